@@ -12,6 +12,7 @@
 ``kernel``            the compiled scheme
 ``reference``         the same step, written plainly, to test the kernel by
 ``generate``          the door to data sets
+``as_function``       the same as a function of arrays, for a reference as anybody's is
 ====================  ==================================================================
 
 Import from the modules: they are kept apart so that nothing compiles before it is needed.

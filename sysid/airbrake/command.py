@@ -125,6 +125,24 @@ class Command:
             return Command(times=tuple(seconds[:-1]), pressures=tuple(table[:-1, 1]), duration=float(seconds[-1]))
         return Command(times=tuple(seconds), pressures=tuple(table[:, 1]), duration=float(duration))
 
+    @staticmethod
+    def from_samples(pressures: NDArray[np.float64], *, sample_time: float) -> Command:
+        """A command from a position for every sample.
+
+        Args:
+            pressures: Psi gauge, shape ``(n,)``.
+            sample_time: Seconds between them.
+
+        Returns:
+            The command, with a row wherever the handle moves.
+        """
+        moved = np.flatnonzero(np.concatenate([[True], np.diff(pressures) != 0.0]))
+        return Command(
+            times=tuple((moved * sample_time).tolist()),
+            pressures=tuple(pressures[moved].tolist()),
+            duration=len(pressures) * sample_time,
+        )
+
     def sampled(self, *, sample_time: float) -> NDArray[np.float64]:
         """The command at each sample, in psi gauge.
 

@@ -134,13 +134,7 @@ def _excited(asked: _Excited, running_pressure: float, sample_time: float) -> Co
         seed=asked.seed,
         **asked.options,
     )
-    values = found.values[:, 0]
-    moved = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
-    return Command(
-        times=tuple((moved * sample_time).tolist()),
-        pressures=tuple(values[moved].tolist()),
-        duration=len(values) * sample_time,
-    )
+    return Command.from_samples(found.values[:, 0], sample_time=sample_time)
 
 
 def _command(recipe: _Recipe, running_pressure: float, sample_time: float) -> Command:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.composite.growth import in_rounds, worst_of
 from sysid.composite.plan import ActiveLearning
 from sysid.models import Cascade
 from sysid.traces import Trace
@@ -137,7 +138,8 @@ Train = Callable[[Cascade, Sequence[Trace], int], tuple[Cascade, float]]
 
 
 Make = Callable[[int], Sequence[Trace]]
-"""Makes the sequences that a round of this number adds from: runs of the reference on new inputs."""
+"""Makes sequences for a round of this number: runs of the reference on new inputs. It adds from these and from what the
+rounds before it have left of theirs."""
 
 
 def sequence_errors(whole: Cascade, sequences: Sequence[Trace], outputs: Sequence[str]) -> NDArray[np.float64]:
@@ -181,7 +183,7 @@ def learn_actively(
         train: Trains it end to end.
         begins: The stage of the report that it stands at.
         estimation: Traces that it was trained on last; every round has them too.
-        pool: Sequences to add from; or what makes the sequences that a round adds from, given its number.
+        pool: Sequences to add from; or what makes more of them for a round, given its number.
         held_out: Sequences that say what a round has brought.
         score: The error by which stages are chosen.
         report: Told after every round.
@@ -189,11 +191,10 @@ def learn_actively(
     Returns:
         What each round brought.
     """
-    make = pool if callable(pool) else None
     left = [] if callable(pool) else list(pool)
     traces, rounds = list(estimation), list[Round]()
 
-    def done(stage: str, added: Sequence[Trace], seconds: float) -> None:
+    def done(now: Cascade, stage: str, added: Sequence[Trace], seconds: float) -> None:
         rounds.append(
             Round(
                 number=len(rounds),
@@ -202,23 +203,29 @@ def learn_actively(
                 traces=len(traces),
                 samples=sum(map(len, traces)),
                 seconds=seconds,
-                assessment=Assessment.at(sequence_errors(whole, held_out, asked.outputs), asked.within),
-                score=score(whole),
+                assessment=Assessment.at(sequence_errors(now, held_out, asked.outputs), asked.within),
+                score=score(now),
             )
         )
         report(rounds[-1])
 
-    done(begins, (), 0.0)
-    while (ended := _ended(asked, rounds, pool_left=make is not None or bool(left))) is None:
-        number = len(rounds)
-        if make is not None:
-            left = list(make(number))
-        added = _picked(asked, whole, left, asked.additions[number - 1])
-        left = [trace for trace in left if trace not in added]
+    def look(number: int, now: Cascade) -> list[Trace]:
+        left.extend(pool(number) if callable(pool) else ())
+        added = _picked(asked, now, left, asked.additions[number - 1])
+        left[:] = [trace for trace in left if trace not in added]
+        return added
+
+    def learn(number: int, now: Cascade, added: Sequence[Trace]) -> Cascade:
         # Behind the others, not between them: where instances take the traces in turn, each keeps its own.
-        traces += added
-        whole, seconds = train(whole, tuple(traces), number)
-        done(f"{LEARNED}, round {number}", added, seconds)
+        traces.extend(added)
+        now, seconds = train(now, tuple(traces), number)
+        done(now, f"{LEARNED}, round {number}", added, seconds)
+        return now
+
+    done(whole, begins, (), 0.0)
+    _, ended = in_rounds(
+        whole, look=look, train=learn, ended=lambda _: _ended(asked, rounds), nothing="it ended with the pool"
+    )
     units = {held_out[0].channel(name).unit for name in asked.outputs}
     unit = units.pop() if len(units) == 1 else ""
     return ActiveLearned(asked=asked, rounds=tuple(rounds), held_out=len(held_out), unit=unit, ended=ended)
@@ -228,12 +235,11 @@ def _picked(asked: ActiveLearning, whole: Cascade, left: Sequence[Trace], count:
     """What the next round adds: the worst of what is left of the pool, or what comes next."""
     if asked.pick == "next":
         return list(left[:count])
-    errors = sequence_errors(whole, left, asked.outputs)
-    return [left[i] for i in np.argsort(-errors, kind="stable")[:count]]
+    return [left[k] for k in worst_of(sequence_errors(whole, left, asked.outputs), count)]
 
 
-def _ended(asked: ActiveLearning, rounds: Sequence[Round], *, pool_left: bool) -> str | None:
-    """Why there is no further round; ``None`` if one is."""
+def _ended(asked: ActiveLearning, rounds: Sequence[Round]) -> str:
+    """Why there is no further round, whatever is left of the pool; empty if nothing speaks against one."""
     best = 0
     for done in rounds[1:]:
         best = done.number if done.assessment.better_than(rounds[best].assessment) else best
@@ -241,6 +247,4 @@ def _ended(asked: ActiveLearning, rounds: Sequence[Round], *, pool_left: bool) -
         return f"it ended with {100.0 * asked.until:g} % under the limit, as aimed at"
     if (idle := len(rounds) - 1 - best) >= asked.patience:
         return f"it ended after {idle} rounds that brought no improvement"
-    if len(rounds) > len(asked.additions):
-        return "it ended with the last round that was asked for"
-    return None if pool_left else "it ended with the pool"
+    return "it ended with the last round that was asked for" if len(rounds) > len(asked.additions) else ""

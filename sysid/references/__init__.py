@@ -9,6 +9,8 @@ what a pipeline or a command names is run, never something that is found beside 
 ``worker``     the process that a reference runs in
 ``runs``       many runs at once, each with its own time limit, kept by their content
 ``design``     which experiments to run: excitations within ranges, parameters spread over theirs
+``events``     departures from the start as an excitation
+``candidates`` new experiments, round by round, for active learning
 ``described``  what an FMU's model description proposes
 =============  =====================================================================================
 

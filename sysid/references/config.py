@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from sysid.errors import UnitError
-from sysid.units import check_unit, plain_unit
+from sysid.units import Reference, check_unit, is_pressure, plain_unit
 from sysid.yaml_files import FieldError
 
 MOST_SAMPLES = 5_000_000
@@ -44,18 +44,38 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class InputPort(_Strict):
-    """An input that experiments move.
+class Port(_Strict):
+    """What goes in or comes out.
 
     Args:
         unit: Its unit.
+        reference: Of a pressure, what it is measured from; ``none`` where the model does not say.
+    """
+
+    unit: Unit = "1"
+    reference: Reference = Reference.NONE
+
+    @model_validator(mode="after")
+    def _pressure(self) -> Port:
+        if self.reference is not Reference.NONE and not is_pressure(self.unit):
+            raise FieldError(
+                "only pressures are measured from something", expected="reference: none, or a unit of pressure",
+                got=f"reference: {self.reference.value}, unit: {self.unit}",
+                remedy="leave reference out, or correct unit",
+            )  # fmt: skip
+        return self
+
+
+class InputPort(Port):
+    """An input that experiments move.
+
+    Args:
         range: Levels, never left.
         rate: Largest change in a second, in its unit; ``None`` for steps.
         levels: The only levels that it may have, where it cannot have all in its range.
         start: Where every experiment begins; the middle of the range by default.
     """
 
-    unit: Unit = "1"
     range: Span
     rate: Annotated[float, Field(gt=0.0)] | None = None
     levels: tuple[float, ...] | None = None
@@ -81,29 +101,21 @@ class InputPort(_Strict):
         return wish if self.levels is None else min(self.levels, key=lambda level: abs(level - wish))
 
 
-class ParameterPort(_Strict):
+class ParameterPort(Port):
     """A parameter that differs from experiment to experiment; a constant input of the surrogate.
 
     Args:
-        unit: Its unit.
         range: Its values.
         variable: Of an FMU, the variable that is set where it has another name: ``variable: x`` of a parameter
             ``x_start`` gives the start value of an output ``x``.
     """
 
-    unit: Unit = "1"
     range: Span
     variable: str | None = None
 
 
-class OutputPort(_Strict):
-    """An output that the surrogate is to have.
-
-    Args:
-        unit: Its unit.
-    """
-
-    unit: Unit = "1"
+class OutputPort(Port):
+    """An output that the surrogate is to have."""
 
 
 class ReferenceConfig(_Strict):

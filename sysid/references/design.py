@@ -7,12 +7,13 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from scipy.stats import qmc
 
 from sysid.excitation import excite
 from sysid.excitation.kinds import KINDS, kind_of
 from sysid.references.config import InputPort, ReferenceConfig
+from sysid.references.events import Events
 from sysid.references.runs import Case
 from sysid.yaml_files import FieldError
 
@@ -28,7 +29,8 @@ class Excited(BaseModel):
     Args:
         kind: Of :mod:`sysid.excitation` (``aprbs``, ``prbs``, ``multisine``, ``noise``, ``chirp``, ``staircase``,
             ``ramps``, ``sine``, ``pulses``), or ``events``: away from the start to random levels, with rest between.
-        options: Of the kind, as :func:`sysid.excite` takes them.
+        options: Of the kind, as :func:`sysid.excite` takes them; of events those of
+            :class:`~sysid.references.events.Events`.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -37,12 +39,25 @@ class Excited(BaseModel):
 
     @model_validator(mode="after")
     def _known(self) -> Excited:
-        if self.kind not in {*KINDS, *OWN} or (self.kind in OWN and self.options):
+        if self.kind not in {*KINDS, *OWN}:
             raise FieldError(
-                "there is no such excitation, or it has no options", expected=", ".join([*KINDS, *OWN]), got=self.kind,
-                remedy="name one of these; events follow hold and have no options",
+                "there is no such excitation", expected=", ".join([*KINDS, *OWN]), got=self.kind,
+                remedy="name one of these",
             )  # fmt: skip
+        if self.kind in OWN:
+            self.events()
         return self
+
+    def events(self) -> Events:
+        """The options of events."""
+        try:
+            return Events.model_validate(self.options)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise FieldError(
+                f"events cannot be so: {first['msg']}", expected=f"some of {', '.join(Events.model_fields)}",
+                got=str(self.options), remedy="correct options, or leave them out",
+            ) from None  # fmt: skip
 
 
 class Counts(BaseModel):
@@ -207,8 +222,8 @@ def moved(config: ReferenceConfig, design: Design, excited: Excited, seed: int) 
     rest, length = np.array([port.begin for port in ports]), samples - lead
     low, high = (np.array([port.range[k] for port in ports]) for k in (0, 1))
     if excited.kind in OWN:
-        rngs = [np.random.default_rng([seed, k]) for k in range(len(ports))]
-        x = np.column_stack([_events(r, length, shortest, longest, p) for r, p in zip(rngs, ports, strict=True)])
+        how, rngs = excited.events(), [np.random.default_rng([seed, k]) for k in range(len(ports))]
+        x = np.column_stack([how.drawn(r, length, h, (shortest, longest), p) for r, p in zip(rngs, ports, strict=True)])
     else:
         kind = kind_of(excited.kind, {**_usual(excited.kind, length, shortest, longest, h), **excited.options})
         names = [f"u{k}" for k in range(len(ports))]
@@ -239,17 +254,6 @@ def _usual(kind: str, length: int, shortest: int, longest: int, h: float) -> Map
         # A low peak takes iterations, and says nothing where there are many experiments.
         return found | {"iterations": 0} if kind == "multisine" else found
     return known.get(kind, {})
-
-
-def _events(rng: np.random.Generator, length: int, shortest: int, longest: int, port: InputPort) -> NDArray[np.float64]:
-    """Rest, then away from it to a random level, and back: single events, and some in quick succession."""
-    x, at = np.full(length, port.begin), 0
-    while at < length:
-        at += int(rng.integers(shortest, 2 * longest + 1))
-        held = int(rng.integers(shortest, longest + 1))
-        x[at : at + held] = rng.uniform(*port.range)
-        at += held
-    return x
 
 
 def _kept_to(x: NDArray[np.float64], port: InputPort, h: float) -> NDArray[np.float64]:

@@ -369,10 +369,8 @@ def channels_of(config: ReferenceConfig) -> tuple[Channel, ...]:
     Returns:
         Inputs, parameters, outputs.
     """
-    units = [(name, port.unit) for name, port in config.inputs.items()]
-    units += [(name, port.unit) for name, port in config.parameters.items()]
-    units += [(name, port.unit) for name, port in config.outputs.items()]
-    return tuple(Channel(name=name, unit=unit) for name, unit in units)
+    ports = {**config.inputs, **config.parameters, **config.outputs}
+    return tuple(Channel(name=name, unit=port.unit, reference=port.reference) for name, port in ports.items())
 
 
 @contextlib.contextmanager

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from sysid.errors import ConfigError
 from sysid.yaml_files import Origins, read_yaml
@@ -20,6 +20,8 @@ from sysid.yaml_files import Origins, read_yaml
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
+    from sysid.ingest.dataset import Unmade
+    from sysid.traces import TraceSet
     from sysid.workbench.runner.program import Program
 
 DEFAULT = "fits"
@@ -57,10 +59,12 @@ class Kind:
         config: Its pydantic model, as ``module:attribute``.
         program: A function of a :class:`RunRequest` that gives its :class:`~sysid.workbench.runner.program.Program`, as
             ``module:attribute``.
+        data: Of a kind that gives data, what stands for a data set, made of the pipeline's path by its ``at``.
     """
 
     config: str
     program: str
+    data: str | None = None
 
     def load_config(self) -> type[BaseModel]:
         """The pydantic model."""
@@ -71,6 +75,20 @@ class Kind:
         """What turns a request into steps."""
         loaded: Callable[[RunRequest], Program[Any]] = _load(self.program)
         return loaded
+
+
+class DataSource(Protocol):
+    """Data that a pipeline gives."""
+
+    @classmethod
+    def at(cls, path: Path) -> DataSource:
+        """Those of the pipeline in a file."""
+
+    def load(self, progress: Callable[[str, int, int], None] | None = None) -> TraceSet:
+        """The traces with their roles; made where they are not there, of which ``progress`` is told."""
+
+    def unmade(self) -> Unmade | None:
+        """What has yet to be made of them; ``None`` if nothing."""
 
 
 FOUND: dict[str, Kind] = {
@@ -92,7 +110,9 @@ KINDS: dict[str, Kind] = {
     ),
     "auto": Kind(config="sysid.workbench.auto.config:AutoConfig", program="sysid.workbench.auto.run:program"),
     "experiment": Kind(
-        config="sysid.workbench.experiments.config:ExperimentConfig", program="sysid.workbench.experiments.run:program"
+        config="sysid.workbench.experiments.config:ExperimentConfig",
+        program="sysid.workbench.experiments.run:program",
+        data="sysid.workbench.experiments.data:ExperimentData",
     ),
     "sweep": Kind(config="sysid.workbench.sweep.config:SweepConfig", program="sysid.workbench.sweep.run:program"),
 }
@@ -138,6 +158,32 @@ def kind_of(path: Path) -> str:
             remedy=f"did you mean {near[0]}?" if near else f"leave kind out for a pipeline of {DEFAULT}",
         )
     return name
+
+
+def data_of_pipeline(path: Path) -> DataSource | None:
+    """The data that a pipeline gives.
+
+    Args:
+        path: What may be one.
+
+    Returns:
+        They; ``None`` where it is no file of a pipeline.
+
+    Raises:
+        ConfigError: If it is a pipeline of a kind that gives none, or one that cannot be used.
+    """
+    if path.suffix.lower() not in {".yaml", ".yml"} or not path.is_file() or "kind" not in read_yaml(path):
+        return None
+    known, name = kinds(), kind_of(path)
+    address = known[name].data
+    if address is None:
+        raise ConfigError(
+            "a pipeline is named where data are asked for", where=path,
+            expected=f"a data set, or a pipeline of kind {', '.join(key for key, row in known.items() if row.data)}",
+            got=f"kind: {name}", remedy="name the data set",
+        )  # fmt: skip
+    source: type[DataSource] = _load(address)
+    return source.at(path)
 
 
 def _load(address: str) -> Any:

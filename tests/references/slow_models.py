@@ -45,6 +45,16 @@ def stiffens(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arr
     return y
 
 
+def tanks(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Two tanks that feed each other: the upper drains into the lower one, and the less the fuller that is."""
+    levels = np.zeros((len(time), 2))
+    for t, pump in enumerate(inputs[:-1, 0], start=1):
+        upper, lower = levels[t - 1]
+        down = 0.15 * np.sqrt(max(upper - 0.3 * lower, 0.0))
+        levels[t] = upper + 0.1 * pump - down, lower + down - 0.08 * lower
+    return levels
+
+
 def thermal(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A wall of 200 layers, heated on one side and cooled by radiation and convection on the other: stiff.
 

@@ -199,6 +199,8 @@ class AssemblyConfig(Words):
             )
         check_rounds(self.learning_rounds)
         pool = self.active_learning.data
+        if self.active_learning.candidates is not None:
+            return self  # new ones, whatever else the pipeline's own experiments are used for
         if (used := self._data).get(pool):
             raise FieldError(
                 f"the pool of active_learning is used otherwise: {pool} is under {used[pool]}",

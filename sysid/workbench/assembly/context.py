@@ -10,17 +10,21 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from sysid.code_digest import code_digest
 from sysid.composite.keeper import Decision, Fit, Sample, Task
+from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, FitResult
 from sysid.models import Cascade
 from sysid.names import slug, task_slug
-from sysid.traces import TraceSet
+from sysid.traces import Trace, TraceSet
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.exporting import export_model
 from sysid.workbench.assembly.extending import Joined
-from sysid.workbench.fits.data import load_named, unmade_data
+from sysid.workbench.assembly.stage_config import ActiveLearningConfig
+from sysid.workbench.experiments.data import ExperimentData
+from sysid.workbench.fits.data import estimate_of, load_named, unmade_data
 from sysid.workbench.fits.estimates import network_time
 from sysid.workbench.fits.record import is_final, read_fit, write_fit
 from sysid.workbench.fits.steps import STORED_BY
+from sysid.workbench.kinds import data_of_pipeline
 from sysid.workbench.runner import events
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
@@ -86,6 +90,36 @@ class Context:
             at_hand=lambda: unmade_data([name], beside=self.beside) is None,
             how_long=lambda: unmade_data([name], beside=self.beside) or NOT_KNOWN,
         )
+
+    def new_runs(self, asked: ActiveLearningConfig, number: int) -> list[Trace]:
+        """Ask the reference behind active learning for new experiments.
+
+        Args:
+            asked: The active learning, with ``candidates``.
+            number: Of the round that looks at them; 0 for those that are held out of all.
+
+        Returns:
+            Their records; what has been run is found.
+        """
+        source, found_out = new_runs_of(asked, self.beside), new_runs_outlined(asked, number, self.beside)
+        count = asked.candidates if number else asked.held_out
+
+        def make(work: Work) -> list[Trace]:
+            return source.new(
+                number, count or 0, duration=asked.duration,
+                progress=lambda case, done, of: work.say(f"{case} ({done} of {of})", done / of),
+            )  # fmt: skip
+
+        return self.run.do(
+            Step(
+                name=found_out.name,
+                title=found_out.title,
+                make=make,
+                outcome=lambda traces: f"{len(traces)} traces",
+                at_hand=lambda: source.unmade_new(number, count or 0, duration=asked.duration) is None,
+                how_long=found_out.how_long,
+            )
+        ).value
 
     def keep(self, task: Task[Fit]) -> Fit:
         """The result of a task of the training, stored under what it depends on.
@@ -213,6 +247,50 @@ class Context:
             What came of it.
         """
         return self.run.do(Step(name=step.name, title=step.title, make=make, outcome=outcome)).value
+
+
+def new_runs_of(asked: ActiveLearningConfig, beside: Path) -> ExperimentData:
+    """The experiments whose reference active learning asks for new runs.
+
+    Args:
+        asked: The active learning.
+        beside: Folder of the pipeline.
+
+    Returns:
+        They.
+
+    Raises:
+        ConfigError: If its data are no pipeline of kind ``experiment``.
+    """
+    source = data_of_pipeline(beside / asked.data)
+    if not isinstance(source, ExperimentData):
+        raise ConfigError(
+            "only a pipeline of kind experiment can be asked for new runs", where="active_learning, data",
+            expected="its file, seen from the folder of the pipeline", got=asked.data,
+            remedy="name one, or leave candidates and held_out out: a data set has its pool",
+        )  # fmt: skip
+    return source
+
+
+def new_runs_outlined(asked: ActiveLearningConfig, number: int, beside: Path) -> Outlined:
+    """The step that asks for new runs, before it is come to.
+
+    Args:
+        asked: The active learning.
+        number: Of the round; 0 for those that are held out.
+        beside: Folder of the pipeline.
+
+    Returns:
+        Its name, its title and how long it takes.
+    """
+    count = (asked.candidates if number else asked.held_out) or 0
+
+    def how_long() -> Estimate:
+        unmade = new_runs_of(asked, beside).unmade_new(number, count, duration=asked.duration)
+        return estimate_of([] if unmade is None else [unmade]) or Estimate(seconds=1.0, basis="they have been run")
+
+    title = f"Running {count} new experiments" + (f" for round {number}" if number else ", which train nothing")
+    return Outlined(name=f"new-runs-{number}", title=title, how_long=how_long)
 
 
 def _how_long(sample: Sample | None) -> Estimate:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from sysid.composite import TrainingData, dealt
+from sysid.composite.active_learning import Make
 from sysid.errors import ConfigError
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.assembly.context import Context
@@ -47,8 +49,14 @@ class AssemblyData:
         if not estimation or not selection:
             raise _lacks_a_role("the training data lack a role", *training)
         beside = {name: context.load(name) for name in (config.together.data if config.together else ())}
-        pool = None if config.active_learning is None else context.load(config.active_learning.data)
-        sources, held_out = (None, ()) if pool is None else _pool(pool)
+        learning, pool = config.active_learning, None
+        sources: Sequence[Trace] | Make | None = None
+        held_out: Sequence[Trace] = ()
+        if learning is not None and learning.candidates is not None:
+            held_out, sources = context.new_runs(learning, 0), partial(context.new_runs, learning)
+        elif learning is not None:
+            pool = context.load(learning.data)
+            sources, held_out = _pool(pool)
         more = [*beside.values(), *([] if pool is None else [pool])]
         return cls(
             data=TrainingData(

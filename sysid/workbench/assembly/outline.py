@@ -9,6 +9,7 @@ from pathlib import Path
 from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name, candidate_title
 from sysid.names import slug, task_slug
 from sysid.workbench.assembly.config import AssemblyConfig
+from sysid.workbench.assembly.context import new_runs_outlined
 from sysid.workbench.assembly.estimates import RoundEstimates
 from sysid.workbench.assembly.evaluation import INTERPOLATION, MEMBERS, MONTE_CARLO, SCORING, WHOLE, export_step
 from sysid.workbench.fits.data import unmade_data
@@ -27,14 +28,17 @@ def outline(config: AssemblyConfig, beside: Path, estimates: RoundEstimates) -> 
     Returns:
         The steps in order; active learning may end before its last round.
     """
-    return [*_data(config, beside), *_training(config, estimates), *_proof(config, beside), REPORT]
+    return [*_data(config, beside), *_training(config, beside, estimates), *_proof(config, beside), REPORT]
 
 
 def _data(config: AssemblyConfig, beside: Path) -> list[Outlined]:
     training = (config.training,) if isinstance(config.training, str) else config.training
     names = [config.data, *training, config.selection, *(config.together.data if config.together else ())]
-    names += [] if config.active_learning is None else [config.active_learning.data]
-    return [_loading(name, beside) for name in dict.fromkeys(names) if name is not None]
+    learning = config.active_learning
+    asks = learning is not None and learning.candidates is not None
+    names += [] if learning is None or asks else [learning.data]
+    loaded = [_loading(name, beside) for name in dict.fromkeys(names) if name is not None]
+    return [*loaded, *([new_runs_outlined(learning, 0, beside)] if learning is not None and asks else [])]
 
 
 def _loading(name: str, beside: Path) -> Outlined:
@@ -42,7 +46,7 @@ def _loading(name: str, beside: Path) -> Outlined:
     return Outlined(name=f"data-{slug(name)}", title=f"Loading {name}", estimate=estimate)
 
 
-def _training(config: AssemblyConfig, estimates: RoundEstimates) -> Iterator[Outlined]:
+def _training(config: AssemblyConfig, beside: Path, estimates: RoundEstimates) -> Iterator[Outlined]:
     plan = config.plan
     if config.warm_start is None:
         yield from _members(config, estimates)
@@ -53,6 +57,8 @@ def _training(config: AssemblyConfig, estimates: RoundEstimates) -> Iterator[Out
     if plan.active_learning is not None:
         parts = len(plan.active_learning.rounds)
         for number in range(1, len(plan.active_learning.additions) + 1):
+            if config.active_learning is not None and config.active_learning.candidates is not None:
+                yield new_runs_outlined(config.active_learning, number, beside)
             for part in range(1, parts + 1):
                 suffix = f".{part}" if parts > 1 else ""
                 name = f"active-learning-{number}{suffix.replace('.', '-')}"

@@ -254,7 +254,12 @@ class ActiveLearningConfig(BaseModel):
     Args:
         data: Data set of the pool: cases with ``role: estimation`` are added from, cases with ``role: selection`` are
             never trained on, say what a round has brought, and choose with the other selection traces, among the states
-            of a round of active learning and between the stages. A data set that nothing else uses.
+            of a round of active learning and between the stages. A data set that nothing else uses. Or, with
+            ``candidates``, a pipeline of kind ``experiment``, whose reference is asked for new runs.
+        candidates: New random experiments that a round looks at, with those that the rounds before left. They are drawn
+            as the pipeline draws its own, and are none of its own, which may be trained on.
+        held_out: New random experiments in the place of those with ``role: selection``.
+        duration: Seconds of each new experiment; those of the pipeline's by default.
         outputs: Outputs that are looked at; the one with the largest error counts.
         within: Root mean square error in their unit that a sequence should stay under.
         add: Sequences added in each round; or in each one of its own, and there are as many rounds: ``[10, 20, 40]``.
@@ -271,6 +276,9 @@ class ActiveLearningConfig(BaseModel):
     model_config = STRICT
 
     data: str
+    candidates: Count | None = None
+    held_out: Count | None = None
+    duration: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     outputs: tuple[str, ...] = Field(min_length=1)
     within: float = Field(gt=0.0)
     add: Count | Annotated[tuple[Count, ...], Field(min_length=1)] = 20
@@ -289,6 +297,13 @@ class ActiveLearningConfig(BaseModel):
                 got=f"rounds: {self.rounds}, add: {', '.join(map(str, self.add))}",
                 remedy="leave rounds out: add says it",
             )
+        asked = [name for name in ("candidates", "held_out", "duration") if getattr(self, name) is not None]
+        if asked and not {"candidates", "held_out"} <= set(asked):
+            raise FieldError(
+                "a reference that is asked for new runs is told how many of each",
+                expected="candidates and held_out together, and duration with them at most", got=" and ".join(asked),
+                remedy="name both, or neither where the data are a data set",
+            )  # fmt: skip
         return self
 
     @property

@@ -13,8 +13,8 @@ from sysid.errors import ConfigError
 from sysid.ingest import load_dataset, write_csv
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import designed
-from sysid.references.runs import Case, Outcome, ReferenceRuns, channels_of
-from sysid.traces import Channel, TraceSet
+from sysid.references.runs import Case, Outcome, Progress, ReferenceRuns, channels_of
+from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import is_pressure
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.runner.events import Warned
@@ -69,8 +69,23 @@ def program(request: RunRequest) -> Program[Experimented]:
     Raises:
         UserError: If the pipeline cannot be used.
     """
-    config = check(ExperimentConfig, read_yaml(request.path), where=request.path)
+    config = read_config(request.path)
     return program_of(config, text=request.path.read_text(encoding="utf-8-sig"), folder=request.path.resolve().parent)
+
+
+def read_config(path: Path) -> ExperimentConfig:
+    """The pipeline in a file.
+
+    Args:
+        path: The YAML.
+
+    Returns:
+        It, checked.
+
+    Raises:
+        ConfigError: If it is not one.
+    """
+    return check(ExperimentConfig, read_yaml(path), where=path)
 
 
 def program_of(config: ExperimentConfig, *, text: str, folder: Path) -> Program[Experimented]:
@@ -84,7 +99,7 @@ def program_of(config: ExperimentConfig, *, text: str, folder: Path) -> Program[
     Returns:
         The program.
     """
-    work = _Experiments(config=config, reference=config.reference.at(folder))
+    work = Experiments(config=config, reference=config.reference.at(folder))
     return Program(
         name=config.name,
         keep=lambda place: write_bytes(place / "pipeline.yaml", text.encode()),
@@ -96,23 +111,35 @@ def program_of(config: ExperimentConfig, *, text: str, folder: Path) -> Program[
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Experiments:
+class Experiments:
+    """What a pipeline runs.
+
+    Args:
+        config: The pipeline.
+        reference: With whole paths.
+    """
+
     config: ExperimentConfig
     reference: ReferenceConfig
 
     def cases(self) -> dict[str, list[Case]]:
+        """The experiments of the design, by role."""
         return designed(self.reference, self.config.experiment)
 
     def run(self, run: Run) -> Experimented:
+        """Run them and load what came of them, as steps."""
         outcomes = run.do(self._running(run)).value
         return run.do(self._loading(run, outcomes)).value
+
+    def lacking(self, cases: Sequence[Case]) -> tuple[int, float | None, str]:
+        """How many of some experiments have yet to be run, seconds that one takes, and where that is known from."""
+        with ReferenceRuns(config=self.reference, workers=self.config.workers) as runs:
+            return len(cases) - runs.kept(cases), *runs.seconds_each()
 
     def estimate(self) -> Estimate:
         """Wall time of what has yet to be run."""
         cases = [case for some in self.cases().values() for case in some]
-        with ReferenceRuns(config=self.reference, workers=self.config.workers) as runs:
-            left = len(cases) - runs.kept(cases)
-            each, basis = runs.seconds_each()
+        left, each, basis = self.lacking(cases)
         said = f"{left} of {len(cases)} runs to make"
         if each is None:
             limit = self.reference.time_limit
@@ -139,11 +166,22 @@ class _Experiments:
             return _by_role(cases, runs.run(flat))
 
     def _ran(self, run: Run, work: Work) -> dict[str, list[Outcome]]:
+        return self.made(lambda name, n, count: work.say(f"{name} ({n} of {count})", n / count), fresh=run.fresh)
+
+    def made(self, progress: Progress | None, *, fresh: bool = False) -> dict[str, list[Outcome]]:
+        """What comes of the experiments.
+
+        Args:
+            progress: Told of each that is done.
+            fresh: Whether they are run again, whatever is kept.
+
+        Returns:
+            By role.
+        """
         cases = self.cases()
         flat = [case for some in cases.values() for case in some]
-        with ReferenceRuns(config=self.reference, workers=self.config.workers, fresh=run.fresh) as runs:
-            done = runs.run(flat, lambda name, n, count: work.say(f"{name} ({n} of {count})", n / count))
-        return _by_role(cases, done)
+        with ReferenceRuns(config=self.reference, workers=self.config.workers, fresh=fresh) as runs:
+            return _by_role(cases, runs.run(flat, progress))
 
     def _loading(self, run: Run, outcomes: Mapping[str, Sequence[Outcome]]) -> Step[Experimented]:
         """Write the data set and load its traces, which shows that it can be used."""
@@ -184,23 +222,10 @@ def write_dataset(
     Raises:
         ConfigError: If there is no record to fit.
     """
-    there = {role: [one for one in some if one.trace is not None] for role, some in outcomes.items()}
-    if not there.get("estimation"):
-        reasons = sorted({str(one.reason) for some in outcomes.values() for one in some if one.reason})
-        raise ConfigError(
-            "no run of the reference gave a record to fit", where=config.name,
-            expected="one record at least", got="; ".join(reasons[:SHOWN]),
-            remedy="run the reference in its own tool with these inputs first, or raise time_limit",
-        )  # fmt: skip
-    for some in there.values():
-        for one in some:
-            assert one.trace is not None  # noqa: S101 - those without are left out above
-            write_csv(one.trace, folder / TRACES / f"{one.case.name}.csv")
-    cases = {
-        one.case.name: {"role": role, "file": f"{TRACES}/{one.case.name}.csv"}
-        for role, some in there.items()
-        for one in some
-    }
+    there = records(config, outcomes)
+    for trace, _ in there:
+        write_csv(trace, folder / TRACES / f"{trace.name}.csv")
+    cases = {trace.name: {"role": role, "file": f"{TRACES}/{trace.name}.csv"} for trace, role in there}
     fields = {
         "name": config.name,
         "description": config.description or f"Designed experiments on a reference ({reference.kind})",
@@ -215,9 +240,33 @@ def write_dataset(
     return folder / DATASET
 
 
+def records(config: ExperimentConfig, outcomes: Mapping[str, Sequence[Outcome]]) -> list[tuple[Trace, str]]:
+    """The records that came of experiments.
+
+    Args:
+        config: The pipeline.
+        outcomes: By role.
+
+    Returns:
+        Each with its role.
+
+    Raises:
+        ConfigError: If there is no record to fit.
+    """
+    there = [(one.trace, role) for role, some in outcomes.items() for one in some if one.trace is not None]
+    if not any(role == "estimation" for _, role in there):
+        reasons = sorted({str(one.reason) for some in outcomes.values() for one in some if one.reason})
+        raise ConfigError(
+            "no run of the reference gave a record to fit", where=config.name,
+            expected="one record at least", got="; ".join(reasons[:SHOWN]),
+            remedy="run the reference in its own tool with these inputs first, or raise time_limit",
+        )  # fmt: skip
+    return there
+
+
 def _channel(channel: Channel) -> dict[str, str]:
-    """A pressure has to say what it is measured from; a slow model says nothing of it."""
-    told = {"reference": "none"} if is_pressure(channel.unit) else {}
+    """A pressure has to say what it is measured from, be it nothing."""
+    told = {"reference": channel.reference.value} if is_pressure(channel.unit) else {}
     return {"name": channel.name, "unit": channel.unit, **told}
 
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
@@ -14,7 +15,11 @@ from sysid.models import Mapping
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.annotation import annotated_set, find_annotator, weighted
 from sysid.workbench.fits.config import PipelineConfig
+from sysid.workbench.kinds import data_of_pipeline
 from sysid.workbench.runner.steps import Estimate
+
+if TYPE_CHECKING:
+    from sysid.ingest.dataset import Unmade
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,9 +116,23 @@ def unmade_data(names: Iterable[str | None], *, beside: Path) -> Estimate | None
     found = []
     for name in dict.fromkeys(name for name in names if name is not None):
         place, search = _place(name, beside)
-        if not is_file_of_traces(place):
+        source = data_of_pipeline(Path(place))
+        if source is not None:
+            found.append(source.unmade())
+        elif not is_file_of_traces(place):
             found.append(unmade(place, search=search))
-    lacking = [one for one in found if one is not None]
+    return estimate_of([one for one in found if one is not None])
+
+
+def estimate_of(lacking: Sequence[Unmade]) -> Estimate | None:
+    """How long it takes to make what data lack.
+
+    Args:
+        lacking: What each lacks.
+
+    Returns:
+        The time, as far as it is known; ``None`` if nothing is lacking.
+    """
     if not lacking:
         return None
     made = (
@@ -147,7 +166,8 @@ def load_named(name: str, beside: Path, *, progress: Callable[[str, int, int], N
     """Load a data set as a pipeline names it.
 
     Args:
-        name: Its name, its folder beside the pipeline's file, or a file with traces, whose one trace is for estimation.
+        name: Its name, its folder beside the pipeline's file, a file with traces, whose one trace is for estimation, or
+            a pipeline of kind ``experiment``, which is run.
         beside: Folder of the pipeline's file.
         progress: Called as ``progress(case, index, count)`` before each case.
 
@@ -158,6 +178,8 @@ def load_named(name: str, beside: Path, *, progress: Callable[[str, int, int], N
     from sysid.ingest import load_dataset
 
     place, search = _place(name, beside)
+    if (source := data_of_pipeline(Path(place))) is not None:
+        return source.load(lambda case, done, count: progress(case, done - 1, count))
     if is_file_of_traces(place):
         return load(place)
     return load_dataset(place, search=search, progress=progress)

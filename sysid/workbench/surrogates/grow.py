@@ -10,18 +10,21 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.composite.growth import in_rounds, worst_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, Training, estimators
 from sysid.estimation.estimators import estimator_of
 from sysid.models import Start
+from sysid.references.candidates import Candidates
 from sysid.references.config import ReferenceConfig
-from sysid.references.design import Design, drawn
+from sysid.references.design import Design
 from sysid.references.runs import Case, Outcome, ReferenceRuns
 from sysid.reporting.growth import GrowthRecord, RoundRecord
 from sysid.traces import Role, Trace, TraceSet
@@ -31,8 +34,6 @@ from sysid.workbench.fits.steps import fit_code
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.surrogates.proof import rms_shares, surrogate_inputs
 
-SEED = 55_001
-"""Of the candidates, behind the design's and before the round's: neither the first runs nor the proof are so drawn."""
 PATIENCE, GAIN = 2, 0.02
 """Rounds without a gain after which it ends, and the part of the error by which a round has to better it."""
 MEMBERS = 2
@@ -101,6 +102,7 @@ class Grower:
     _began: float = field(default_factory=time.monotonic)
     _rows: list[RoundRecord] = field(default_factory=list)
     _ran: int = 0
+    _seen: list[Outcome] = field(default_factory=list)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -131,25 +133,23 @@ class Grower:
                 "growth cannot be judged", where="runs", expected="selection runs, which say what a round has brought",
                 got="none", remedy="give runs a number for selection",
             )  # fmt: skip
-        self._began, self._rows, self._ran = time.monotonic(), [], 0
+        self._began, self._rows, self._ran, self._seen = time.monotonic(), [], 0, []
         begun = self._stand(first, [])
         self._row(0, "start", begun, 0)
-        stands, control, ended, stale = [begun], [begun], "", 0
+        control = [begun]
         with ReferenceRuns(config=self.reference, workers=self.workers) as runs:
-            while not ended:
-                number = len(stands)
-                added, drawn_now = self._picked(runs, number, stands[-1])
-                if not added:
-                    ended = f"none of {self.config.candidates} new experiments is beyond {self.config.until:.2g}"
-                    break
-                stands.append(self._round(number, stands[-1], added, self.config.pick))
+
+            def train(number: int, former: Stand, added: Sequence[Outcome]) -> Stand:
+                stand = self._round(number, former, added, self.config.pick)
                 if self.config.control:
-                    control.append(
-                        self._round(number, control[-1], self._as_they_come(runs, drawn_now, added), "random")
-                    )
-                best = min(one.error for one in stands[:-1])
-                stale = 0 if stands[-1].error < (1.0 - GAIN) * best else stale + 1
-                ended = self._ended(number, stands[-1].error, stale)
+                    beside = self._as_they_come(runs, self._candidates.cases(number), added)
+                    control.append(self._round(number, control[-1], beside, "random"))
+                return stand
+
+            stands, ended = in_rounds(
+                begun, look=partial(self._picked, runs), train=train, ended=self._ended,
+                nothing=f"none of {self.config.candidates} new experiments is beyond {self.config.until:.2g}",
+            )  # fmt: skip
         every = [*stands, *control[1:]]
         chosen = min(range(len(every)), key=lambda k: (every[k].error, k))
         record = GrowthRecord(
@@ -160,33 +160,40 @@ class Grower:
         )  # fmt: skip
         return Grown(best=every[chosen], record=record)
 
-    def _ended(self, number: int, error: float, stale: int) -> str:
+    def _ended(self, stands: Sequence[Stand]) -> str:
         """Why there is no further round; empty where there is one."""
-        if error <= self.config.until:
+        if len(stands) == 1:
+            return ""
+        if stands[-1].error <= self.config.until:
             return "the error quantile holds"
+        errors, stale = [one.error for one in stands], 0
+        while stale < len(errors) - 1 and errors[-1 - stale] >= (1.0 - GAIN) * min(errors[: -1 - stale]):
+            stale += 1
         if stale >= PATIENCE:
             return f"the last {PATIENCE} rounds gained less than {GAIN:.0%}"
-        if number >= self.config.rounds:
+        if len(stands) > self.config.rounds:
             return "all rounds are done"
         return "the time is spent" if self._left() <= 0.0 else ""
 
     def _left(self) -> float:
         return float("inf") if self.seconds is None else self.seconds - (time.monotonic() - self._began)
 
-    def _picked(self, runs: ReferenceRuns, number: int, stand: Stand) -> tuple[list[Outcome], list[Case]]:
-        """What a round adds, and the candidates that it looked at."""
-        config = self.config
-        cases = drawn(
-            self.reference, self.design, config.candidates, seed=(self.design.seed, SEED, number), prefix=f"G{number}N"
-        )
+    @property
+    def _candidates(self) -> Candidates:
+        return Candidates(reference=self.reference, design=self.design, count=self.config.candidates)
+
+    def _picked(self, runs: ReferenceRuns, number: int, stand: Stand) -> list[Outcome]:
+        """What a round adds."""
+        config, cases = self.config, self._candidates.cases(number)
         if config.pick == "uncertain":
-            doubt = self._doubt(stand, cases)
-            asked = [cases[k] for k in np.argsort(-doubt, kind="stable")[: config.keep]]
-            return [one for one in self._run(runs, asked) if one.trace is not None], cases
-        done = [one for one in self._run(runs, cases) if one.trace is not None]
-        errors = self._errors(stand.fits, [one.trace for one in done if one.trace is not None])
-        worst = [int(k) for k in np.argsort(-errors, kind="stable")[: config.keep] if errors[k] > config.until]
-        return [done[k] for k in worst], cases
+            asked = [cases[k] for k in worst_of(self._doubt(stand, cases), config.keep)]
+            return [one for one in self._run(runs, asked) if one.trace is not None]
+        # What was run for an earlier round and not added may be what is worst now.
+        taken = {one.case.name for one in stand.added}
+        self._seen += [one for one in self._run(runs, cases) if one.trace is not None]
+        left = [one for one in self._seen if one.case.name not in taken]
+        errors = self._errors(stand.fits, [one.trace for one in left if one.trace is not None])
+        return [left[k] for k in worst_of(errors, config.keep, beyond=config.until)]
 
     def _as_they_come(self, runs: ReferenceRuns, cases: Sequence[Case], added: Sequence[Outcome]) -> list[Outcome]:
         """As many of the same candidates, in the order in which they were drawn."""

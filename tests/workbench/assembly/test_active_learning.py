@@ -12,6 +12,7 @@ from sysid.errors import ConfigError
 from sysid.workbench.assembly.stage_config import ActiveLearningConfig
 from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
+from tests.references import slow_models
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results, write_tanks
 from tests.workbench.assembly.test_config import config
 
@@ -174,3 +175,44 @@ def test_the_rounds_of_active_learning_are_the_last_one_before_but_for_what_they
 def test_a_share_of_none_is_nothing_to_aim_at():
     with pytest.raises(ValidationError, match="until"):
         ActiveLearningConfig(data="pool", outputs=("BC",), within=1.0, until=0.0)
+
+
+ASKED_FOR = """\
+kind: experiment
+name: tank-runs
+reference:
+  python: {module}:tanks
+  folder: {folder}
+  sample_time: 1.0
+  inputs: {{pump: {{unit: cm, range: [0, 2], start: 0}}}}
+  outputs: {{upper: {{unit: cm}}, lower: {{unit: cm}}}}
+experiment: {{duration: 150, runs: {{estimation: 2, selection: 1, test: 0}}, excitations: [events], hold: [10, 30]}}
+workers: 1
+"""
+ASKING = GROWN.replace("{data: pool,", "{data: tank-runs.yaml, candidates: 2, held_out: 2, duration: 100,")
+
+
+def test_it_adds_new_runs_that_a_reference_is_asked_for(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SYSID_CACHE", str(workspace / "cache"))
+    (workspace / "pipelines" / "tank-runs.yaml").write_text(
+        ASKED_FOR.format(module=Path(slow_models.__file__).stem, folder=Path(slow_models.__file__).parent),
+        encoding="utf-8",
+    )
+    text = LEAN.replace(GROWN, ASKING).replace("training: tanks", "training: tank-runs.yaml")
+    results = run(workspace, text)
+    (found,) = results.active_learning
+    assert [one.added for one in found.rounds[:1]] == [[]]
+    # The second round looks at what the first has left, too; 150 samples were fitted first, 100 are added each time.
+    assert all(name[:3] in {"G1N", "G2N"} for one in found.rounds[1:] for name in one.added)
+    assert [one.samples for one in found.rounds] == [150, 250, 350]
+    assert found.held_out == 2
+    kept = {one: one.stat().st_mtime_ns for one in (workspace / "cache").rglob("*") if one.is_file()}
+    assert run(workspace, text).stages == results.stages
+    assert {one: one.stat().st_mtime_ns for one in kept} == kept, "nothing is run again"
+
+
+def test_only_a_reference_is_asked_for_new_runs_and_how_many_is_said(pooled: Path) -> None:
+    with pytest.raises(ConfigError, match="only a pipeline of kind experiment can be asked"):
+        run(pooled, LEAN.replace(GROWN, ASKING.replace("tank-runs.yaml", "tanks")))
+    with pytest.raises(ValidationError, match="told how many of each"):
+        ActiveLearningConfig.model_validate(ASKED | {"candidates": 3})

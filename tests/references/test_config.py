@@ -1,0 +1,24 @@
+"""What a reference is, as it stands in YAML: its ports, and what their pressures are measured from."""
+
+from __future__ import annotations
+
+import pytest
+
+from sysid.references.config import InputPort, ReferenceConfig
+from sysid.references.runs import channels_of
+
+
+def test_a_pressure_says_what_it_is_measured_from() -> None:
+    psi = {"unit": "psi", "reference": "gauge"}
+    config = ReferenceConfig.model_validate(
+        {
+            **{"python": "a:b", "sample_time": 0.1, "inputs": {"handle": {**psi, "range": [60, 90]}}},
+            "outputs": {"pipe": psi, "cylinder": {"unit": "psi"}},
+        }
+    )
+    assert [one.label for one in channels_of(config)] == ["handle [psi gauge]", "pipe [psi gauge]", "cylinder [psi]"]
+
+
+def test_what_is_no_pressure_is_measured_from_nothing() -> None:
+    with pytest.raises(ValueError, match="only pressures are measured from something"):
+        InputPort.model_validate({"unit": "V", "reference": "gauge", "range": [0, 1]})
