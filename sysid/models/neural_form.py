@@ -241,16 +241,15 @@ class NeuralForm(AbstractForm):
             Shape ``(n_states,)``.
         """
         seen = _Seen(scaled, output, np.ones(len(output), dtype=np.bool_) if known is None else known)
-        # What is expected may lie far outside where the records were, and from there the output may not show the way:
-        # descents begin all around.
-        expected = np.clip(x, -1.0, 1.0)
-        around = [expected, np.zeros(len(x)), *np.eye(len(x)), *-np.eye(len(x))]
+        # From what is expected the output may not show the way: descents begin all around.
+        expected = x
+        around = [x, np.clip(x, -1.0, 1.0), np.zeros(len(x)), *np.eye(len(x)), *-np.eye(len(x))]
         if self.rectified:
             # Across the kink of an absolute value no descent leads. With either sign given there is no kink.
             signed = replace(self, rectified=False, low=-np.inf, high=np.inf)
             n = self.sizes.outputs
             around += [
-                signed._descended(replace(seen, output=np.array(signs) * output), around[1], expected, HISTORY_NOISE)
+                signed._descended(replace(seen, output=np.array(signs) * output), expected, expected, HISTORY_NOISE)
                 for signs in product((1.0, -1.0), repeat=n if n <= MOST_SIGNED else 1)
             ]
         descents = [self._descended(seen, begin, expected, HISTORY_NOISE) for begin in around]
@@ -304,6 +303,24 @@ class NeuralForm(AbstractForm):
         y = np.empty((len(scaled), self.sizes.outputs))
         kernel.free_run(scaled, x, *self.arguments(self.theta), y)
         return y
+
+    def path(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The states that a run visits: those before each sample.
+
+        Args:
+            scaled: Scaled inputs, shape ``(n_samples, n_inputs)``.
+            x: State before the first sample, shape ``(n_states,)``; becomes the state after the last.
+
+        Returns:
+            Shape ``(n_samples, n_states)``.
+        """
+        s = self.sizes
+        states = np.empty((len(scaled), s.states))
+        # The run of a model whose outputs are its states.
+        own = np.concatenate([self.theta[s.dynamic], np.eye(s.states, s.row).ravel()])
+        kind = code_of(self.activation)
+        kernel.free_run(scaled, x, read_only(own), s.neurons, 0, kind, False, self.bound, -np.inf, np.inf, states)
+        return states
 
     def arguments(self, theta: NDArray[np.float64]) -> tuple[object, ...]:
         """What the kernels take between the state and the output.

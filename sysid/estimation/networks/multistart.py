@@ -87,6 +87,8 @@ class Multistart:
     on_progress: Callable[[FitProgress], None]
     resume: Checkpoint | None = None
     pretraining: StepSamples | None = None
+    learnt: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda theta: theta
+    """From trained parameters to the same with those that no residual reads, such as a map to a state."""
     until: float = math.inf
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
     """Where the runs of this multistart, and of others of the same fit, are kept."""
@@ -98,7 +100,7 @@ class Multistart:
 
     def model(self, theta: NDArray[np.float64]) -> Network:
         """The model with these parameters of the basis."""
-        return replace(self.template, theta=self.to_plain @ theta)
+        return replace(self.template, theta=self.to_plain @ self.learnt(theta))
 
     def left(self, run: str) -> float:
         """Seconds that a run may take, what earlier sessions have spent on it included."""

@@ -118,6 +118,14 @@ class NeuralProvider(AbstractProvider):
         return tuple((record.u, record.target) for record in self._records)
 
     @property
+    def counted(self) -> tuple[NDArray[np.bool_], ...]:
+        """Which samples of each record count, the history's included."""
+        return tuple(
+            np.ones(len(r.u), dtype=np.bool_) if r.root_weights is None else r.root_weights.max(axis=1) > 0.0
+            for r in self._records
+        )
+
+    @property
     def segments(self) -> tuple[Segment, ...]:
         """The records as a linear estimator sees them."""
         scaling, found = self.template, []
@@ -138,16 +146,8 @@ class NeuralProvider(AbstractProvider):
         Returns:
             One array of shape ``(n_samples, n_states)`` per record.
         """
-        found = []
-        for record in self._records:
-            x = self._begin(record, theta)
-            path = np.empty((len(record.u), len(x)))
-            y = np.empty((1, self.template.sizes.outputs))
-            for t in range(len(path)):
-                path[t] = x
-                kernel.free_run(record.u[t : t + 1], x, *self.template.arguments(theta), y)
-            found.append(path)
-        return tuple(found)
+        form = self.at(theta)
+        return tuple(form.path(record.u, self._begin(record, theta)) for record in self._records)
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""

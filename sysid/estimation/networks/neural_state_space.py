@@ -18,6 +18,7 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
+from sysid.estimation.networks.neural_map import learnt_map
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
 from sysid.estimation.networks.output_weights import reweighted, weighed
@@ -219,6 +220,7 @@ def _fit(
         start=records.start,
         initial=None if records.initial is None else records.initial.model.recursion.numbers,
         on_progress=on_progress,
+        learnt=partial(learnt_map, provider),
         checkpoints=checkpoints_of(on_progress),
         # A fit whose linear start took all of its time would be that start alone.
         until=max(
@@ -231,9 +233,14 @@ def _fit(
     if windows.samples:
         race = choice.chosen
         provider = replace(provider, experiments=experiments)
-        theta, centre = map(provider.begun, (race.solution.theta, race.solution.state.prior.centre))
+        raced = multistart.learnt(race.solution.theta)
+        theta, centre = map(provider.begun, (raced, race.solution.state.prior.centre))
         provider = weighed(provider, theta)
-        own = replace(multistart, to_plain=np.eye(template.n_parameters, provider.n_parameters))
+        own = replace(
+            multistart,
+            learnt=partial(learnt_map, provider),
+            to_plain=np.eye(template.n_parameters, provider.n_parameters),
+        )
         choice = windows.finished(own, choice, provider, theta, centre)
         candidates = in_place(candidates, race, choice.chosen)
     others = experiments_of(records.selection, template.mapping, records.start, template.resting)
