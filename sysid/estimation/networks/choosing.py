@@ -10,12 +10,13 @@ import numpy as np
 from sysid.estimation.networks.multistart import Candidate, Network
 
 
-def rank(candidate: Candidate, choose_by: str) -> tuple[bool, float]:
+def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, float]:
     """Sorting key, best first; fits that did not improve come last.
 
     Args:
         candidate: The candidate.
-        choose_by: ``selection`` or ``evidence``; without selection traces the evidence, without evidence the loss. Or
+        choose_by: ``selection``, where a tolerance is declared by the traces on which it is left first, or
+            ``evidence``; without selection traces the evidence, without evidence the loss. Or
             ``loss``, which comes after selection traces too, and before the evidence.
 
     Returns:
@@ -27,7 +28,7 @@ def rank(candidate: Candidate, choose_by: str) -> tuple[bool, float]:
         value = -candidate.log_evidence
     else:
         value = candidate.loss
-    return not candidate.solution.status.usable, value
+    return not candidate.solution.status.usable, candidate.outside if choose_by == "selection" else 0, value
 
 
 VETTED = 10

@@ -149,7 +149,7 @@ def selected(
     found = elect(
         models,
         [c.score for c in usable],
-        lambda model: starts.score(multistart, model),
+        lambda model: starts.judged(multistart, model)[0],
         picks=training.ensemble,
         origins=[c.number for c in usable],
         accept=vet or (lambda _: True),

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ underdetermined network small."""
 PRETRAINED = 0.4
 """Share of a fit's time that its starts may take one step ahead."""
 
-
+T = TypeVar("T")
 Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel | EquationModel
 """What is trained here."""
 
@@ -118,6 +118,7 @@ class Candidate:
         model: The model there.
         score: Geometric mean over the selection traces, and over outputs, of the mean squared error; NaN without
             such traces.
+        outside: Selection traces on which it leaves the tolerance of the training; 0 where that has none.
         members: Starts that an ensemble unites, once for each pick; empty for a single start.
         without: Inputs that it does without.
     """
@@ -127,6 +128,7 @@ class Candidate:
     solution: Solution
     model: Network
     score: float
+    outside: int = 0
     members: tuple[int, ...] = ()
     without: tuple[str, ...] = ()
 
@@ -206,8 +208,24 @@ def run(multistart: Multistart) -> list[Candidate]:
                 break
             latest = reached
             order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
-            numbers = [candidate.number for candidate in order[: max(1, (len(order) + 1) // 2)]]
+            numbers = [candidate.number for candidate in better_half(order)]
     return seen
+
+
+def better_half(ranked: Sequence[T]) -> Sequence[T]:
+    """Who goes on after a look.
+
+    Args:
+        ranked: The best first.
+
+    Returns:
+        Half of them, the larger one of an odd number.
+
+    Example:
+        >>> better_half("abc"), better_half("a")
+        ('ab', 'a')
+    """
+    return ranked[: (len(ranked) + 1) // 2]
 
 
 def _rung(
@@ -300,7 +318,8 @@ def _advance(multistart: Multistart, number: int, before: Candidate | None, shar
         return before
     multistart.iterations[number] = solution.state.iteration  # one that was taken as it was kept has told nobody
     model = multistart.model(solution.theta)
-    return Candidate(number=number, seed=seed, solution=solution, model=model, score=score(multistart, model))
+    mean, outside = judged(multistart, model)
+    return Candidate(number=number, seed=seed, solution=solution, model=model, score=mean, outside=outside)
 
 
 def advanced(
@@ -339,7 +358,8 @@ def advanced(
             engine = replace(engine, evidence_after=state.iteration + SETTLED)
         solution = keep.resume(name, engine, provider, first)
     model = multistart.model(solution.theta)
-    return replace(before, solution=solution, model=model, score=score(multistart, model))
+    mean, outside = judged(multistart, model)
+    return replace(before, solution=solution, model=model, score=mean, outside=outside)
 
 
 def _pretraining(
@@ -455,7 +475,7 @@ def _engine(multistart: Multistart, number: int, iterations: int, seconds: float
     return engine if training.regularisation is None else replace(engine, evidence_after=None)
 
 
-def score(multistart: Multistart, model: Network) -> float:
+def judged(multistart: Multistart, model: Network) -> tuple[float, int]:
     """Geometric mean over the selection traces: one trace on which every start fails must not choose alone.
 
     Args:
@@ -464,9 +484,11 @@ def score(multistart: Multistart, model: Network) -> float:
 
     Returns:
         Of the mean squared errors, in the output's unit squared, or of several outputs in scaled numbers; NaN without
-        selection traces.
+        selection traces. And on how many of these it leaves the tolerance of the training.
     """
     errors, unit = [], model.scaling.error_unit / np.square(model.scaling.output_scale)
+    within, spans = multistart.training.within, _spans(multistart.selection, model)
+    outside = 0
     for trace in multistart.selection:
         inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
         begun = beginning(model, inputs, target, multistart.start, trace.usable_samples, case=trace.name)
@@ -475,6 +497,14 @@ def score(multistart: Multistart, model: Network) -> float:
             output = model.simulate(inputs[n:], history)
         else:
             output = model.predict(inputs[n:], target[n:], history)
-        errors.append(np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2, axis=0) * unit)
+        squared = np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2, axis=0)
+        errors.append(squared * unit)
+        outside += within is not None and not (np.sqrt(squared) <= within * spans).all()
     with np.errstate(divide="ignore"):  # a trace that is met exactly, such as a constant: the mean is 0
-        return float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")
+        return (float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")), outside
+
+
+def _spans(traces: Sequence[Trace], model: Network) -> NDArray[np.float64]:
+    """Range of each output, shape ``(n_outputs,)`` or ``()``; of one that never moves 1, in its unit."""
+    spans = np.ptp(np.concatenate([model.measured(trace) for trace in traces]), axis=0) if traces else np.ones(())
+    return np.asarray(np.where(spans > 0.0, spans, 1.0))

@@ -58,6 +58,9 @@ class Training:
         seed: Seed of the first start; the others count up from it.
         choose_by: What chooses in the end: ``selection`` (least error on traces that are used for nothing else) or
             ``evidence``.
+        within: Share of each output's range over the selection traces that the root mean square of its error may come
+            to: who stays within it on more of these traces comes before who has the least mean, which hides one that
+            fails. By default the mean alone chooses.
         workers: Starts that run at the same time.
         basis: ``incremental`` (the delta form) trains on each channel's newest sample and its rates of change,
             ``plain`` on the lagged samples as they are. The finished model is over lagged samples either way.
@@ -92,6 +95,7 @@ class Training:
     starts: int | None = None
     seed: int = 0
     choose_by: str = "selection"
+    within: float | None = None
     workers: int = 2
     basis: str = "incremental"
     offsets: tuple[Mapping[str, float], ...] = ()
@@ -134,6 +138,8 @@ class Training:
             raise ConfigError(
                 "pretraining is too small", where="pretraining", expected="0 or more", got=self.pretraining
             )
+        if self.within is not None and not 0.0 < self.within < 1.0:
+            raise ConfigError("not a share", where="within", expected="between 0 and 1, or nothing", got=self.within)
         if self.window is not None and 0 != self.window < LEAST_WINDOW:
             raise ConfigError(
                 "window is too small",

@@ -19,6 +19,8 @@ REFIT, TRIAL = 0.2, 0.15
 GOING_ON, TRIAL_OF_MANY = 0.4, 0.1
 """The same where the chosen network is trained on from where its trial had ended. Trials then have to tell which one is
 worth that, no more; what the others would have got is the chosen one's."""
+RACE = (0.08, 0.12)
+"""Shares of the same in which the best networks are trained on side by side before one is chosen: four, then two."""
 UNKNOWN = 0.5
 """Share of its limit that a trial is taken to last where no other of its kind has told."""
 LINEAR = 0.5

@@ -33,6 +33,31 @@ ALIKE = 0.03
 """Part of the least error within which another one counts as no worse; of those the smallest is chosen."""
 
 
+Rank = Callable[[Trial], tuple[float, float, int]]
+"""Sorting key of a trial, the best first: the share of what chooses that it does not stay within the tolerance on, its
+error, its number."""
+
+
+def ranked_by(error: Callable[[Trial], float], tolerance: float | None) -> Rank:
+    """What chooses.
+
+    Args:
+        error: A mean square; infinite for what cannot be used.
+        tolerance: Where how many of the traces that choose stay within it comes before the error: a mean hides one
+            trace that fails behind others that are far better than they need to be. ``None`` for the error alone.
+
+    Returns:
+        The sorting key; what cannot be used is last.
+    """
+
+    def rank(trial: Trial) -> tuple[float, float, int]:
+        usable = math.isfinite(error(trial))
+        outside = 0.0 if tolerance is None or not usable else 1.0 - trial.within(tolerance)
+        return outside if usable else math.inf, error(trial), trial.number
+
+    return rank
+
+
 @dataclass(kw_only=True, eq=False)
 class Plan:
     """Asks for trials round by round: linear structures, the first nonlinear ones, then what stands next to the best.
@@ -47,6 +72,7 @@ class Plan:
         families: What there is to try.
         seed: Of the search.
         again: How often the best are trained again; 0 where what was chosen is not.
+        tolerance: As for :func:`ranked_by`.
         ended: Why it ended, once it has.
         left_out: Linear structures for which there was no time beside the others.
     """
@@ -58,11 +84,13 @@ class Plan:
     families: Sequence[Family] = field(default_factory=lambda: FAMILIES)
     seed: int = 0
     again: int = AGAIN
+    tolerance: float | None = None
     ended: str = ""
     left_out: list[str] = field(default_factory=list)
     trials: list[Trial] = field(default_factory=list)
     _tries: list[Try] = field(default_factory=list)
     _seen: set[str] = field(default_factory=set)
+    _points: dict[int, Point] = field(default_factory=dict)
     _repeats: dict[int, int] = field(default_factory=dict)
     """By the number of a repeated point, the place of its trial."""
     _told_again: list[int] = field(default_factory=list)
@@ -79,6 +107,7 @@ class Plan:
                 self.left_out += [point.structure.label for point in points if point not in taken]
             elif len(taken) < len(points):
                 self.ended = "the budget is spent"
+            self._points |= {point.number: point for point in taken}
             by_number = {point.number: one for point, one in zip(points, tries, strict=True)}
             self._tries += [by_number[point.number] for point in taken]
             if taken:
@@ -110,6 +139,19 @@ class Plan:
         return min(errors, default=math.inf)
 
     @property
+    def _rank(self) -> Rank:
+        return ranked_by(self.error, self.tolerance)
+
+    def _least_outside(self) -> float:
+        """The least share of what chooses that something does not stay within the tolerance on."""
+        return min((self._rank(trial)[0] for trial in self.trials), default=math.inf)
+
+    @property
+    def points(self) -> Mapping[int, Point]:
+        """What was tried, by number."""
+        return self._points
+
+    @property
     def n_again(self) -> int:
         """Nonlinear models that were trained again."""
         return len(self._told_again)
@@ -130,7 +172,7 @@ class Plan:
         """The best nonlinear models once more, from other starts."""
         kinds = {family.kind for family in self.families if not family.linear}
         places = [n for n, one in enumerate(self._tries[: len(self.trials)]) if one.structure.kind in kinds]
-        best = sorted(places, key=lambda n: self.error(self.trials[n]))[:FINALISTS]
+        best = sorted(places, key=lambda n: self._rank(self.trials[n]))[:FINALISTS]
         finals: list[Try] = []
         for place in best:
             for k in range(self.again if math.isfinite(self.error(self.trials[place])) else 0):
@@ -168,13 +210,14 @@ class Plan:
         """What stands next to good ones, as long as it gains."""
         stale = 0
         while stale < PATIENCE:
-            before = self.least()
+            before, outside = self.least(), self._least_outside()
             wanted = self._next()
             if not wanted:
                 self.ended = self.ended or "everything next to the best was tried"
                 return
             yield wanted
-            stale = 0 if math.sqrt(self.least()) < (1.0 - GAIN) * math.sqrt(before) else stale + 1
+            gained = math.sqrt(self.least()) < (1.0 - GAIN) * math.sqrt(before) or self._least_outside() < outside
+            stale = 0 if gained else stale + 1
         self.ended = self.ended or f"the last {PATIENCE * ROUND} trials gained less than {GAIN:.0%}"
 
     def _unasked(self, *, linear: bool) -> Iterator[list[Try]]:
@@ -211,7 +254,7 @@ class Plan:
         """What stands next to good nonlinear models: half to the best of all, half to the best of another kind."""
         around = {family.kind: family.around for family in self.families if not family.linear}
         pairs = [pair for pair in zip(self.trials, self._tries, strict=True) if pair[1].structure.kind in around]
-        ranked = sorted(pairs, key=lambda pair: (self.error(pair[0]), pair[0].number))
+        ranked = sorted(pairs, key=lambda pair: self._rank(pair[0]))
         usable = [pair for pair in ranked if math.isfinite(self.error(pair[0]))]
         leading = {kind: usable[0][1].structure.kind == kind for kind in around} if usable else {}
         others = [

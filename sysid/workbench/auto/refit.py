@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from sysid.estimation import FitResult, Training
-from sysid.estimation.estimators import estimator_of
-from sysid.models import AbstractStructure
+from sysid.estimation import FitResult
 from sysid.traces import Role, Trace
 from sysid.validation import case_results
 from sysid.workbench.auto.look import span_of
@@ -30,22 +28,9 @@ GONE_ON, ENOUGH = (
 """What is said where the last fit is taken, and where it is not."""
 
 
-def trains_on(structure: AbstractStructure) -> bool:
-    """Whether a trial of a structure, which ends early, can be trained on from where it is.
-
-    Args:
-        structure: What was chosen.
-
-    Returns:
-        True for networks.
-    """
-    row = estimator_of(structure)
-    return row.training is Training and row.initial is not None
-
-
 def refitted(
-    work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult, further: bool,
-    tolerance: float | None = None,
+    work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult,
+    whole: Callable[[], FitResult], further: bool, tolerance: float | None = None,
 ) -> FitResult:  # fmt: skip
     """Fit the chosen structure once more: to all estimation traces, or on from where its trial had ended.
 
@@ -54,7 +39,8 @@ def refitted(
         fit: The structure and its training.
         config: The pipeline, as of the model's outputs.
         data: All traces.
-        chosen: The fit that was chosen.
+        chosen: The fit that was chosen, which needs no posterior.
+        whole: Gives it with all that a fit has, where it is kept.
         further: Whether it is trained on from where it is, and selection traces, where there are some, say whether that
             was for the better; else it is fitted anew, and all estimation traces do.
         tolerance: Share of each output's range: who stays within it over more of these traces is better, whatever the
@@ -69,7 +55,7 @@ def refitted(
     taken, left = (GONE_ON, ENOUGH) if further else (BETTER, KEPT)
     ours, theirs = (_error(one, judging, config, tolerance) for one in (again, chosen))
     better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs[1]))
-    found = again if better else chosen
+    found = again if better else whole()
     return replace(found, notes=(*found.notes, taken if better else left))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +17,9 @@ from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord, write_sweep
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.parts import FURTHER, LAST
-from sysid.workbench.auto.refit import refitted, trains_on
-from sysid.workbench.auto.search import FOUND, TITLE, Found, Hire, Search, refit_share, stand_in
+from sysid.workbench.auto.race import trains_on
+from sysid.workbench.auto.refit import refitted
+from sysid.workbench.auto.search import FOUND, TITLE, Found, Hire, Search, stand_in
 from sysid.workbench.auto.table import table_of_front
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, Pipeline
@@ -300,7 +302,7 @@ class _AutoSteps:
 
         Where that is no fit of the chosen one, it has the share that was kept, as it is not made again.
         """
-        options, share = dict[str, Any](found.training[name]), refit_share(found.parts)
+        options, share = dict[str, Any](found.training[name]), found.kept
         structure: Mapping[str, Any] = found.shown[name].structure
         if found.parts.trained_on and trains_on(structure_from_dict(structure)):
             options |= FURTHER
@@ -321,7 +323,10 @@ class _AutoSteps:
         key = {"chosen": made.key, how: steps.fit_key(model.fit, model.config, data, None), "tolerance": tolerance}
 
         def make(work: Work) -> FitResult:
-            chosen = made.make(work)
-            return refitted(work, model.fit, model.config, data, chosen=chosen, further=further, tolerance=tolerance)
+            whole = partial(made.make, work)
+            return refitted(
+                work, model.fit, model.config, data, chosen=made.bare() if made.bare else whole(), whole=whole,
+                further=further, tolerance=tolerance,
+            )  # fmt: skip
 
         return GivenFit(key=digest(strict(key)), make=make)

@@ -10,11 +10,12 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.models import ARX, AbstractStructure
 from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.auto.budget import FINAL, GOING_ON, REFIT, TRIAL, TRIAL_OF_MANY, Budget
+from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
-from sysid.workbench.auto.plan import AGAIN, Plan
+from sysid.workbench.auto.plan import AGAIN, Plan, ranked_by
+from sysid.workbench.auto.race import Race
 from sysid.workbench.auto.trials import Trials
 from sysid.workbench.auto.words import Choice, choose, sentence
 from sysid.workbench.fits.config import FitConfig
@@ -71,6 +72,7 @@ class Found:
         fits: Their fits, as they were made, one a model.
         training: Their options.
         parts: What was fitted and what chose.
+        kept: Share of the budget that is left to the last fit, at least.
         told: What a reader has to know.
         done_now: Trials that this session has done itself.
     """
@@ -80,6 +82,7 @@ class Found:
     fits: Mapping[str, list[GivenFit]]
     training: Mapping[str, Mapping[str, Any]]
     parts: Parts
+    kept: float
     told: tuple[str, ...]
     done_now: int
 
@@ -179,9 +182,12 @@ class Search:
             kept=FINAL if again else 0.0,
         )
         training = {**self.parts.training, **budget.limits(budget.trial / len(self.parts.folds))}
+        if self.parts.trained_on and self.config.tolerance is not None:
+            training["within"] = self.config.tolerance
         plan = Plan(
-            looked=self.looked, budget=budget, error=error, training=training, seed=self.config.seed, again=again
-        )
+            looked=self.looked, budget=budget, error=error, training=training, seed=self.config.seed, again=again,
+            tolerance=self.config.tolerance,
+        )  # fmt: skip
         while points := plan.ask():
             plan.tell(trials.run(points))
         if not math.isfinite(plan.least()):
@@ -192,30 +198,42 @@ class Search:
                 got=", ".join(sorted({trial.status for trial in plan.trials})) or "no trial within the budget",
                 remedy="allow more minutes, and look at the record with sysid advise",
             )
-        return self._chosen(plan, trials, clock.total)
+        return self._chosen(plan, trials, clock)
 
-    def _chosen(self, plan: Plan, trials: Trials, wall_s: float) -> Found:
-        first = trials.drivers[0]
+    def _chosen(self, plan: Plan, trials: Trials, clock: Clock) -> Found:
+        first, kept, raced = trials.drivers[0], refit_share(self.parts), 0
+        if self.parts.trained_on:
+            race = Race(
+                driver=first, points=plan.points, rank=ranked_by(error, self.config.tolerance),
+                n_outputs=len(self.config.mapping.outputs), wall_s=self.config.wall_s,
+                iterations=self.config.iterations, workers=self.config.workers, clock=lambda: clock.total,
+                kept=kept - sum(RACE),
+            )  # fmt: skip
+            plan.trials[:], spent = race.run(plan.trials)
+            kept, raced = kept - spent, len(race.in_it)
         checks = Checks(driver=first, bench=self.bench.fold(0))
         choice = choose(plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance)
         shown = {FOUND: choice.chosen}
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear
         return Found(
-            record=self._record(plan, choice, wall_s),
+            record=self._record(plan, choice, clock.total, raced),
             shown=shown,
             fits={name: checks.given(trial) for name, trial in shown.items()},
             training={name: first.last[trial.number].training for name, trial in shown.items()},
             parts=self.parts,
+            kept=kept,
             told=(*self.parts.told, *_left_out(plan), *(f"Look at the data: {one}" for one in self.looked.cautions)),
             done_now=trials.done_now,
         )
 
-    def _record(self, plan: Plan, choice: Choice, wall_s: float) -> SweepRecord:
+    def _record(self, plan: Plan, choice: Choice, wall_s: float, raced: int) -> SweepRecord:
         outputs = self.config.mapping.outputs
         # Errors of several outputs count over their variances: in standard deviations.
         unit = self.bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
-        said = sentence(choice, len(plan.trials), again=plan.n_again, unit=unit, ended=plan.ended, error=error)
+        said = sentence(
+            choice, len(plan.trials), again=plan.n_again, raced=raced, unit=unit, ended=plan.ended, error=error
+        )
         return SweepRecord(
             name=self.config.name,
             mapping=str(self.config.mapping),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.numbers import number, quantity
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.plan import ALIKE
+from sysid.workbench.auto.plan import ALIKE, ranked_by
 
 Error = Callable[[Trial], float]
 
@@ -49,17 +49,17 @@ def choose(
         trials: All of them; at least one can be used.
         error: What chooses, as a mean square.
         first_stable: The first of some whose free run is stable, and how many were passed over.
-        tolerance: Where how many of the traces that choose stay within it comes before the error: a mean hides one
-            trace that fails behind others that are far better than they need to be.
+        tolerance: As for :func:`~sysid.workbench.auto.plan.ranked_by`.
 
     Returns:
         The choice.
     """
+    rank = ranked_by(error, tolerance)
 
     def outside(trial: Trial) -> float:
-        return 0.0 if tolerance is None else 1.0 - trial.within(tolerance)
+        return rank(trial)[0]
 
-    usable = sorted((t for t in trials if math.isfinite(error(t))), key=lambda t: (outside(t), error(t), t.number))
+    usable = sorted((t for t in trials if math.isfinite(error(t))), key=rank)
     chosen, refused = first_stable(usable)
     limit = error(chosen) * (1.0 + ALIKE) ** 2
     alike = [t for t in usable[refused:] if error(t) <= limit and outside(t) <= outside(chosen)]
@@ -73,13 +73,14 @@ def choose(
     )  # fmt: skip
 
 
-def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: str, error: Error) -> str:
+def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit: str, ended: str, error: Error) -> str:
     """Why this one.
 
     Args:
         choice: What was chosen.
         tried: How many were tried.
         again: The best nonlinear models among them that were trained again from other starts; 0 for none.
+        raced: Networks among them that were trained on side by side before the choice.
         unit: Of the output.
         ended: Why the search ended.
         error: What chooses.
@@ -103,6 +104,7 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, unit: str, ended: st
         )
     best = "the best nonlinear model" if again == 1 else f"the {again} best nonlinear models"
     finals = f", {best} again from other starts" if again else ""
+    finals += f", the {raced} best networks trained on side by side before that" if raced else ""
     parts = [f"{why}, of {tried} tried{finals}"]
     if choice.linear is not None and choice.linear.number != choice.chosen.number:
         share = 1.0 - root / math.sqrt(error(choice.linear))

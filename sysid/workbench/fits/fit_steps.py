@@ -59,10 +59,13 @@ class GivenFit:
     Args:
         key: Digest of everything that it depends on.
         make: Gives it, when it is not stored yet; told how to say how that goes.
+        bare: Gives it without its posterior, for which a part of its training may have to be done again; ``None`` where
+            that costs nothing.
     """
 
     key: str
     make: Callable[[Work], FitResult]
+    bare: Callable[[], FitResult] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -73,8 +73,13 @@ class Checks:
             fit = self._whole(trial, self._checked(trial), number)
             return replace(fit, train_time_s=float(trial.seconds) / count)
 
+        def bare(number: int) -> FitResult:
+            return replace(self._checked(trial)[number], train_time_s=float(trial.seconds) / count)
+
         keys = [digest(strict(terms if count == 1 else {**terms, "model": number})) for number in range(count)]
-        return [GivenFit(key=key, make=partial(make, number)) for number, key in enumerate(keys)]
+        return [
+            GivenFit(key=key, make=partial(make, number), bare=partial(bare, number)) for number, key in enumerate(keys)
+        ]
 
     def _stored(self, trial: Trial) -> list[FitResult]:
         return [FitResult.from_dict(one["fit"]) for one in stored_models(self._outcome(trial))]

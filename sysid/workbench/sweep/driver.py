@@ -152,6 +152,43 @@ class Driver:
             self._progress.dropped(len(alive), rungs[number:])
         return [found[point.number] for point in points]
 
+    def run_on(
+        self, points: Sequence[Point], before: Mapping[int, Trial], options: Callable[[Point], Mapping[str, Any]]
+    ) -> list[Trial]:
+        """Train points on from where their last job has ended.
+
+        Args:
+            points: Networks that were tried.
+            before: Their trials so far, by number.
+            options: How each is trained on, in place of what its training has of these.
+
+        Returns:
+            A trial for each, in their order, with the time and iterations of those before.
+        """
+        self._progress.expect(points, [Rung(iterations=self._full, record=1.0, keep=1.0)])
+        jobs = {point.number: self._job_on(point, options(point)) for point in points}
+        done = self._do(jobs.values())
+        self.last.update(jobs)
+        trials = [as_trial_of(done[jobs[p.number].key], p, before=before[p.number]) for p in points]
+        return [one.model_copy(update={"iterations": one.iterations + before[one.number].iterations}) for one in trials]
+
+    def is_stored_on(self, points: Sequence[Point], options: Callable[[Point], Mapping[str, Any]]) -> bool:
+        """Whether all that :meth:`run_on` would do is done and on disk."""
+        return all(self.store.read(self._job_on(point, options(point)).key) is not None for point in points)
+
+    def _job_on(self, point: Point, options: Mapping[str, Any]) -> Job:
+        training = {**self._training(point), **options}
+        return self._keyed(
+            Job(
+                key="",
+                number=point.number,
+                structure=point.structure.to_dict(),
+                training=training,
+                after=self.last[point.number].key,
+                cost=self.cost(point, int(training.get("max_iterations", self._full))),
+            )
+        )
+
     def _split(self, points: list[Point], found: Mapping[int, Trial], keep: float) -> tuple[list[Point], list[Point]]:
         """Those who go on and those who do not, both in the order of the grid; ties go to the earlier point."""
         if keep >= 1.0:

@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import Loop, Status, Training, fit_narx
+from sysid.estimation.networks.choosing import rank
+from sysid.estimation.networks.multistart import judged
 from sysid.models import NARX, Start, StartKind
 from sysid.traces import Trace
 from tests.estimation.tank import TANK, tank
@@ -73,6 +76,26 @@ def test_what_is_chosen_has_the_least_error_on_the_selection_traces():
     assert len(scores) >= 4
     chosen = np.exp(np.mean([np.log(free_run_mse(fit, trace)) for trace in selection]))
     assert chosen == pytest.approx(min(scores), rel=1e-9)
+
+
+def test_who_stays_within_a_tolerance_on_every_selection_trace_comes_before_who_fails_on_one():
+    """The mean would take the other, who is far better than it needs to be elsewhere."""
+    model = fit_narx([tank(1)], TANK, SMALL, Training(max_iterations=10)).model
+    runs = [model.simulate(one.columns(["pump"])) for one in (tank(2), tank(4), tank(5))]
+    span, training = np.ptp(np.concatenate(runs)), Training(within=0.01)
+
+    def off_by(*shares: float) -> SimpleNamespace:
+        traces = [
+            replace(one, values=np.column_stack([one["pump"], run + share * span]))
+            for one, run, share in zip((tank(2), tank(4), tank(5)), runs, shares, strict=True)
+        ]
+        mean, outside = judged(SimpleNamespace(selection=traces, training=training, start=Start()), model)
+        return SimpleNamespace(score=mean, outside=outside, solution=SimpleNamespace(status=Status.CONVERGED))
+
+    fails, holds = off_by(1e-5, 1e-5, 0.02), off_by(0.005, 0.005, 0.005)
+    assert (fails.outside, holds.outside) == (1, 0)
+    assert fails.score < holds.score
+    assert rank(holds, "selection") < rank(fails, "selection")
 
 
 def test_without_selection_traces_the_evidence_chooses():
@@ -195,6 +218,7 @@ def test_progress_ends_at_the_whole():
         {"basis": "fourier"},
         {"starts": 0},
         {"max_iterations": 0},
+        {"within": 1.0},
     ],
     ids=lambda fields: next(iter(fields)),
 )

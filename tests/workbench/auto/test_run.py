@@ -105,6 +105,10 @@ def test_where_selection_traces_chose_it_is_trained_on_and_they_say_whether_for_
     assert tried_with is not None
     assert any(note in {GONE_ON, ENOUGH} for note in best.notes)
     assert best.cases["b"].free_run.mse <= tried_with.selection_free_run_mse
+    # The two networks were trained on side by side first; what that came to is found like any trial.
+    assert "the 2 best networks trained on side by side" in found.record.chosen_by
+    again = searched(tmp_path, known, iterations=200, find=lambda *_: Refusing())
+    assert (tried(again), again.record.chosen_by) == (tried(found), found.record.chosen_by)
 
 
 def test_the_screen_hears_how_much_is_left(first: tuple[Path, Searched]) -> None:
