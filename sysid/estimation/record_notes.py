@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.error_causes import causes
 from sysid.estimation.error_lags import left_out
 from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.informative import informative, still
@@ -136,7 +137,9 @@ def contradicted(model: AbstractModel, traces: Sequence[Trace], start: Start) ->
     """
     runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
     longest = max(runs, key=lambda run: len(run.output))
-    return (*_beside_a_constant(model, runs), *left_out(model, longest))
+    lags = left_out(model, longest)
+    # A lag that is left out is a cause, and the nearer one.
+    return (*_beside_a_constant(model, runs), *(lags or causes(model, longest)))
 
 
 def _beside_a_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[str]:

@@ -1,0 +1,280 @@
+"""What the error of a free run is made of, where it is more than noise need be: told by its cause, for every structure.
+
+A fit that ended in a minimum may be far from its record and say nothing. Five causes leave marks in the error itself:
+lone samples that jump away and back, an output that stands at an end while the model goes on, something of the inputs
+that the model leaves out, nothing of the inputs at all, and an error that lasts as long as the record.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal, special
+
+from sysid.estimation.fitted_run import FreeRun
+from sysid.estimation.informative import informative, unit
+from sysid.estimation.input_features import CURVES, LINEAR, PLAYS, features
+from sysid.estimation.least_squares.correlation import correlation_time
+from sysid.models import AbstractModel
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEAST_SAMPLES = 100
+WORTH = 0.1
+"""Part of the output's standard deviation that an error must have to be worth a cause."""
+LONE, MOST_LONE, LONE_SHARE = 6.0, 0.05, 0.25
+"""Robust deviations by which a lone sample leaves its neighbours, the most that are lone, and their least part of the
+squared error."""
+STAY, STANDS, OFF = 3, 0.05, 0.15
+"""Samples in a row at an end that are a stay, the least part of all that stand there, and how far the run is off
+then, in standard deviations of the output."""
+TERMS, EXPLAINED, IN_EACH = 8, 0.3, 0.15
+"""Terms that the error is explained by, and what part of the other half's error they must explain: in the mean, and in
+each half."""
+PLAINLY, PLAINLY_IN_EACH = 0.7, 0.5
+"""The same of signals as they are."""
+MOSTLY = 0.8
+"""Part of what all terms explain, from which the simpler of them are said to be it."""
+FAR, BY_CHANCE = 0.6, 0.05
+"""Part of the output's standard deviation that an error must have before it is asked whether the inputs say anything
+at all; and how improbable by chance it must be that they do."""
+LEAST_INDEPENDENT, OWN, SMALL, LARGE = 30.0, 0.8, 0.2, 0.3
+"""Independent samples that an error counts for, below which its fit says little of another record; the part of an error
+in its sample before from which it is told in any case; and its part of the output for either."""
+STRAIGHT, STEEP = 0.4, 0.5
+"""What a line in time must leave of an output's squares beside its inputs, and how far it must go, in deviations."""
+OWN_PAST = 5
+
+
+def causes(model: AbstractModel, run: FreeRun) -> list[str]:
+    """The causes of an error that is more than it need be.
+
+    Args:
+        model: The fitted model.
+        run: Its free run over a record that was fitted.
+
+    Returns:
+        Sentences; none where the error is small, or what is left of it looks like noise.
+    """
+    told = []
+    for i, name in enumerate(model.mapping.outputs):
+        y, s = run.output[:, i], run.simulated[:, i]
+        if run.usable.sum() < LEAST_SAMPLES or not np.isfinite(s).all() or not np.ptp(y[run.usable]) > 0.0:
+            continue
+        spread = float(np.std(y[run.usable]))
+        if not float(np.std((y - s)[run.usable])) > WORTH * spread:
+            continue
+        told += _of_output(model, run, name, (y / spread, s / spread))
+    return told
+
+
+def _of_output(model: AbstractModel, run: FreeRun, name: str, signals: tuple[Array, Array]) -> list[str]:
+    y, s = signals
+    lone = _lone(y, s, run.usable)
+    sound = run.usable & ~lone
+    told = [_of_lone(y - s, lone, run.usable, name)] if lone.any() else []
+    if sound.sum() < LEAST_SAMPLES or not float(np.std((y - s)[sound])) > WORTH:
+        return told
+    standing = _standing(y, s, sound)
+    if standing:
+        return [*told, standing.format(name=name)]
+    kept = informative(run.inputs[sound])
+    inputs = " and ".join(model.mapping.inputs[j] for j in kept)
+    if kept:
+        groups = features(run.inputs[:, list(kept)], s)
+        found = _drift(groups, y, sound, name) or _nothing(model, (y, s), groups, sound).format(
+            name=name, inputs=inputs
+        )
+        found = found or _of_inputs(groups, y - s, sound).format(name=name, inputs=inputs)
+        if found:
+            return [*told, found]
+    return [*told, *_lasting(y - s, sound, name)]
+
+
+def _lone(y: Array, s: Array, usable: Mask) -> Mask:
+    """Samples that leave both neighbours, the same way in the measurement as in the error."""
+    out, error = (_off_neighbours(x) for x in (y, y - s))
+    scale = float(np.median(np.abs((y - s)[usable] - np.median((y - s)[usable])))) / 0.6745
+    found = usable & (np.abs(error) > LONE * max(scale, 1e-2)) & (np.abs(out - error) < 0.5 * np.abs(error))
+    many = np.count_nonzero(found) > MOST_LONE * np.count_nonzero(usable)
+    squares = (y - s)[usable] ** 2
+    few = float(((y - s)[found] ** 2).sum()) < LONE_SHARE * float(squares.sum())
+    return np.zeros(len(y), dtype=bool) if many or few else found
+
+
+def _off_neighbours(x: Array) -> Array:
+    return np.asarray(x - signal.medfilt(x, 3), dtype=np.float64)
+
+
+def _of_lone(error: Array, lone: Mask, usable: Mask, name: str) -> str:
+    share = float((error[lone] ** 2).sum() / (error[usable] ** 2).sum())
+    at = ", ".join(str(k) for k in np.flatnonzero(lone)[:3])
+    return (
+        f"{int(lone.sum())} lone samples of {name} jump away from their neighbours and back (the first at sample {at} "
+        f"of the run), and carry {100 * share:.0f} % of the squared error: the fit bends to them. If they are faults "
+        "of the recording, leave their cells empty and mask them (repairs: {nan: mask})."
+    )
+
+
+def _standing(y: Array, s: Array, usable: Mask) -> str:
+    """A sentence where the output stands at an end of its range while the run goes on."""
+    for end, side in ((float(y[usable].max()), "greatest"), (float(y[usable].min()), "least")):
+        at = usable & (y == end)
+        edges = np.flatnonzero(np.diff(np.r_[0, at.astype(np.int8), 0]))
+        long = np.repeat(np.diff(edges)[::2] >= STAY, np.diff(edges)[::2])
+        stands = np.flatnonzero(at)[long]
+        if len(stands) < STANDS * usable.sum() or not float(np.sqrt(np.mean((s[stands] - end) ** 2))) > OFF:
+            continue
+        return (
+            f"{{name}} stands at its {side} value in {100 * len(stands) / usable.sum():.0f} % of the samples, and "
+            "the free run goes on moving then: a plant or a sensor at its end, of which the model knows nothing. "
+            "Where the plant ends there, fit what has an end (NARX limits: found, HammersteinWiener output: "
+            "saturation, min and max in equations); where only the sensor does, mask these samples."
+        )
+    return ""
+
+
+def _of_inputs(groups: dict[str, Array], target: Array, usable: Mask) -> str:
+    """A sentence where the inputs explain a signal, on halves of the record that did not choose how."""
+    found: dict[str, float] = {}
+    columns = np.empty((len(target), 0))
+    for kind in (LINEAR, CURVES, PLAYS):
+        columns = np.column_stack([columns, groups[kind]])
+        found[kind] = _explained(columns, target, usable)
+    most = max(found.values())
+    if not most > 0.0:
+        return ""
+    share = f"{100 * most:.0f} % of what the free run of {{name}} leaves moves with earlier values of {{inputs}}"
+    if found[LINEAR] >= MOSTLY * most:
+        how = ": the model has too little memory, or not the right one. Try more lags or states, other orders, or more"
+    elif found[CURVES] >= MOSTLY * most:
+        how = " along a curve that the model lacks. Try a network, more neurons or pieces, another curve, or more"
+    else:
+        how = (
+            " after a play, as with backlash, friction or hysteresis, which the model lacks. Try a network with more "
+            "lags of the output, more states, or more"
+        )
+    return f"{share}{how} starts. (Or {{inputs}} is fed back from {{name}}.)"
+
+
+def _explained(columns: Array, target: Array, usable: Mask) -> float:
+    """The part of a signal that some of the columns explain on the half of a record that did not choose them.
+
+    Both are taken less what the signal's own last sample says of it, as two things that wander explain each other; or
+    as they are, where they explain so much that no wandering does.
+    """
+    rows = usable & np.r_[False, usable[:-1]]
+    centred = target - target[usable].mean()
+    past = np.r_[0.0, centred[:-1]]
+    own = float(past[rows] @ centred[rows] / max(float(past[rows] @ past[rows]), 1e-300))
+    places = np.flatnonzero(rows[1:])
+    halves = places[: len(places) // 2], places[len(places) // 2 :]
+    best = 0.0
+    for part, (least, in_each) in ((own, (EXPLAINED, IN_EACH)), (0.0, (PLAINLY, PLAINLY_IN_EACH))):
+        x, y = columns[1:] - part * columns[:-1], centred[1:] - part * centred[:-1]
+        found = [_of_half(x, y, here, there) for here, there in (halves, halves[::-1])]
+        if min(found) >= in_each and np.mean(found) >= least:
+            best = max(best, float(np.mean(found)))
+    return best
+
+
+def _of_half(columns: Array, target: Array, here: NDArray[np.int64], there: NDArray[np.int64]) -> float:
+    chosen, weights = _pursued(columns[here] - columns[here].mean(axis=0), target[here] - target[here].mean())
+    other = target[there] - target[there].mean()
+    left = other - (columns[there][:, chosen] - columns[there][:, chosen].mean(axis=0)) @ weights
+    return 1.0 - float(left @ left) / max(float(other @ other), 1e-300)
+
+
+def _pursued(columns: Array, target: Array) -> tuple[list[int], Array]:
+    """The few columns that explain a signal best, one after the other (orthogonal matching pursuit), and weights."""
+    directions, chosen = unit(columns), list[int]()
+    weights: Array = np.empty(0, dtype=np.float64)
+    left: Array = target
+    for _ in range(min(TERMS, columns.shape[1])):
+        products = np.abs(directions.T @ left)
+        products[chosen] = 0.0
+        chosen.append(int(np.argmax(products)))
+        weights = np.asarray(np.linalg.lstsq(columns[:, chosen], target, rcond=None)[0], dtype=np.float64)
+        left = target - columns[:, chosen] @ weights
+    return chosen, weights
+
+
+def _moves_with(y: Array, s: Array, usable: Mask, parameters: int) -> bool:
+    """Whether the measurement moves with the run more than it does by chance with a run of so many parameters.
+
+    Both are taken less what the error's own past says of them, which leaves an error that is news at every sample.
+    """
+    whole = np.all([np.roll(usable, lag) for lag in range(OWN_PAST + 1)], axis=0)
+    whole[:OWN_PAST] = False
+    y, s = y - y[usable].mean(), s - s[usable].mean()
+    past = [np.column_stack([np.roll(x, lag) for lag in range(1, OWN_PAST + 1)])[whole] for x in (y - s, y, s)]
+    weights = np.linalg.lstsq(past[0], (y - s)[whole], rcond=None)[0]
+    new, of_run = y[whole] - past[1] @ weights, s[whole] - past[2] @ weights
+    product = float(unit(new[:, np.newaxis])[:, 0] @ unit(of_run[:, np.newaxis])[:, 0])
+    if not product > 0.0:
+        return False
+    share, used = product**2, max(1, min(parameters, len(new) // 4))
+    free = max(1, len(new) - used)
+    ratio = share / used * free / max(1.0 - share, float(np.finfo(np.float64).eps))
+    return bool(special.fdtrc(used, free, ratio) < BY_CHANCE)
+
+
+def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[str, Array], usable: Mask) -> str:
+    y, s = signals
+    if not float(np.std((y - s)[usable])) > FAR or _moves_with(y, s, usable, model.n_parameters):
+        return ""
+    if _of_inputs(groups, y, usable):
+        return ""
+    return (
+        "Nothing in these records says that {name} moves with {inputs}: what the model makes of it is no nearer than "
+        "chance, and neither are simple curves of it with any memory. Measure what moves {name}, excite it more, or "
+        "give its dead time; where it moves by itself, as in a limit cycle, a network with more states may tell."
+    )
+
+
+def _drift(groups: dict[str, Array], y: Array, usable: Mask, name: str) -> str:
+    """A sentence where a straight line in time is what the inputs leave of the output."""
+    columns = np.column_stack([groups[LINEAR], groups[CURVES]])[usable]
+    columns, target = columns - columns.mean(axis=0), y[usable] - y[usable].mean()
+    line = np.linspace(-0.5, 0.5, len(y))[usable]
+    line = (line - line.mean()) / np.linalg.norm(line - line.mean())
+    without = _left(columns, target)
+    flat = target - line * (line @ target)
+    within = _left(columns - np.outer(line, line @ columns), flat)
+    if not within @ within < STRAIGHT * (without @ without) or not np.std(without) > WORTH:
+        return ""
+    chosen, weights = _pursued(columns - np.outer(line, line @ columns), flat)
+    slope = float(line @ (target - columns[:, chosen] @ weights)) * float(np.ptp(line))
+    if not abs(slope) > STEEP:
+        return ""
+    way = "rises" if slope > 0 else "falls"
+    return (
+        f"{name} drifts: besides what its inputs do it {way} by {abs(slope):.2g} of its "
+        "standard deviations from beginning to end, which the model cannot say. Take the drift out of the records, or "
+        "give its cause as an input; where it integrates an input, take a structure that does."
+    )
+
+
+def _left(columns: Array, target: Array) -> Array:
+    chosen, weights = _pursued(columns, target)
+    return target - columns[:, chosen] @ weights
+
+
+def _lasting(error: Array, usable: Mask, name: str) -> list[str]:
+    """A sentence where the error is not the noise of a sensor: it lasts, and no input explains it."""
+    centred = np.where(usable, error - error[usable].mean(), 0.0)
+    count = int(usable.sum())
+    independent = count / correlation_time(centred)
+    whole = usable & np.r_[False, usable[:-1]]
+    now, before = centred[whole], np.r_[0.0, centred[:-1]][whole]
+    told = float(now @ before) ** 2 / max(float(now @ now) * float(before @ before), 1e-300)
+    size = float(np.std(error[usable]))
+    if size < SMALL or (independent >= LEAST_INDEPENDENT and not (told > OWN and size > LARGE)):
+        return []
+    return [
+        f"The error of the free run of {name} is no noise of a sensor: {100 * told:.0f} % of it is in the sample "
+        f"before, and its {count} samples count for some {max(1.0, independent):.0f} independent ones. Something that "
+        "is not measured moves it, or it sums up all errors, and how well the run follows these records says little "
+        "of others. Measure it, record longer, or fit a model with noise (BJ, ARMAX) and predict."
+    ]

@@ -1,0 +1,86 @@
+"""Simple things that an output may do with its inputs: follow slowly, follow along a curve, follow with play."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+Array = NDArray[np.float64]
+
+LINEAR, CURVES, PLAYS = "linear", "curves", "plays"
+SLOWEST = 8
+"""Times that the longest memory goes into the record at least."""
+STEP = 3.0
+"""From one memory to the next."""
+ORDERS = 3
+"""Times that a linear memory follows itself."""
+AT = (0.2, 0.4, 0.6, 0.8)
+"""Quantiles at which a curve bends."""
+WIDTHS = (0.1, 0.2, 0.35)
+"""Half the play, in ranges."""
+MOST_INPUTS = 4
+
+
+def features(inputs: Array, simulated: Array) -> dict[str, Array]:
+    """Signals that a model of some inputs may have left out.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``; of many inputs the first are looked at.
+        simulated: Free run of one output, shape ``(n_samples,)``, for curves behind it.
+
+    Returns:
+        By kind the columns, shape ``(n_samples, n)``.
+    """
+    u = inputs[:, :MOST_INPUTS]
+    u = (u - u.mean(axis=0)) / np.maximum(u.std(axis=0), np.finfo(np.float64).tiny)
+    memories = [1.0]
+    while memories[-1] * STEP <= len(u) / SLOWEST:
+        memories.append(memories[-1] * STEP)
+    # An integrator's output, but for the level from which it integrates.
+    linear, curves, plays = [u, _late(u), np.cumsum(_late(u), axis=0) / len(u)], [], []
+    bent = np.column_stack([*(_curves(one) for one in u.T), *_products(u)])
+    held = np.column_stack([_play(one, width * float(np.ptp(one))) for one in u.T for width in WIDTHS])
+    curves += [bent, _curves(simulated)]
+    plays += [held]
+    for memory in memories:
+        slow = u
+        for _ in range(ORDERS):
+            slow = _slowed(slow, memory)
+            linear.append(slow)
+        curves += [_slowed(bent, memory), *(_curves(one) for one in _slowed(u, memory).T)]
+        plays += [_slowed(held, memory)]
+    return {kind: np.column_stack(parts) for kind, parts in ((LINEAR, linear), (CURVES, curves), (PLAYS, plays))}
+
+
+def _late(x: Array) -> Array:
+    return np.concatenate([x[:1], x[:-1]])
+
+
+def _slowed(x: Array, memory: float) -> Array:
+    """What follows a signal with a time constant, from the next sample on, settled at its first value."""
+    pole = float(np.exp(-1.0 / memory))
+    late = _late(x)
+    out, _ = signal.lfilter([1.0 - pole], [1.0, -pole], late, axis=0, zi=pole * late[:1])
+    return np.asarray(out, dtype=np.float64)
+
+
+def _curves(x: Array) -> Array:
+    """A parabola, and what is above each of some quantiles."""
+    bends = [np.maximum(x - at, 0.0) for at in np.quantile(x, AT)]
+    return np.column_stack([x**2, *bends])
+
+
+def _products(u: Array) -> list[Array]:
+    n = u.shape[1]
+    return [u[:, i] * u[:, j] for i in range(n) for j in range(i)]
+
+
+def _play(x: Array, width: float) -> Array:
+    """What follows a signal only when it is pushed by the ends of a gap (backlash)."""
+    out = np.empty(len(x))
+    at = x[0]
+    for k, value in enumerate(x.tolist()):
+        at = min(max(at, value - width), value + width)
+        out[k] = at
+    return out

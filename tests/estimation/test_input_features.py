@@ -1,0 +1,37 @@
+"""What an output may do with its inputs, as columns: each is causal, settled at the beginning, and of its kind."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sysid.estimation.input_features import CURVES, LINEAR, PLAYS, features
+
+
+def test_columns_are_settled_and_depend_on_nothing_that_comes_later() -> None:
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1.0, 1.0, (40, 2)), 5, axis=0)
+    u -= u.mean(axis=0)
+    simulated = np.cumsum(u[:, 0])
+    found = features(u, simulated)
+    assert set(found) == {LINEAR, CURVES, PLAYS}
+    for columns in found.values():
+        assert columns.shape[0] == 200
+        assert np.isfinite(columns).all()
+    still = features(np.full((200, 1), 3.0), np.zeros(200))
+    for kind in (CURVES, PLAYS):
+        assert np.allclose(still[kind], still[kind][0])
+
+
+def test_a_play_follows_only_what_pushes_it() -> None:
+    u = np.r_[np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.0, 50)]
+    held = features(u[:, np.newaxis], u)[PLAYS][:, 0]
+    turn = held[49:56]
+    assert np.allclose(turn, turn[0])  # nothing moves while it crosses the gap
+    assert held[-1] < turn[0]
+
+
+def test_of_many_inputs_the_first_are_looked_at() -> None:
+    u = np.random.default_rng(1).standard_normal((200, 9))
+    assert all(a.shape == b.shape for a, b in zip(
+        features(u, u[:, 0]).values(), features(u[:, :4], u[:, 0]).values(), strict=True
+    ))  # fmt: skip
