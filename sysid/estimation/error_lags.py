@@ -62,27 +62,59 @@ def _at_once(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: 
         return []
     return [
         f"{100 * share:.0f} % of what is new in the error of {target} moves with {name} of the same sample."
-        f" Either {name} acts at once, which this model leaves out (give it the lag 0: nk: 0, delays: 0, "
-        f"input_delays from 0, feedthrough: true), or it is fed back from {target}."
+        f" Either {name} acts at once, which this model leaves out ({_at(model, 0)}), or it is fed back from {target}."
     ]
 
 
 def _elsewhere(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: int, i: int) -> list[str]:
     """Whether an output begins to move with an input at another lag than in the model, and the error says so too."""
     first = _first(model, run, j, i)
-    if first is None:
-        return []
     lag, share = _lag(run.output[:, i], run.inputs[:, j], run.usable, slice(0, 1))
+    name, target = model.mapping.inputs[j], model.mapping.outputs[i]
+    before = f"{lag} sample{'s' if lag > 1 else ''} before"
+    moves = f"{100 * share:.0f} % of what is new in {target} moves with {name} of {before},"
+    if first is None:
+        deaf = share > 0.0 and _deaf(model, run, j, i)
+        return [f"{moves} and in the model {target} does not depend on {name}. {_begin(model, lag, lag)}"] * deaf
     own = slice(first, first + LAGS + 1)
     if share <= 0.0 or lag in range(own.start, own.stop) or not _lag(error, run.inputs[:, j], run.usable, own)[1]:
         return []
-    name, target = model.mapping.inputs[j], model.mapping.outputs[i]
     return [
-        f"{100 * share:.0f} % of what is new in {target} moves with {name} of {lag} sample{'s' if lag > 1 else ''} "
-        f"before, and in the model {name} acts from lag {first} on: its dead time is too "
-        f"{'short' if first < lag else 'long'}. Begin there (nk: {lag}, delays: {lag}, input_delays from {lag}), or "
-        "let it be searched (auto)."
+        f"{moves} and in the model {name} acts from lag {first} on: its dead time is too "
+        f"{'short' if first < lag else 'long'}. {_begin(model, lag, lag - first)}"
     ]
+
+
+def _begin(model: AbstractModel, lag: int, late: int) -> str:
+    """What to write for inputs that act from a lag on, in the words of the structure."""
+    words = _at(model, lag)
+    if words:
+        return f"Begin there ({words}), or let it be searched (auto)."
+    return (
+        f"This structure has no dead time: give it the input {abs(late)} samples {'later' if late > 0 else 'earlier'}, "
+        "or take one that has (nk, delays, input_delays), or let it be searched (auto)."
+    )
+
+
+def _at(model: AbstractModel, lag: int) -> str:
+    """How a structure says from which lag on its inputs act; empty where it cannot."""
+    structure = model.structure
+    if hasattr(structure, "input_delays"):
+        return f"input_delays from {lag}"
+    if lag == 0 and hasattr(structure, "feedthrough"):
+        return "feedthrough: true"
+    for field in ("nk", "delays"):
+        if hasattr(structure, field):
+            return f"{field}: {lag}"
+    return "let it stand in the equation of the output" if lag == 0 else ""
+
+
+def _deaf(model: AbstractModel, run: FreeRun, j: int, i: int) -> bool:
+    """Whether an output of the model is the same whatever an input does."""
+    turned = run.inputs.copy()
+    turned[:, j] = turned[::-1, j]
+    before, after = (model.simulate(u, run.history).reshape(len(u), -1)[:, i] for u in (run.inputs, turned))
+    return bool(np.array_equal(before, after))
 
 
 def _read_backwards(model: AbstractModel, run: FreeRun, j: int, i: int) -> list[str]:

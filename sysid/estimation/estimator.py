@@ -21,7 +21,7 @@ from sysid.estimation.linear_posteriors import LinearPosterior
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import Training
-from sysid.estimation.record_notes import contradicted, outnumbered, underexcited, undetermined
+from sysid.estimation.record_notes import between_levels, contradicted, outnumbered, underexcited, undetermined
 from sysid.estimation.result import FitResult
 from sysid.estimation.stability.check import (
     AbstractStabilityCheck,
@@ -203,6 +203,7 @@ class Estimator:
             against = contradicted(found.model, traces, named["start"])
             few = (*outnumbered(found.model, traces), *underexcited(found.model, traces))
             warned = (*undetermined(traces, mapping), *few, *against, *off)
+            told = (*told, *between_levels(found.model, traces))
             return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
 
         # Matrices of a linear fit are small: BLAS threads that wake for them cost more than they give.

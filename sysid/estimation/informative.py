@@ -33,9 +33,22 @@ def still(column: NDArray[np.float64]) -> bool:
 
 
 def _made_of(column: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    return own_part(column, others) <= SAME
+
+
+def own_part(column: NDArray[np.float64], others: NDArray[np.float64]) -> float:
+    """The part of a channel's movement that others do not explain; 1 beside none.
+
+    Args:
+        column: Shape ``(n_samples,)``; it moves.
+        others: Shape ``(n_samples, n)``.
+
+    Returns:
+        From 0 to 1, in standard deviations.
+    """
     basis = unit(np.column_stack([others, np.ones(len(column))]))
     left = column - basis @ np.linalg.lstsq(basis, column, rcond=None)[0]
-    return bool(np.linalg.norm(left) <= SAME * np.linalg.norm(column - column.mean()))
+    return float(np.linalg.norm(left) / max(float(np.linalg.norm(column - column.mean())), np.finfo(np.float64).tiny))
 
 
 def unit(columns: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid.estimation.error_causes import causes
 from sysid.estimation.error_lags import left_out
 from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.informative import informative, still
+from sysid.estimation.informative import informative, own_part, still
 from sysid.estimation.nonparametric.excitation_order import MOST, excitation_order
 from sysid.estimation.nonparametric.segments import segments_of
 from sysid.models import AbstractModel, Mapping, Start
@@ -22,6 +22,10 @@ LEAST_SAMPLES = 100
 NOTHING = 1e-6
 """Part of its largest direction that the smallest of an input's movements has where it is rounding."""
 MOST_TRACES = 20
+OF_CURVES, LEVELS = 4, 3
+"""Order that an input must excite for a curve, which one sine does not; and levels that are too few for one."""
+HARDLY_OWN = 0.01
+"""Part of an input's movement that others do not explain, below which its effect is told by hardly anything."""
 WORSE, HARDLY = 1.1, 0.9
 """Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt; and
 above which it does as well, all but a twentieth of the output's movement."""
@@ -54,6 +58,13 @@ def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
         elif j not in kept:
             names = ", ".join(mapping.inputs[i] for i in kept if i < j)
             told.append(f"{name} is made of {names} in these records: they do not tell their effects apart.")
+        elif (rest := own_part(inputs[:, j], inputs[:, [i for i in kept if i < j]])) < HARDLY_OWN:
+            names = ", ".join(mapping.inputs[i] for i in kept if i < j)
+            told.append(
+                f"{name} is nearly made of {names} in these records: {100 * rest:.2g} % of its movement is its own, "
+                "and by that alone their effects are told apart. Where they move apart the model is a guess: leave one "
+                "of them out, or record them moving apart."
+            )
     columns = zip((*mapping.inputs, *mapping.outputs), (*inputs.T, *outputs.T), strict=True)
     return (*told, *(told_ for name, column in columns for told_ in _far_off(name, column)))
 
@@ -97,7 +108,8 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
     """Whether an input moves in too few ways to tell all coefficients of its effect.
 
     Args:
-        model: The fitted model; only linear ones have such coefficients.
+        model: The fitted model: of a linear one the coefficients of each input count, of one that learns its
+            curves from the records, more than one sine has.
         traces: The records that were fitted.
 
     Returns:
@@ -108,6 +120,8 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
         # Of an equation with past outputs the noise excites the denominator.
         of_input = len(ratio.B) if ratio.past_outputs else len(ratio.B) + len(ratio.F) - 1
         asked[j] = max(asked.get(j, 0), of_input)
+    if not model.ratios and model.structure.learns_curves:
+        asked = dict.fromkeys(range(len(model.mapping.inputs)), OF_CURVES)
     segments, told = segments_of(traces, model.mapping.each[0]), []  # of each output the same inputs
     for j, needed in asked.items():
         parts = [segment.inputs[:, j] for segment in segments]
@@ -116,10 +130,31 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
         order, _ = excitation_order(parts, needed, seen=NOTHING)
         if order < needed:
             told.append(
-                f"{model.mapping.inputs[j]} moves in too few ways: it excites order {order}, and the model has "
-                f"{needed} coefficients of its effect. The records tell what it does at these frequencies alone; at "
+                f"{model.mapping.inputs[j]} moves in too few ways: it excites order {order}, and the model asks "
+                f"for {needed} to tell its effect. The records tell what it does at these frequencies alone; at "
                 "all others the model is free. Excite it with more (sysid.excite), or fit fewer coefficients."
             )
+    return tuple(told)
+
+
+def between_levels(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...]:
+    """Which inputs take so few values that what a model makes of all others is not learnt.
+
+    Args:
+        model: The fitted model; only one that learns curves from records has something to learn of levels.
+        traces: The records that were fitted.
+
+    Returns:
+        One sentence for each such input: no fault, where it is never at others.
+    """
+    if not model.structure.learns_curves:
+        return ()
+    told = []
+    for name in model.mapping.inputs:
+        levels = np.unique(np.concatenate([trace[name][trace.usable_samples] for trace in traces]))
+        if 1 < len(levels) <= LEVELS:
+            at = ", ".join(f"{value:.6g}" for value in levels)
+            told.append(f"{name} is only ever {at} in these records: what the model makes of other values is a guess.")
     return tuple(told)
 
 

@@ -47,6 +47,9 @@ class AbstractStructure(ABC):
     learns_start: bool = False
     """Whether where a record begins is fitted with the parameters, so that a run from its start need not be at rest."""
 
+    learns_curves: bool = False
+    """Whether what an input does at each of its levels is learnt from records alone, and no equation says it."""
+
     per_input: tuple[str, ...] = ()
     """Fields that hold one number per input."""
 

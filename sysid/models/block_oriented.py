@@ -48,6 +48,8 @@ class BlockStructure(AbstractStructure):
 
     delays: int | tuple[int, ...]
 
+    learns_curves = True
+
     def lags(self, n_inputs: int) -> tuple[int, ...]:
         """The dead time of each input, in samples."""
         return (self.delays,) * n_inputs if isinstance(self.delays, int) else self.delays

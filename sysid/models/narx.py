@@ -66,6 +66,7 @@ class NARX(AbstractStructure):
     limits: Any = None
 
     kind = "NARX"
+    learns_curves = True
 
     def __init__(
         self,

@@ -54,6 +54,7 @@ class NeuralStateSpace(AbstractStructure):
 
     acts_at_once = True
     kind = "NSS"
+    learns_curves = True
     learns_start = True
 
     def __post_init__(self) -> None:

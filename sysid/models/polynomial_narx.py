@@ -49,6 +49,7 @@ class PolynomialNARX(AbstractStructure):
     terms: Annotated[int, IntRange(low=2, high=30)] = 20
 
     kind = "PolynomialNARX"
+    learns_curves = True
 
     def __post_init__(self) -> None:
         given = self.input_delays

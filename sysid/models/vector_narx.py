@@ -59,6 +59,7 @@ class VectorNARX(AbstractStructure):
     limits: Any = None
 
     kind = "VectorNARX"
+    learns_curves = True
     several_outputs = True
 
     def __init__(

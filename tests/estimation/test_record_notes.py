@@ -11,7 +11,7 @@ import pytest
 import sysid
 from sysid.estimation.error_lags import left_out
 from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.record_notes import contradicted, outnumbered
+from sysid.estimation.record_notes import between_levels, contradicted, outnumbered, underexcited, undetermined
 from sysid.models import History, Mapping, Start
 
 N = 400
@@ -78,6 +78,15 @@ def test_channels_that_say_nothing_are_named(structure: sysid.ARX) -> None:
     assert "u2 is made of u1 in these records: they do not tell their effects apart." in told
     assert "u3 never changes in these records: they say nothing of its effect." in told
     assert not [note for note in told if note.startswith("u1 ")]
+
+
+@pytest.mark.parametrize(("own", "told"), [(1e-3, True), (0.1, False)])
+def test_an_input_that_is_nearly_made_of_another_is_told(own: float, told: bool) -> None:
+    u = _u()
+    both = np.column_stack([u, u + own * np.random.default_rng(3).standard_normal(N) * u.std()])
+    (trace,) = sysid.data((both, _y(u, dead=1)), sample_time=1.0)
+    found = undetermined([trace], Mapping(inputs=("u1", "u2"), outputs=("y",)))
+    assert [note.startswith("u2 is nearly made of u1 in these records: 0.1 %") for note in found] == [True] * told
 
 
 @pytest.mark.parametrize("level", [0.0, 3.0])
@@ -168,7 +177,38 @@ def test_a_dead_time_that_is_too_short_is_told_with_the_right_one(structure: obj
     y = np.convolve(np.r_[np.zeros(30), u], 0.1 * 0.9 ** np.arange(800))[:800]
     told = [note for note in _fit(u, _noisy(y), structure).warnings if "dead time is too" in note]
     assert len(told) == 1
-    assert "acts from lag 1 on: its dead time is too short. Begin there (nk: 30," in told[0]
+    word = "input_delays from 30" if structure.kind == "NARX" else "nk: 30"
+    assert f"acts from lag 1 on: its dead time is too short. Begin there ({word})," in told[0]
+
+
+def test_a_remedy_is_in_the_words_of_the_structure() -> None:
+    u = np.repeat(np.random.default_rng(0).uniform(-1, 1, 200), 4)
+    y = np.convolve(np.r_[np.zeros(30), u], 0.1 * 0.9 ** np.arange(800))[:800]
+    traces = sysid.data((u, _noisy(y)), sample_time=1.0)
+    grey = sysid.GreyBox(equations="dx/dt = (u - x)/tau; y = g*x", parameters={"tau": 5.0, "g": 1.0})
+    (told,) = [note for note in sysid.fit(traces, "u -> y", grey).warnings if "dead time is too" in note]
+    late = int(told.split("give it the input ")[1].split(" samples later")[0])
+    shifted = sysid.data((u[:-late], y[late:]), sample_time=1.0)  # as it says
+    assert not [note for note in sysid.fit(shifted, "u -> y", grey).warnings if "dead time" in note]
+
+
+def test_an_input_that_the_model_let_go_is_told_with_its_dead_time() -> None:
+    u = np.repeat(np.random.default_rng(0).uniform(-1, 1, 200), 4)[:, np.newaxis]
+    y = np.convolve(np.r_[np.zeros(30), u[:, 0]], 0.1 * 0.9 ** np.arange(800))[:800]
+    model = SimpleNamespace(
+        mapping=Mapping(inputs=("u",), outputs=("y",)),
+        structure=SimpleNamespace(acts_at_once=False, input_delays=((1,),)),
+        simulate=lambda u, _: np.zeros(len(u)),
+    )
+    run = FreeRun(
+        inputs=u,
+        output=_noisy(y)[:, np.newaxis],
+        simulated=np.zeros((800, 1)),
+        usable=np.ones(800, dtype=bool),
+        history=History.at_rest(inputs=[0.0], output=0.0),
+    )
+    (told,) = left_out(model, run)
+    assert "y does not depend on u. Begin there (input_delays from 30)," in told
 
 
 def test_a_dead_time_that_is_too_long_is_told_with_the_right_one() -> None:
@@ -176,7 +216,7 @@ def test_a_dead_time_that_is_too_long_is_told_with_the_right_one() -> None:
     for structure in (sysid.ARX(na=1, nb=1, nk=12), sysid.OE(nb=1, nf=1, nk=12)):
         told = [note for note in _fit(u, _noisy(_y(u, dead=3)), structure).warnings if "dead time is too" in note]
         assert len(told) == 1
-        assert "acts from lag 12 on: its dead time is too long. Begin there (nk: 3," in told[0]
+        assert "acts from lag 12 on: its dead time is too long. Begin there (nk: 3)," in told[0]
 
 
 @pytest.mark.parametrize("plant", ["quantised", "dead zone", "drift", "two paths", "slow"])
@@ -218,6 +258,36 @@ def test_an_input_that_moves_in_too_few_ways_is_told(structure: object, u: np.nd
     fit = sysid.fit(sysid.data((u, _noisy(_y(u, dead=1))), sample_time=1.0), "u -> y", structure)
     told = [note for note in fit.warnings if "too few ways" in note]
     assert [f"excites order {order}," in note for note in told] == ([] if order is None else [True])
+
+
+CURVED = [
+    sysid.NARX(input_delays=2, output_delays=2, neurons=1),
+    sysid.VectorNARX(input_delays=2, output_delays=2, neurons=1),
+    sysid.PolynomialNARX(input_delays=1, output_delays=1),
+    sysid.NeuralStateSpace(states=1, neurons=1),
+    sysid.HammersteinWiener(states=1, input="polynomial 2"),
+    sysid.WienerHammerstein(first=1, second=1, curve="polynomial 2"),
+]
+
+
+@pytest.mark.parametrize("structure", CURVED, ids=lambda s: s.kind)
+def test_a_structure_that_learns_curves_is_told_what_one_sine_and_two_levels_leave_open(structure: object) -> None:
+    model = SimpleNamespace(
+        mapping=Mapping(inputs=("u",), outputs=("y",)), structure=structure, ratios={}
+    )  # what is asked is of structure and records alone
+    told = {}
+    for name, u in {"sine": np.sin(0.1 * np.arange(N)), "steps": np.sign(_u()), "random": _u()}.items():
+        traces = list(sysid.data((u, _y(u, dead=1)), sample_time=1.0))
+        told[name] = (len(underexcited(model, traces)), len(between_levels(model, traces)))
+    assert told == {"sine": (1, 0), "steps": (0, 1), "random": (0, 0)}
+
+
+def test_equations_are_not_told_of_curves() -> None:
+    u = np.sign(_u())
+    grey = sysid.GreyBox(equations="dx/dt = (u - x)/tau; y = x", parameters={"tau": 5.0})
+    traces = list(sysid.data((u, _y(u, dead=1)), sample_time=1.0))
+    model = SimpleNamespace(mapping=Mapping(inputs=("u",), outputs=("y",)), structure=grey, ratios={})
+    assert (underexcited(model, traces), between_levels(model, traces)) == ((), ())
 
 
 def test_inputs_of_several_outputs_are_looked_at_once() -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from sysid.estimation.grey_box.named import Named
 from sysid.estimation.grey_box.profile import Profile
@@ -206,11 +207,25 @@ class Findings:
                 )
         with np.errstate(invalid="ignore"):
             correlation = self.covariance / np.outer(deviations, deviations)
-        for i, one in enumerate(self.named):
-            for j in range(i):
-                pair, found = f"{self.named[j].name} and {one.name}", correlation[i, j]
-                told += [
-                    f"The parameters {pair} can hardly be told apart (correlation {found:.4f}): the run hardly changes "
-                    "where both move, and the interval of each may be too short. Fix one of them, or give it a prior."
-                ] * bool(abs(found) > TOGETHER)
-        return tuple(told)
+        return (*told, *_together([one.name for one in self.named], np.abs(correlation)))
+
+
+def _together(names: Sequence[str], correlation: Array) -> list[str]:
+    """One sentence for each group of parameters that can hardly be told apart, however many pairs it has."""
+    near = np.triu(correlation > TOGETHER, 1)
+    count, group = connected_components(near, directed=False)
+    told = []
+    for one in range(count):
+        members = np.flatnonzero(group == one)
+        if len(members) < 2:
+            continue
+        most = float(np.max(correlation[np.ix_(members, members)][near[np.ix_(members, members)]]))
+        listed = f"{', '.join(names[i] for i in members[:-1])} and {names[members[-1]]}"
+        told.append(
+            f"The parameters {listed} can hardly be told apart (correlation up to {most:.4f}): the run hardly changes "
+            "where they move together, and the interval of each may be too short. Fix some of them, or give priors."
+            if len(members) > 2
+            else f"The parameters {listed} can hardly be told apart (correlation {most:.4f}): the run hardly changes "
+            "where both move, and the interval of each may be too short. Fix one of them, or give it a prior."
+        )
+    return told
