@@ -1,7 +1,8 @@
 """Traces and a structure in, a FitResult out."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
     from sysid.estimation.attempts import Attempt
@@ -64,37 +65,30 @@ __all__ = [
     "with_upstream_outputs",
 ]
 
-_ROOM = "sysid.estimation"
 _WHERE = {
-    "attempts": ("Attempt",),
-    "linear.arx": ("fit_arx",),
-    "linear.frequency_response": ("Spectrum", "fit_spectra"),
-    "linear.instrumental": ("fit_iv4",),
-    "linear.modes": ("Mode", "modes"),
-    "linear.polynomial.fit": ("PolynomialTraining", "fit_polynomial"),
-    "linear.state_space.fit": ("fit_state_space", "fit_vector_state_space"),
-    "linear.state_space.orders": ("StateOrders", "state_orders"),
-    "linear.state_space.search": ("StateSpaceTraining",),
-    "linear.transfer_function": ("fit_transfer_function",),
-    "linear.transfer_function_training": ("TransferFunctionTraining",),
-    "networks.joint": ("CascadeFit", "JointTraining"),
-    "networks.joint_training": ("fit_cascade", "with_upstream_outputs"),
-    "networks.narx": ("fit_narx",),
-    "networks.neural_state_space": ("fit_neural_state_space", "fit_vector_neural_state_space"),
-    "networks.posterior": ("Posterior",),
-    "networks.training": ("FitProgress", "Training"),
-    "networks.vector_narx": ("fit_vector_narx",),
-    "operating_point": ("OperatingPoint",),
-    "result": ("Evidence", "FitResult", "Loop", "Status"),
-    "stability": ("StabilityOptions",),
-    "uncertainty": ("Uncertainty",),
+    "sysid.estimation.attempts": ("Attempt",),
+    "sysid.estimation.linear.arx": ("fit_arx",),
+    "sysid.estimation.linear.frequency_response": ("Spectrum", "fit_spectra"),
+    "sysid.estimation.linear.instrumental": ("fit_iv4",),
+    "sysid.estimation.linear.modes": ("Mode", "modes"),
+    "sysid.estimation.linear.polynomial.fit": ("PolynomialTraining", "fit_polynomial"),
+    "sysid.estimation.linear.state_space.fit": ("fit_state_space", "fit_vector_state_space"),
+    "sysid.estimation.linear.state_space.orders": ("StateOrders", "state_orders"),
+    "sysid.estimation.linear.state_space.search": ("StateSpaceTraining",),
+    "sysid.estimation.linear.transfer_function": ("fit_transfer_function",),
+    "sysid.estimation.linear.transfer_function_training": ("TransferFunctionTraining",),
+    "sysid.estimation.networks.joint": ("CascadeFit", "JointTraining"),
+    "sysid.estimation.networks.joint_training": ("fit_cascade", "with_upstream_outputs"),
+    "sysid.estimation.networks.narx": ("fit_narx",),
+    "sysid.estimation.networks.neural_state_space": ("fit_neural_state_space", "fit_vector_neural_state_space"),
+    "sysid.estimation.networks.posterior": ("Posterior",),
+    "sysid.estimation.networks.training": ("FitProgress", "Training"),
+    "sysid.estimation.networks.vector_narx": ("fit_vector_narx",),
+    "sysid.estimation.operating_point": ("OperatingPoint",),
+    "sysid.estimation.result": ("Evidence", "FitResult", "Loop", "Status"),
+    "sysid.estimation.stability": ("StabilityOptions",),
+    "sysid.estimation.uncertainty": ("Uncertainty",),
 }
 """Where each name is defined: a frozen model is run without anything that fits one, which takes longest to import."""
 
-
-def __getattr__(name: str) -> Any:
-    """A name, imported now."""
-    for module, names in _WHERE.items():
-        if name in names:
-            return globals().setdefault(name, getattr(import_module(f"{_ROOM}.{module}"), name))
-    raise AttributeError(f"module {_ROOM!r} has no attribute {name!r}")
+__getattr__ = imported_when_asked(_WHERE)

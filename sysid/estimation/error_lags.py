@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal, special
 
 from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.informative import SAME, informative, unit
@@ -163,7 +163,7 @@ def _lag(
     most = len(left) // 3
     if whole.sum() < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(column[whole]):
         return 0, 0.0
-    both = signal.correlate(_direction(left), _direction(new))
+    both = scipy.signal.correlate(_direction(left), _direction(new))
     shares = both[len(left) - 1 : len(left) - 1 + most] ** 2
     shares[but] = 0.0
     share, free = float(shares.max()), int(whole.sum()) - LAGS - 2
@@ -210,4 +210,4 @@ def _direction(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _by_chance(share: float, free: int) -> float:
     """How probable it is that one column explains that much of noise (F test with 1 and ``free`` degrees)."""
-    return float(special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))
+    return float(scipy.special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))

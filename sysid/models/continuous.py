@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.errors import ConfigError
 from sysid.extras import need
@@ -40,7 +40,7 @@ def rates(A: Array, B: Array, sample_time: float, *, remedy: str) -> tuple[Array
     Raises:
         ConfigError: If a pole is zero or negative.
     """
-    poles = linalg.eigvals(A) if len(A) else np.zeros(0)
+    poles = scipy.linalg.eigvals(A) if len(A) else np.zeros(0)
     bad = poles[(np.abs(poles.imag) < NEGATIVE) & (poles.real <= NEGATIVE)]
     if len(bad):
         raise ConfigError(
@@ -53,7 +53,7 @@ def rates(A: Array, B: Array, sample_time: float, *, remedy: str) -> tuple[Array
     n, m = B.shape
     block = np.eye(n + m)
     block[:n, :n], block[:n, n:] = A, B
-    found = np.real(linalg.logm(block)) / sample_time
+    found = np.real(scipy.linalg.logm(block)) / sample_time
     return found[:n, :n], found[:n, n:]
 
 
@@ -80,7 +80,7 @@ class ContinuousStateSpace:
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Poles in the s plane, in rad/s, shape ``(n,)``."""
-        return np.asarray(linalg.eigvals(self.A), dtype=np.complex128)
+        return np.asarray(scipy.linalg.eigvals(self.A), dtype=np.complex128)
 
     def to_control(self, *, pade_order: int = 3) -> Any:
         """The same as a ``control.StateSpace`` in continuous time.

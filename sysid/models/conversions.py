@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.errors import ConfigError
 from sysid.models.continuous import rates
@@ -139,7 +139,7 @@ def _scaled(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
     """The same system with states of a like size; scaling by powers of two, which rounds nothing."""
     if not len(A):
         return A, B, C
-    found, (scale, _) = linalg.matrix_balance(A, permute=False, separate=True)
+    found, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
     return found, B / scale[:, np.newaxis], C * scale
 
 
@@ -170,9 +170,9 @@ def _observer(nums: Any, dens: Any) -> tuple[Array, Array, Array, Array]:
                 same[1][j] = top
         rows.append(observer_row(parts, len(num)))
     return (
-        np.asarray(linalg.block_diag(*(A for A, *_ in rows))).reshape(2 * (sum(len(A) for A, *_ in rows),)),
+        np.asarray(scipy.linalg.block_diag(*(A for A, *_ in rows))).reshape(2 * (sum(len(A) for A, *_ in rows),)),
         np.concatenate([B for _, B, *_ in rows]),
-        np.asarray(linalg.block_diag(*(C for *_, C, _ in rows))),
+        np.asarray(scipy.linalg.block_diag(*(C for *_, C, _ in rows))),
         np.concatenate([D for *_, D in rows]),
     )
 
@@ -230,7 +230,7 @@ def canonical(system: Any, form: str) -> Any:
         denominator = np.poly(A)
         # From the observability matrix of the form itself, which is triangular.
         own = np.array([[denominator[i - j] if i >= j else 0.0 for j in range(len(A))] for i in range(len(A))])
-        T = linalg.pinv(own @ seen)
+        T = scipy.linalg.pinv(own @ seen)
     else:
         raise ConfigError(
             "no such form of this system",
@@ -239,7 +239,7 @@ def canonical(system: Any, form: str) -> Any:
             got=f"{form}, {B.shape[1]} inputs and {C.shape[0]} outputs",
             remedy="write modal, or take one input and one output",
         )
-    sizes = linalg.svdvals(T)
+    sizes = scipy.linalg.svdvals(T)
     if len(T) and not sizes[-1] > WELL_CONDITIONED * sizes[0]:
         raise ConfigError(
             f"the system has no {form} form",
@@ -247,7 +247,7 @@ def canonical(system: Any, form: str) -> Any:
             got=f"coordinates that are singular to {sizes[-1] / sizes[0]:.1e}",
             remedy="reduce the system first (reduced), or leave its coordinates as they are",
         )
-    inverse = linalg.inv(T)
+    inverse = scipy.linalg.inv(T)
     return control.StateSpace(inverse @ A @ T, inverse @ B, C @ T, given.D, given.dt, **_names(given))
 
 
@@ -261,7 +261,7 @@ def _krylov(A: Array, b: Array) -> Array:
 
 def _eigenvectors(A: Array) -> Array:
     """Real eigenvectors, of a pair the real and the imaginary part; by falling magnitude of the pole."""
-    poles, vectors = linalg.eig(A)
+    poles, vectors = scipy.linalg.eig(A)
     columns: list[Array] = []
     for i in np.lexsort((-poles.imag, -poles.real, -np.abs(poles).round(12))):
         if poles[i].imag == 0.0:
@@ -325,10 +325,14 @@ def reduced(system: Any, states: int) -> Reduction:
             got=states,
             remedy="keep as many as there are large singular values",
         )
-    solve = linalg.solve_discrete_lyapunov if discrete else (lambda A, Q: linalg.solve_continuous_lyapunov(A, -Q))
+    solve = (
+        scipy.linalg.solve_discrete_lyapunov
+        if discrete
+        else (lambda A, Q: scipy.linalg.solve_continuous_lyapunov(A, -Q))
+    )
     A, B, C = _scaled(given.A, given.B, given.C)
     P, Q = _root(solve(A, B @ B.T)), _root(solve(A.T, C.T @ C))
-    U, sizes, Vt = linalg.svd(Q.T @ P)
+    U, sizes, Vt = scipy.linalg.svd(Q.T @ P)
     # Projections of the square-root method: nothing is inverted but the singular values that are kept.
     scale = 1.0 / np.sqrt(sizes[:states])
     left, right = (U[:, :states] * scale).T @ Q.T, P @ Vt[:states].T * scale
@@ -337,7 +341,7 @@ def reduced(system: Any, states: int) -> Reduction:
 
 
 def _root(gramian: Array) -> Array:
-    sizes, vectors = linalg.eigh(0.5 * (gramian + gramian.T))
+    sizes, vectors = scipy.linalg.eigh(0.5 * (gramian + gramian.T))
     return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))
 
 

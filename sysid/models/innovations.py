@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.kernels import innovations as kernel
 
@@ -92,7 +92,7 @@ class Innovations:
 
     def poles(self) -> NDArray[np.complex128]:
         """Eigenvalues of ``A``."""
-        return np.asarray(linalg.eigvals(self.A), dtype=np.complex128) if self.n_state else np.zeros(0, dtype=complex)
+        return np.asarray(scipy.linalg.eigvals(self.A) if self.n_state else np.zeros(0), dtype=np.complex128)
 
     def predicted(self, inputs: Array, outputs: Array, x: Array) -> tuple[Array, Array]:
         """One-step prediction over a record.
@@ -131,7 +131,7 @@ class Innovations:
             Shape ``(n_state,)``; the shortest where there are many.
         """
         drive = self.B @ inputs + self.K @ (outputs - self.D @ inputs - self.constant)
-        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.predictor, drive, cond=1e-9)[0])
+        return np.asarray(scipy.linalg.lstsq(np.eye(self.n_state) - self.predictor, drive, cond=1e-9)[0])
 
     def padded(self, states: int) -> Innovations:
         """The same system with states more that nothing reaches and nobody sees."""
@@ -189,12 +189,12 @@ class Innovations:
         try:
             P = _root(_gramian(A, drive @ drive.T))
             Q = _root(_gramian(A.T, self.C.T @ self.C))
-            U, sizes, Vt = linalg.svd(Q.T @ P)
+            U, sizes, Vt = scipy.linalg.svd(Q.T @ P)
             if not sizes[-1] > 1e-12 * sizes[0]:
                 return self
             # Both directions come from the factors: nothing is inverted but the singular values.
             return self.in_coordinates((U / np.sqrt(sizes)).T @ Q.T, P @ Vt.T / np.sqrt(sizes))
-        except (linalg.LinAlgError, ValueError):
+        except (np.linalg.LinAlgError, ValueError):
             return self
 
 
@@ -204,7 +204,7 @@ def spectral_radius(A: Array) -> float:
         return 0.0
     if not np.isfinite(A).all():
         return np.inf
-    return float(np.abs(linalg.eigvals(A, check_finite=False)).max())
+    return float(np.abs(scipy.linalg.eigvals(A, check_finite=False)).max())
 
 
 def _gramian(A: Array, Q: Array) -> Array:
@@ -221,5 +221,5 @@ def _gramian(A: Array, Q: Array) -> Array:
 
 def _root(gramian: Array) -> Array:
     """A factor ``G`` with ``G G' `` the Gramian, whose small eigenvalues rounding may have made negative."""
-    sizes, vectors = linalg.eigh(0.5 * (gramian + gramian.T))
+    sizes, vectors = scipy.linalg.eigh(0.5 * (gramian + gramian.T))
     return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.models.orthonormal_basis import BasisSection, Domain
 
@@ -41,7 +41,7 @@ class Realisation:
         n = len(self.A)
         block = np.zeros((n + 1, n + 1))
         block[:n, :n], block[:n, n] = self.A, self.B
-        exponential = linalg.expm(block * sample_time)
+        exponential = scipy.linalg.expm(block * sample_time)
         return Realisation(A=exponential[:n, :n], B=exponential[:n, n], C=self.C, D=self.D)
 
     def equilibrium(self, u: float) -> NDArray[np.float64]:
@@ -54,7 +54,7 @@ class Realisation:
             Shape ``(n_state,)``; the one of least length where there are many (an integrator without input).
         """
         matrix = np.eye(len(self.A)) - self.A
-        return np.asarray(linalg.lstsq(matrix, self.B * u)[0])
+        return np.asarray(scipy.linalg.lstsq(matrix, self.B * u)[0])
 
 
 def realise(basis: Sequence[BasisSection], domain: Domain) -> Realisation:
@@ -201,4 +201,4 @@ def observer_row(parts: Iterable[Ratios], n_inputs: int) -> tuple[NDArray[np.flo
         if len(block.A):
             C[0, at] = 1.0
         at += len(block.A)
-    return np.asarray(linalg.block_diag(*(block.A for block in blocks if len(block.A)))).reshape(n, n), B, C, D
+    return np.asarray(scipy.linalg.block_diag(*(block.A for block in blocks if len(block.A)))).reshape(n, n), B, C, D

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.errors import TraceError
 from sysid.kernels import innovations
@@ -142,13 +142,13 @@ class StateSpace(AbstractForm):
     @property
     def memory(self) -> int:
         """Twice as many samples as states but for dead times, which are among the states once."""
-        moving = int(np.count_nonzero(np.abs(linalg.eigvals(self.A)) > AT_ONE)) if self.n_state else 0
+        moving = int(np.count_nonzero(np.abs(scipy.linalg.eigvals(self.A)) > AT_ONE)) if self.n_state else 0
         return self.n_state + moving + 1
 
     @cached_property
     def _radius(self) -> float:
         """Largest magnitude of an eigenvalue."""
-        return float(np.abs(linalg.eigvals(self.A)).max(initial=0.0)) if self.n_state else 0.0
+        return float(np.abs(scipy.linalg.eigvals(self.A)).max(initial=0.0)) if self.n_state else 0.0
 
     def _resting(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Equilibrium at scaled inputs, with the output where the model leaves it open.
@@ -161,10 +161,10 @@ class StateSpace(AbstractForm):
         x = self.equilibrium(inputs)
         if abs(self._radius - 1.0) > AT_ONE:
             return x
-        _, sizes, rows = linalg.svd(np.eye(self.n_state) - self.A)
+        _, sizes, rows = scipy.linalg.svd(np.eye(self.n_state) - self.A)
         free = rows[sizes <= AT_ONE * max(float(sizes[0]), 1.0)]
         level = output - self.C @ x - self.D @ inputs - self.constant
-        return np.asarray(x + free.T @ linalg.lstsq(self.C @ free.T, level)[0]) if len(free) else x
+        return np.asarray(x + free.T @ scipy.linalg.lstsq(self.C @ free.T, level)[0]) if len(free) else x
 
     def equilibrium(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The state at which the system stays while its inputs are held.
@@ -177,7 +177,7 @@ class StateSpace(AbstractForm):
         """
         if self.n_state == 0:
             return np.zeros(0)
-        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A, self.B @ inputs, cond=AT_ONE)[0])
+        return np.asarray(scipy.linalg.lstsq(np.eye(self.n_state) - self.A, self.B @ inputs, cond=AT_ONE)[0])
 
     def standing(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:
         """The filter's state after scaled inputs and scaled outputs that have stood for ever.
@@ -190,7 +190,7 @@ class StateSpace(AbstractForm):
             Shape ``(n_state,)``.
         """
         drive = self.B @ inputs + self.gain @ (output - self.D @ inputs - self.constant)
-        return np.asarray(linalg.lstsq(np.eye(self.n_state) - self.A + self.gain @ self.C, drive, cond=AT_ONE)[0])
+        return np.asarray(scipy.linalg.lstsq(np.eye(self.n_state) - self.A + self.gain @ self.C, drive, cond=AT_ONE)[0])
 
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""
@@ -270,7 +270,7 @@ class StateSpace(AbstractForm):
             return np.zeros(self.n_state)
         size = np.linalg.norm(observed, axis=0)
         scale = np.where(size > 0.0, size, 1.0)
-        found, _, rank, _ = linalg.lstsq(observed / scale, missing, cond=1e-10)
+        found, _, rank, _ = scipy.linalg.lstsq(observed / scale, missing, cond=1e-10)
         left = missing - (observed / scale) @ found
         level = float(left @ left) / max(len(left) - rank, 1)
         clean = level <= EXACT * max(float(np.mean(output**2)), np.finfo(np.float64).tiny)
@@ -284,7 +284,7 @@ class StateSpace(AbstractForm):
         if len(left) <= rank:
             level = HISTORY_NOISE * max(float(np.trace(seen)) / len(seen), np.finfo(np.float64).tiny)
         with np.errstate(all="ignore"):
-            moved = spread @ observed.T @ linalg.lstsq(seen + level * np.eye(len(seen)), missing)[0]
+            moved = spread @ observed.T @ scipy.linalg.lstsq(seen + level * np.eye(len(seen)), missing)[0]
         return np.asarray(moved if np.isfinite(moved).all() else found / scale)
 
     def _covariance(self, level: float) -> NDArray[np.float64]:
@@ -296,7 +296,7 @@ class StateSpace(AbstractForm):
         if self._radius >= 1.0:
             return np.eye(self.n_state)
         drive = self.B @ self.B.T + level * (self.gain @ self.gain.T)
-        return np.asarray(linalg.solve_discrete_lyapunov(self.A, drive))
+        return np.asarray(scipy.linalg.solve_discrete_lyapunov(self.A, drive))
 
     def _checked(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         inputs = np.asarray(inputs, dtype=np.float64)

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.errors import ConfigError
 from sysid.extras import need
@@ -112,7 +112,7 @@ def of_wired(models: Sequence[Any], inputs: Sequence[str], outputs: Sequence[str
     for row, name in enumerate(name for model in models for name in model.mapping.inputs):
         reads[row, written.index(name) if name in written else len(written) + list(inputs).index(name)] = 1.0
     inner, outer = np.split(reads, [len(written)], axis=1)
-    A, B, C, D = (linalg.block_diag(*blocks) for blocks in zip(*parts, strict=True))
+    A, B, C, D = (scipy.linalg.block_diag(*blocks) for blocks in zip(*parts, strict=True))
     # What is read at the same sample comes in a chain: y = C x + D (inner y + outer u) can always be solved for y.
     solved = np.linalg.inv(np.eye(len(written)) - D @ inner)
     C, D = solved @ C, solved @ D @ outer

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.errors import ConfigError, shortened
 from sysid.models import orthonormal_basis as bases
@@ -298,7 +298,7 @@ class TransferFunctionModel(LinearForms):
             B[at : at + len(part.A), j] = part.B
             at += len(part.A)
         return StateSpace(
-            A=np.ascontiguousarray(linalg.block_diag(*(part.A for part in parts))),
+            A=np.ascontiguousarray(scipy.linalg.block_diag(*(part.A for part in parts))),
             B=B,
             C=np.concatenate([part.C[0] for part in parts])[np.newaxis],
             D=np.array([[part.D[0] for part in parts]]),
@@ -334,7 +334,7 @@ class TransferFunctionModel(LinearForms):
             here = slice(at, at + len(part.A))
             B[here, j], C[0, here], D[0, j] = part.B, gain * (taps @ part.C), gain * (taps @ part.D)
             at = here.stop
-        A = linalg.block_diag(*(part.A for part in parts))
+        A = scipy.linalg.block_diag(*(part.A for part in parts))
         delays = tuple(k * self.sample_time for k in self.delays)
         return ContinuousStateSpace(A=A, B=B, C=C, D=D, delays=delays, mapping=self.mapping)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
     from sysid.reporting.benchmarks.page import publish_benchmarks as publish_benchmarks
@@ -26,33 +27,21 @@ if TYPE_CHECKING:
     from sysid.reporting.signals import CaseSignals as CaseSignals
     from sysid.reporting.signals import read_signals as read_signals
 
-# Loaded when first asked for: matplotlib takes longer to import than `sysid --help` may take to answer.
-_HOME = {
-    "CaseSignals": "signals",
-    "PublishedFigure": "published.tables",
-    "PublishedTable": "published.tables",
-    "Results": "results",
-    "case_figure": "figures.fit_figures",
-    "compare_runs": "comparing.against",
-    "parse_results": "results",
-    "publish_benchmarks": "benchmarks.page",
-    "publish_run": "publication",
-    "published_names": "published.tables",
-    "read_published": "published.tables",
-    "read_results": "results",
-    "read_run": "kinds",
-    "read_signals": "signals",
-    "results_json_schema": "kinds",
-    "write_comparison": "comparing.against_page",
-    "write_pdf": "pdf",
-    "write_report": "report",
-    "write_results": "results",
+_WHERE = {
+    "sysid.reporting.benchmarks.page": ("publish_benchmarks",),
+    "sysid.reporting.comparing.against": ("compare_runs",),
+    "sysid.reporting.comparing.against_page": ("write_comparison",),
+    "sysid.reporting.figures.fit_figures": ("case_figure",),
+    "sysid.reporting.kinds": ("read_run", "results_json_schema"),
+    "sysid.reporting.pdf": ("write_pdf",),
+    "sysid.reporting.publication": ("publish_run",),
+    "sysid.reporting.published.tables": ("PublishedFigure", "PublishedTable", "published_names", "read_published"),
+    "sysid.reporting.report": ("write_report",),
+    "sysid.reporting.results": ("Results", "parse_results", "read_results", "write_results"),
+    "sysid.reporting.signals": ("CaseSignals", "read_signals"),
 }
+"""Where each name is defined: matplotlib takes longer to import than ``sysid --help`` may take to answer."""
 
-__all__ = list(_HOME)
+__all__ = [name for names in _WHERE.values() for name in names]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+__getattr__ = imported_when_asked(_WHERE)

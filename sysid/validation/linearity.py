@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from sysid.traces import Role
-from sysid.validation.evaluate import Evaluation
+from sysid.validation.evaluation import Evaluation
 from sysid.validation.metrics import is_constant, mean_fit
 
 SMALL, LARGE = 1.0 / 3.0, 0.85

@@ -40,7 +40,7 @@ from sysid.models import (
 )
 from sysid.traces import Channel, Role, Trace
 from sysid.validation import predict_interval
-from sysid.validation.evaluate import case_results
+from sysid.validation.evaluation import case_results
 from tests.benchmarks._findings import found
 from tests.estimation.linear_systems import trace_of
 

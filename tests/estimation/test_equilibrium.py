@@ -20,7 +20,7 @@ from sysid.models import (
     TransferFunction,
 )
 from sysid.traces import Role, Trace
-from sysid.validation.evaluate import evaluate_case
+from sysid.validation.evaluation import evaluate_case
 from tests.estimation.linear.test_any_record import bursts
 from tests.estimation.linear_systems import trace_of
 

@@ -289,7 +289,7 @@ def cascade_bundle(limited: Cascade, command: TraceSet, tmp_path_factory: pytest
     formats = [name for name, one in EXPORTERS.items() if not name.startswith("torch") and not one.lacks()]
     folder = tmp_path_factory.mktemp("cascade") / "b"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sysid.export.bundle.random_cases", few)
+        patch.setattr("sysid.export.writing.random_cases", few)
         return export_bundle(
             limited, command, folder, formats=formats, metrics=evaluate_cascade(limited, command, repeats=1)
         )

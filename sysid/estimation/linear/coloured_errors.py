@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, signal
 
 from sysid.estimation.nonparametric.noise import LONGEST_MEMORY, power, whitener
 
@@ -60,7 +60,7 @@ def information(blocks: Iterable[Array], a: Array) -> Array:
             J = np.zeros((_tail(a), total.shape[1]))  # noqa: PLW2901
         if not total.size:
             total, state = np.zeros((J.shape[1], J.shape[1])), np.zeros((len(a) - 1, J.shape[1]))
-        through, state = (J, state) if len(a) == 1 else signal.lfilter([1.0], a, J, axis=0, zi=state)
+        through, state = (J, state) if len(a) == 1 else scipy.signal.lfilter([1.0], a, J, axis=0, zi=state)
         total += through.T @ through
     return np.asarray(total / power(a))
 
@@ -78,7 +78,7 @@ def sandwich(half: Array, coloured: Array, n_samples: int) -> Array:
         The factor, over the same directions; times the errors' deviation, as if they were white, it is that of the
         covariance.
     """
-    sizes, vectors = linalg.eigh(half.T @ coloured @ half)
+    sizes, vectors = scipy.linalg.eigh(half.T @ coloured @ half)
     taken = min(float(sizes.sum()), 0.5 * n_samples)
     lost = max(n_samples - half.shape[1], 1) / max(n_samples - taken, 1.0)
     return np.asarray(half @ (vectors * np.sqrt(lost * np.maximum(sizes, 0.0))))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sysid.errors import ConfigError
-from sysid.export.bundle import zip_bundle
+from sysid.export.writing import zip_bundle
 from sysid.names import slug
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.kinds import RunRequest, kind_of, kinds

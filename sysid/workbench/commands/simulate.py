@@ -205,7 +205,8 @@ def _tell(simulation: Simulation, out: Path) -> None:
         of = (
             f"on the {len(simulation.trace) - simulation.first} samples after" if simulation.first else "on all samples"
         )
-        text = f"fit {percent(found.nrmse_fit)} %, mean squared error {found.mse:.4g} {squared(found.unit)}"
+        error = f"{found.mse:.4g} {squared(found.unit)}".removesuffix(" 1")  # a pure number has no unit to name
+        text = f"fit {percent(found.nrmse_fit)} %, mean squared error {error}"
         console().print(f"against the measured {name}: {text}, {of}", soft_wrap=True, markup=False)
     for sentence in simulation.sentences:
         console().print(sentence, soft_wrap=True)

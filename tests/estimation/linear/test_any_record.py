@@ -16,7 +16,7 @@ from sysid.estimation import FitResult, fit_arx, fit_transfer_function
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.models import ARX, Domain, Mapping, Start, StartKind, TransferFunction, TransferFunctionModel
 from sysid.traces import Role, Trace
-from sysid.validation.evaluate import evaluate_case
+from sysid.validation.evaluation import evaluate_case
 from tests.estimation.linear_systems import trace_of
 
 ONE, TWO = Mapping.parse("u1 -> y"), Mapping.parse("u1+u2 -> y")

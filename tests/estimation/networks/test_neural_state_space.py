@@ -27,7 +27,7 @@ from sysid.models import (
 )
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.validation import evaluate_case
-from sysid.validation.evaluate import evaluate_outputs
+from sysid.validation.evaluation import evaluate_outputs
 
 MAPPING = Mapping.parse("u -> y")
 CHANNELS = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))

@@ -17,7 +17,7 @@ from sysid.models import Cascade, History, Mapping, Start, StartKind, VectorNARX
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Role, Trace, TraceSet
-from sysid.validation.evaluate import evaluate_outputs
+from sysid.validation.evaluation import evaluate_outputs
 from sysid.validation.intervals import predict_interval
 from tests.models.cascades import block, command, network
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError
 from sysid.models import Activity, Cascade, CascadeRun, Ends
 from sysid.traces import Role, Trace, TraceSet
-from sysid.validation.evaluate import CaseResult, Evaluation
+from sysid.validation.evaluation import CaseResult, Evaluation
 from sysid.validation.metrics import figures, none
 
 

@@ -1,0 +1,43 @@
+"""A package whose names are imported when asked for has the names that type checkers are told of, and no others."""
+
+import ast
+import importlib
+from pathlib import Path
+
+import pytest
+
+import sysid
+
+ROOT = Path(sysid.__file__).parent
+ROOMS = sorted(
+    ".".join(file.parent.relative_to(ROOT.parent).parts)
+    for file in ROOT.rglob("__init__.py")
+    if "imported_when_asked" in file.read_text(encoding="utf-8")
+)
+
+
+def told(room: str) -> dict[str, str]:
+    """Names by the modules that they are imported from under ``TYPE_CHECKING``."""
+    tree = ast.parse(Path(str(importlib.import_module(room).__file__)).read_text(encoding="utf-8"))
+    blocks = [node for node in tree.body if isinstance(node, ast.If)]
+    lines = [line for block in blocks for line in block.body if isinstance(line, ast.ImportFrom)]
+    return {name.name: str(line.module) for line in lines for name in line.names}
+
+
+def test_there_are_such_rooms() -> None:
+    assert {"sysid.estimation", "sysid.export", "sysid.reporting", "sysid.validation"} <= set(ROOMS)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_what_is_imported_when_asked_is_what_type_checkers_see(room: str) -> None:
+    package = importlib.import_module(room)
+    assert set(package.__all__) == set(told(room))
+    for name, module in told(room).items():
+        assert getattr(package, name) is getattr(importlib.import_module(module), name)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_another_name_is_refused_with_those_that_there_are(room: str) -> None:
+    package = importlib.import_module(room)
+    with pytest.raises(AttributeError, match=f"no public name 'nothing' here; there are .*{package.__all__[0]}"):
+        package.__getattr__("nothing")
