@@ -14,6 +14,7 @@ from sysid.advice.finding import Advice, Finding
 from sysid.advice.linearity import check_linearity
 from sysid.advice.record import Record
 from sysid.advice.structures import suggestions
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.models import Mapping
 from sysid.traces import Role, TraceSet
 
@@ -30,6 +31,7 @@ CHECKS: Final[tuple[Callable[[Record], Iterator[Finding]], ...]] = (
 """In the order in which they are read."""
 
 
+@one_blas_thread()
 def advise(traces: TraceSet, mapping: Mapping) -> Advice:
     """Look at a data set: what is in it, what is wrong with it, what to try.
 

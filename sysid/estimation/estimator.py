@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -206,8 +205,7 @@ class Estimator:
             told = (*told, *between_levels(found.model, traces))
             return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
 
-        # Matrices of a linear fit are small: BLAS threads that wake for them cost more than they give.
-        with one_blas_thread() if self.linear else nullcontext():
+        with one_blas_thread():
             return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
 
     def with_posterior(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.order_search import OrderLosses
 from sysid.estimation.result import FitResult
@@ -81,6 +82,7 @@ def _ignore(_done: int, _total: int) -> None:
     """The callback of those who do not watch."""
 
 
+@one_blas_thread()
 def run_finalists(
     losses: OrderLosses,
     traces: Sequence[Trace],

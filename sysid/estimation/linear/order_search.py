@@ -16,6 +16,7 @@ from scipy import linalg
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.experiment import experiments_of
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import root_weights, stack
 from sysid.kernels import linear_orders as kernel
@@ -232,6 +233,7 @@ def _ignore(_done: int, _total: int) -> None:
     """The callback of those who do not watch."""
 
 
+@one_blas_thread()
 def search_orders(
     traces: Sequence[Trace],
     mapping: Mapping,

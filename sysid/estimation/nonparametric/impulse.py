@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.nonparametric.dead_time import shares
 from sysid.estimation.nonparametric.evidence import CHUNK, Posterior, Triangle, posterior, triangle
 from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
@@ -251,6 +252,7 @@ def _column_sums(x: NDArray[np.float64], lags: Sequence[int], first: int) -> NDA
     return np.array([value for row in sums for value in row] + [float(x[first:, -1].sum())])
 
 
+@one_blas_thread()
 def estimate_impulse_response(
     traces: Sequence[Trace],
     mapping: Mapping,

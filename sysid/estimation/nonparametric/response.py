@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.nonparametric.segments import Segment, segments_of
 from sysid.estimation.nonparametric.spectra import Spectra, SpectralMethod, etfe, spa, welch
 from sysid.models import Mapping
@@ -131,6 +132,7 @@ class FrequencyResponse:
         )
 
 
+@one_blas_thread()
 def estimate_frequency_response(
     traces: Sequence[Trace],
     mapping: Mapping,

@@ -15,6 +15,7 @@ from sysid.code_digest import code_digest
 from sysid.errors import ConfigError, SysidError
 from sysid.estimation import FitProgress
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.reporting.records import RunResults, write_record
 from sysid.workbench.runner.environment import environment
 from sysid.workbench.runner.events import Event, StepDone, StepProgress, StepStarted, Warned, Watcher
@@ -135,7 +136,8 @@ class Run:
         work = _Working(run=self, step=step, key=key, title=title)
         began = time.perf_counter()
         try:
-            value = step.make(work)
+            with one_blas_thread():
+                value = step.make(work)
         except SysidError as error:
             if key:
                 error.add_note(f"{step.title[0].lower()}{step.title[1:]}")
