@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from contextlib import AbstractContextManager
 from typing import Any, Final
@@ -11,7 +12,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
-from matplotlib.ticker import Formatter, LogFormatter, NullFormatter, ScalarFormatter
+from matplotlib.ticker import Formatter, LogFormatterSciNotation, NullFormatter, ScalarFormatter
 
 from sysid.names import visible
 from sysid.reporting.figures import palette
@@ -104,12 +105,7 @@ class Drawing(Figure):
             for text in legend.get_texts() if legend is not None and beside < NARROW else ():
                 text.set_text(_fitting(text.get_text(), round(8 * beside)))
             for axis in (axes.xaxis, axes.yaxis):
-                formatter = axis.get_major_formatter()
-                if isinstance(formatter, _NUMBERS):  # powers of ten are formulae
-                    numbers |= {label for tick in axis.get_major_ticks() for label in (tick.label1, tick.label2)}
-                elif not isinstance(formatter, _Words):
-                    axis.set_major_formatter(_Words(formatter))
-                numbers |= {label for tick in axis.get_minor_ticks() for label in (tick.label1, tick.label2)}
+                numbers |= _numbers_of(axis)
         for text in self.findobj(Text):
             if isinstance(text, Text) and text not in numbers:
                 text.set_parse_math(False)
@@ -152,7 +148,44 @@ def _fitting(text: str, length: int) -> str:
     return "\n".join(line if len(line) <= length else f"{line[: length - 1]}…" for line in lines)
 
 
-_NUMBERS: Final = (ScalarFormatter, LogFormatter, NullFormatter)
+_NUMBERS: Final = (ScalarFormatter, NullFormatter)
+_SUPERSCRIPT: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _numbers_of(axis: Any) -> set[Text]:
+    """Labels of ticks that may be formulae, after names and powers of ten have been given letters."""
+    formatter = axis.get_major_formatter()
+    if isinstance(formatter, LogFormatterSciNotation):
+        axis.set_major_formatter(_Powers())
+        if isinstance(axis.get_minor_formatter(), LogFormatterSciNotation):
+            axis.set_minor_formatter(_Powers())
+        return set()
+    if not isinstance(formatter, _NUMBERS):
+        if not isinstance(formatter, _Words):
+            axis.set_major_formatter(_Words(formatter))
+        return set()
+    ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+    return {label for tick in ticks for label in (tick.label1, tick.label2)}
+
+
+class _Powers(LogFormatterSciNotation):
+    r"""Powers of ten in letters, which can be read aloud and selected; a formula takes some ms to be set.
+
+    Example:
+        >>> _Powers()._words(r"$\mathdefault{2\times10^{-3}}$")
+        '2×10⁻³'
+        >>> _Powers()._words(r"$\mathdefault{4\times10^{0}}$")
+        '4'
+    """
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The label of a tick."""
+        return self._words(super().__call__(x, pos))
+
+    def _words(self, formula: str) -> str:
+        plain = re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", formula)
+        plain = plain.removesuffix(r"\times10^{0}").replace(r"\times", "×")
+        return re.sub(r"\^\{(-?\d+)\}", lambda found: found[1].translate(_SUPERSCRIPT), plain)
 
 
 class _Words(Formatter):
