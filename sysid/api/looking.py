@@ -216,12 +216,13 @@ def _advice(found: room.Advice) -> Advice:
     return Advice(**{field.name: getattr(found, field.name) for field in dataclasses.fields(room.Advice)})
 
 
-def mapping_of(traces: TraceSet, mapping: Given | None) -> Mapping:
+def mapping_of(traces: TraceSet, mapping: Given | None, *, option: str = "mapping=") -> Mapping:
     """A mapping as it was given, or the only one that a data set of one or two channels has.
 
     Args:
         traces: The data set.
         mapping: As it was given.
+        option: What stands before a mapping where it is given: ``--mapping`` on the command line.
 
     Returns:
         The mapping.
@@ -240,7 +241,7 @@ def mapping_of(traces: TraceSet, mapping: Given | None) -> Mapping:
         where=f"data set {traces.name}",
         expected="a mapping of its channels",
         got=", ".join(names),
-        remedy=f'write for example --mapping "{example}"',
+        remedy=f'write for example {option}"{example}"',
     )
 
 

@@ -31,8 +31,9 @@ def test_advice_prints_what_was_found_and_draws_it() -> None:
 
 def test_two_channels_need_no_mapping_and_three_do() -> None:
     assert str(sysid.advise(traces()).mapping) == "u -> y"
-    with pytest.raises(ConfigError, match="nothing tells"):
+    with pytest.raises(ConfigError, match="nothing tells") as refused:
         sysid.advise(traces(2))
+    assert refused.value.remedy == 'write for example mapping="u+y1 -> y2"'
 
 
 def test_several_outputs_are_looked_at_one_by_one() -> None:

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from sysid.advice import Verdict
 from sysid.api.fitting import load
-from sysid.api.looking import Advice, SystemAdvice, advise
+from sysid.api.looking import Advice, SystemAdvice, advise, mapping_of
 from sysid.names import slug
 from sysid.reporting.advice_words import lines
 from sysid.reporting.figures.advice_figure import advice_figure
@@ -33,7 +33,7 @@ def advise_command(source: str, *, mapping: str | None) -> None:
         UserError: If the data cannot be read, or the mapping is missing or wrong.
     """
     traces = load(source)
-    found = advise(traces, mapping)
+    found = advise(traces, mapping_of(traces, mapping, option="--mapping "))
     several = found.outputs.items() if isinstance(found, SystemAdvice) else [("", found)]
     for name, one in several:
         _show(one, f".{slug(name)}" if name else "")

@@ -38,7 +38,7 @@ def auto_command(source: str, *, given: Mapping[str, Any], fresh: bool, out: Pat
     """
     traces = load(source)
     options = {name: value for name, value in given.items() if value is not None}
-    options["mapping"] = mapping_of(traces, options.get("mapping"))
+    options["mapping"] = mapping_of(traces, options.get("mapping"), option="--mapping ")
     if "start" in options:
         options["start"] = parse_start(options["start"])
     name = f"auto-{slug(traces.name)}"

@@ -45,7 +45,7 @@ def orders_command(
         UserError: If the data cannot be read, or the mapping is missing or wrong.
     """
     traces = load(source)
-    chosen = mapping_of(traces, mapping)
+    chosen = mapping_of(traces, mapping, option="--mapping ")
     kinds = (
         list(KINDS) if structures.strip().lower() == "all" else [k.strip() for k in structures.split(",") if k.strip()]
     )
