@@ -49,6 +49,21 @@ def unique_folders(candidates: Iterable[Path]) -> tuple[Path, ...]:
     return tuple(found)
 
 
+def what_to_do_with_data(name: str) -> str:
+    """What somebody may want who names a data set where a pipeline is meant.
+
+    Args:
+        name: Of the data set.
+
+    Returns:
+        A remedy.
+    """
+    return (
+        f'sysid auto {name} --mapping "u -> y" finds a model of it; or write a pipeline, pipelines/mine.yaml, with '
+        f"data: {name}, a mapping and fits, and sysid run mine"
+    )
+
+
 def nearest_name(wanted: str, groups: Iterable[Iterable[str]]) -> str | None:
     """What was probably meant; a name of one's own goes before a built-in one that is nearer.
 

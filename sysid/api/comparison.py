@@ -13,7 +13,9 @@ from sysid.api.several import Several
 from sysid.estimation import FitResult
 from sysid.extras import need
 from sysid.models import Start, StartKind, StartLike
+from sysid.traces import Role, TraceSet
 from sysid.validation import Evaluation, evaluate_outputs
+from sysid.validation.beyond import beyond
 from sysid.validation.metrics import percent
 
 if TYPE_CHECKING:
@@ -31,10 +33,12 @@ class Comparison:
     Args:
         evaluations: By label of the model: what it does on every case, in free run and one step ahead.
         outputs: By label: name and unit of the output that it is a model of.
+        notes: What is to be known of the figures: records that go where none was fitted.
     """
 
     evaluations: dict[str, Evaluation]
     outputs: dict[str, tuple[str, str]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         cases = list(next(iter(self.evaluations.values())).cases) if self.evaluations else []
@@ -49,7 +53,7 @@ class Comparison:
             + "".join(f"   {cell:>{width}}" for cell, width in zip(row[1:], widths[1:], strict=True))
             for row in [head, *rows]
         ]
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.notes])
 
     __repr__ = __str__
 
@@ -119,14 +123,24 @@ def compare(traces: TracesLike, *fits: FitResult | Several, start: StartLike = E
     """
     evaluations: dict[str, Evaluation] = {}
     outputs: dict[str, tuple[str, str]] = {}
+    notes: dict[str, None] = {}
     traces, start = traces_of(traces, word="compare"), Start.of(start)
     for fit in fits:
         members = [fit] if isinstance(fit, FitResult) else list(fit.fits.values())
         several = len(members) > 1 or len(members[0].model.mapping.outputs) > 1
         for one in members:
+            notes |= dict.fromkeys(_beyond(one, traces))
             units = dict(zip(one.model.mapping.outputs, one.model.ends.output_units, strict=True))
             for output, found in evaluate_outputs(one.model, traces, start, posterior=one.posterior).items():
                 label = f"{one.model.structure.label} -> {output}" if several else one.model.structure.label
                 label = label if label not in evaluations else f"{label} ({len(evaluations) + 1})"
                 evaluations[label], outputs[label] = found, (output, units[output])
-    return Comparison(evaluations=evaluations, outputs=outputs)
+    return Comparison(evaluations=evaluations, outputs=outputs, notes=tuple(notes))
+
+
+def _beyond(fit: FitResult, traces: TraceSet) -> tuple[str, ...]:
+    """What is said of cases beyond the records that a fit was made of, where it knows them."""
+    made_of: TraceSet = getattr(fit, "traces", traces)
+    fitted = made_of.with_role(Role.ESTIMATION)
+    scored = [trace for trace in traces if not any(np.array_equal(trace.values, one.values) for one in fitted)]
+    return beyond(fit.model, fitted, scored)

@@ -13,6 +13,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
 from sysid.ingest import READERS, load_dataset, read_trace
+from sysid.ingest.in_python import remedies_of_a_file
 from sysid.models import AbstractStructure, Mapping, Start, StartLike
 from sysid.traces import Role, TraceSet
 
@@ -51,7 +52,8 @@ def load(source: str | Path) -> TraceSet:
     path = Path(source)
     if not is_file_of_traces(path):
         return load_dataset(source)
-    trace = read_trace(path)
+    with remedies_of_a_file(path):
+        trace = read_trace(path)
     return TraceSet(name=path.stem, traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
 
 

@@ -129,9 +129,7 @@ class FileFinding:
         """What a data set of this file has to deal with, one phrase each."""
         found = list(self.notes)
         given = self.files.model_dump(exclude_none=True)
-        found += [
-            f"{name}: {given[name]} is a guess" for name in sorted(self.guessed - {"zone", "format"}) if name in given
-        ]
+        found += [_guess(name, given[name]) for name in sorted(self.guessed - {"zone", "format"}) if name in given]
         found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
         timing = self.timing
         if timing is None:
@@ -152,6 +150,19 @@ class FileFinding:
             unknown = f"{column.name}: the file says {column.said}, which is no unit that is known"
             found += [unknown] if column.said else []
         return tuple(found)
+
+
+def _guess(name: str, value: object) -> str:
+    """What was guessed of how a file is written, and where to say otherwise."""
+    shown = ", ".join(map(repr, value)) if isinstance(value, list | tuple) else repr(value)
+    said = {
+        "decimal": f"{shown} is taken for the decimal mark",
+        "thousands": f"{shown} is taken for the mark between thousands",
+        "missing": f"{shown} is taken for a missing value",
+        "states": "words are taken for states",
+        "transpose": "rows are taken for columns",
+    }.get(name, f"{name} is taken to be {shown}")
+    return f"{said}, which is a guess: source.files.{name} in dataset.yaml says it"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,6 +14,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from sysid.content import what_to_do_with_data
 from sysid.errors import ConfigError
 from sysid.yaml_files import Origins, read_yaml
 
@@ -138,6 +139,14 @@ def kind_of(path: Path) -> str:
         ConfigError: If the file cannot be read, or there is no such kind.
     """
     data = read_yaml(path)
+    if "channels" in data and "cases" in data:
+        raise ConfigError(
+            "a data set is no pipeline",
+            where=path,
+            expected="a YAML file with data, mapping and fits",
+            got="one with channels and cases, which describes records",
+            remedy=what_to_do_with_data(path.parent.name if path.stem == "dataset" else str(path)),
+        )
     if "extends" in data and "kind" not in data:
         raise ConfigError(
             "a pipeline that extends another does not say of which kind it is",

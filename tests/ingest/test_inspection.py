@@ -179,3 +179,15 @@ def test_whatever_columns_and_files_are_called_the_proposal_loads(
     trace = traces.traces[0]
     assert trace.values[:, -1].tolist() == [2.0 * i for i in range(20)]
     assert name in trace.channel_names
+
+
+def test_a_guess_is_told_in_words_and_where_to_say_otherwise(write: Write) -> None:
+    text = "time [s];y [Pa]\n" + rows(20, lambda i: f"{i};1.234.567,{i:02d}")
+    told = inspect_file(write("german.csv", text)).problems
+    assert [one for one in told if "guess" in one] == [
+        "',' is taken for the decimal mark, which is a guess: source.files.decimal in dataset.yaml says it",
+        "'.' is taken for the mark between thousands, which is a guess: source.files.thousands in dataset.yaml says it",
+    ]
+    text = "time [s],y [Pa]\n" + rows(20, lambda i: f"{i},{'#N/A' if i == 7 else i * i}")
+    told = inspect_file(write("sheet.csv", text)).problems
+    assert "'#N/A' is taken for a missing value, which is a guess: source.files.missing in dataset.yaml says it" in told

@@ -26,7 +26,7 @@ from sysid.workbench.fits.config import FitConfig, Pipeline
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
 from sysid.workbench.fits.outputs import FitModel, models_of
-from sysid.workbench.fits.table import table_of_fits
+from sysid.workbench.fits.table import table_of_fits, told_of_fits
 from sysid.workbench.runner import events
 from sysid.workbench.runner.program import Closing, Program, carry_out
 from sysid.workbench.runner.run import Run
@@ -191,6 +191,7 @@ def closing(searched: Searched, folder: Path) -> Closing:
         lines=[
             table_of_front(searched.record),
             table_of_fits(searched.results),
+            *told_of_fits(searched.results),
             f"Why this one: {searched.record.chosen_by}",
             *notes,
         ],

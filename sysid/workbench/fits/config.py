@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from sysid.content import content_folders, nearest_file, nearest_name
+from sysid.content import content_folders, nearest_file, nearest_name, what_to_do_with_data
 from sysid.errors import ConfigError
 from sysid.estimation.estimator import Options
 from sysid.estimation.estimators import check as check_request
@@ -272,6 +272,13 @@ def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
         found = next((file for file in (given, *built_in) if file.is_file()), None)
         if found is not None:
             return found
+        if (given / "results.json").is_file():
+            raise ConfigError(
+                "the folder of a run is no pipeline",
+                expected="a pipeline's name, or the path of its YAML file",
+                got=name_or_path,
+                remedy=f"name the pipeline that was run, {given.name}, or its file",
+            )
         beside = nearest_file(given, {".yaml", ".yml"})
         raise ConfigError(
             "there is no such pipeline file",
@@ -285,6 +292,14 @@ def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
         known.setdefault(file.stem, file)
     if name_or_path in known:
         return known[name_or_path]
+    data_sets = content_folders("datasets", workspace=workspace)
+    if any((folder / name_or_path / "dataset.yaml").is_file() for folder in data_sets):
+        raise ConfigError(
+            f"{name_or_path} is a data set and no pipeline",
+            expected="a pipeline's name, or the path of its YAML file",
+            got=name_or_path,
+            remedy=what_to_do_with_data(name_or_path),
+        )
     near = nearest_name(name_or_path, [[file.stem for file in group] for group in groups])
     raise ConfigError(
         f"there is no pipeline named {name_or_path}",

@@ -15,8 +15,9 @@ from sysid.models import Mapping as Mapped
 from sysid.reporting.curves import CURVES_FILE
 from sysid.reporting.records import SCHEMA_VERSION
 from sysid.reporting.sweep_record import SweepRecord
-from sysid.traces import Role
+from sysid.traces import Role, TraceSet
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
+from sysid.validation.beyond import beyond
 from sysid.validation.metrics import mean_fit
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data
@@ -139,18 +140,21 @@ def read_scores(folder: Path) -> Scores:
     return Scores(evaluation=Evaluation(cases=cases), selection_mse=float(stored["selection_mse"]))
 
 
-def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: TraceSet) -> dict[str, Any]:
     """One fit as it stands in results.json.
 
     Args:
         ready: The fit and its figures.
         exports: The exported files, with paths relative to the run folder.
+        traces: The cases, some of which may go where none was fitted.
 
     Returns:
         JSON values.
     """
     fit, model = ready.fit, ready.fit.model
-    stored = fit.to_dict()
+    stored, fitted = fit.to_dict(), traces.with_role(Role.ESTIMATION)
+    scored = [trace for trace in traces if traces.roles[trace.name] is not Role.ESTIMATION]
+    further = beyond(model, fitted, scored)
     return {
         "name": ready.config.name,
         "slug": ready.config.slug,
@@ -164,8 +168,8 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]]) -> dict[st
         "status": fit.status.name,
         "seed": fit.seed,
         "initial": ready.config.initial,
-        "notes": list(fit.notes),
-        "warnings": list(fit.warnings),
+        "notes": [*fit.notes, *further],
+        "warnings": [*fit.warnings, *further],
         "evidence": stored["evidence"],
         "attempts": stored["attempts"],
         "stability": stored["stability"],
@@ -242,7 +246,7 @@ def results_document(
         if data.selection
         else None,
         "start": {"kind": start.kind.value, "n_measured": start.n_measured},
-        "fits": [fit_record(ready, exports if ready.config.name == first else ()) for ready in fits],
+        "fits": [fit_record(ready, exports if ready.config.name == first else (), traces) for ready in fits],
         "systems": system_records(fits),
         "orders": [dict(one) for one in orders],
         "best": asdict(choice) | {"name": first} if choice else None,

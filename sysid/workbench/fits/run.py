@@ -10,7 +10,7 @@ from sysid.reporting.results import Results
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import Pipeline, read_pipeline
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
-from sysid.workbench.fits.table import table_of_fits
+from sysid.workbench.fits.table import table_of_fits, told_of_fits
 from sysid.workbench.runner import events
 from sysid.workbench.runner.program import Closing, Program, carry_out
 from sysid.workbench.runner.store import write_bytes
@@ -98,7 +98,7 @@ def closing(results: Results, folder: Path) -> Closing:
     Returns:
         The lines and files.
     """
-    lines: list[Any] = [table_of_fits(results)]
+    lines: list[Any] = [table_of_fits(results), *told_of_fits(results)]
     if results.best is not None:
         lines.append(f"Best: {results.best_name}. {results.best.chosen_by}")
     files = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 from rich.text import Text
 
+from sysid.estimation.result import Status
 from sysid.reporting.results import FitRecord, Results, SystemRecord
 from sysid.units import squared
 
@@ -45,6 +46,24 @@ def table_of_fits(results: Results) -> Table:
             row = _whole(whole, fit, cases, selection=bool(results.selection))
             table.add_row(*row, style="bold" if best else None, end_section=True)
     return table
+
+
+def told_of_fits(results: Results) -> list[str]:
+    """What is to be looked at before a figure is believed: of each fit how it ended, where it is of no use, and why.
+
+    Args:
+        results: What the run found.
+
+    Returns:
+        A line for each fit of which there is something to say; the report has the rest.
+    """
+    lines = []
+    for fit in results.fits:
+        ended = Status[fit.status]
+        told = [*([ended.value] if not ended.usable else []), *fit.warnings]
+        more = f" ({len(told) - 1} more in the report)" if len(told) > 1 else ""
+        lines += [f"Look at {fit.name}: {one}{more}" for one in told[:1]]
+    return lines
 
 
 def _whole(whole: SystemRecord, last: FitRecord, cases: list[str], *, selection: bool) -> list[str]:

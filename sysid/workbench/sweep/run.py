@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysid.workbench.fits.table import table_of_fits
+from sysid.workbench.fits.table import table_of_fits, told_of_fits
 from sysid.workbench.runner import events
 from sysid.workbench.runner.program import Closing, Program, carry_out
 from sysid.workbench.runner.store import write_bytes
@@ -142,6 +142,7 @@ def closing(swept: Swept, folder: Path) -> Closing:
         lines=[
             table_of_trials(swept.record),
             table_of_fits(swept.results),
+            *told_of_fits(swept.results),
             f"Best: {swept.results.fits[0].label}. {swept.record.chosen_by}",
         ],
         files={

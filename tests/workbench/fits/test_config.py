@@ -201,3 +201,21 @@ def test_the_file_that_was_meant_is_named(workspace: Path) -> None:
 def test_a_pipeline_in_a_folder_is_found_by_both_names() -> None:
     found = find_pipeline("benchmarks/silverbox")
     assert (found.parent.name, found.name) == ("benchmarks", "silverbox.yaml")
+
+
+def test_a_data_set_is_no_pipeline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    place = tmp_path / "datasets" / "mine" / "dataset.yaml"
+    place.parent.mkdir(parents=True)
+    place.write_text("name: mine\nchannels: []\ncases: {}\n")
+    for ask in (lambda: find_pipeline("mine"), lambda: kind_of(place)):
+        with pytest.raises(ConfigError, match='sysid auto mine --mapping "u -> y"'):
+            ask()
+
+
+def test_the_folder_of_a_run_names_its_pipeline(tmp_path: Path) -> None:
+    folder = tmp_path / "runs" / "mine"
+    folder.mkdir(parents=True)
+    (folder / "results.json").write_text("{}")
+    with pytest.raises(ConfigError, match="name the pipeline that was run, mine"):
+        find_pipeline(str(folder))

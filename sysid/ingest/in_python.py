@@ -1,0 +1,61 @@
+"""What an error asks for, as it is written in Python: remedies are in YAML, in which most records are described."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from sysid.errors import UserError
+
+PAIR = re.compile(r"\{(\w+): ([\w.]+)\}")
+OPTION = re.compile(r"\b(repairs|grid): (?=\{)")
+
+
+def in_python(text: str) -> str:
+    """A remedy with its YAML written as Python.
+
+    Args:
+        text: The remedy.
+
+    Returns:
+        The same, where options are arguments, and what is in them is a dict.
+
+    Example:
+        >>> in_python("ask for repairs: {gaps: hold} or {gaps: mask}")
+        'ask for repairs={"gaps": "hold"} or {"gaps": "mask"}'
+    """
+    return PAIR.sub(r'{"\1": "\2"}', OPTION.sub(r"\1=", text))
+
+
+@contextmanager
+def remedies_in_python() -> Iterator[None]:
+    """Errors from within say what to write in a call of :func:`sysid.data`."""
+    try:
+        yield
+    except UserError as error:
+        if error.remedy is None or in_python(error.remedy) == error.remedy:
+            raise
+        raise _with(error, in_python(error.remedy)) from None
+
+
+@contextmanager
+def remedies_of_a_file(path: Path) -> Iterator[None]:
+    """Errors of a file that is loaded as it is say how it gets a description, in which options can be written."""
+    try:
+        yield
+    except UserError as error:
+        place = Path("datasets", path.stem, "dataset.yaml")
+        command = shlex.join(("sysid", "ingest", str(path), "--propose", str(place)))
+        described = f"describe the file once ({command}), which proposes these options, and load({path.stem!r})"
+        raise _with(error, f"{error.remedy}. A file alone takes no options: {described}") from None
+
+
+def _with(error: UserError, remedy: str) -> UserError:
+    """The same error with another remedy."""
+    other = type(error).__new__(type(error))
+    other.__dict__.update(error.__dict__)
+    UserError.__init__(other, error.what, where=error.where, expected=error.expected, got=error.got, remedy=remedy)
+    return other
