@@ -275,6 +275,7 @@ def _lasting(error: Array, usable: Mask, name: str) -> list[str]:
     return [
         f"The error of the free run of {name} is no noise of a sensor: {100 * told:.0f} % of it is in the sample "
         f"before, and its {count} samples count for some {max(1.0, independent):.0f} independent ones. Something that "
-        "is not measured moves it, or it sums up all errors, and how well the run follows these records says little "
-        "of others. Measure it, record longer, or fit a model with noise (BJ, ARMAX) and predict."
+        "is not measured moves it, it sums up all errors, or it does what neither the model nor a simple curve of its "
+        "inputs does: how well the run follows these records says little of others. Measure what moves it, record "
+        "longer, try a network with more states, or a model with noise (BJ, ARMAX) that predicts."
     ]
