@@ -17,6 +17,7 @@ from sysid.reporting.assembly.results import (
 from sysid.reporting.assembly.rounds import rounds_table
 from sysid.reporting.assembly.tables import (
     active_learning_table,
+    equation_table,
     limit_check_table,
     limit_table,
     monte_carlo_tables,
@@ -57,7 +58,7 @@ def assembly_document(folder: Path, results: AssemblyResults, workspace: Path | 
     parts: list[Part] = [*_sentences(results), *tables[:1], *charts[:1], *tables[1:], *charts[1:]]
     sections = [
         Section(anchor=ANCHOR, title="The assembly", parts=tuple(parts)),
-        Section(anchor="judged", title="What was judged", parts=(_stages(results),)),
+        Section(anchor="judged", title="What was judged", parts=(_stages(results), *_known(results))),
         *data_set_section(results.data),
     ]
     verdict = Verdict(headline=headline(results), tiles=(), points=tuple(_points(results)), warnings=())
@@ -110,6 +111,10 @@ def _stages(results: AssemblyResults) -> Table:
         [("", ""), ("models", "")],
         [[stage.name, "; ".join(stage.networks)] for stage in results.stages],
     )
+
+
+def _known(results: AssemblyResults) -> list[Table]:
+    return [equation_table(results.equations)] if results.equations else []
 
 
 def _squared(results: AssemblyResults, output: str) -> str:

@@ -242,6 +242,15 @@ class LimitRecord(Record):
     sequences: ActivityRecord | None = Field(default=None, description="Over the random sequences.")
 
 
+class EquationRecord(Record):
+    """A submodel that is declared and not fitted."""
+
+    output: str = Field(description="What it gives.")
+    unit: str = Field(description="Of the output.")
+    equation: str = Field(description="As fixed takes it, such as RL = relay(BP - AR, on=1.45, off=-0.985, slope=20).")
+    instances: list[str] = Field(default=[""], description="What follows its channels' names at each of its places.")
+
+
 class LimitExcess(Record):
     """A limit that is a channel, and by how much training traces pass it."""
 
@@ -297,6 +306,7 @@ class AssemblyResults(RunResults):
     active_learning: list[ActiveLearningRecord] = Field(default=[])
     ablation: list[AblationRecord] = Field(default=[], description="The steps that the stages put to the test.")
     monte_carlo: MonteCarloRecord | None = None
+    equations: list[EquationRecord] = Field(default=[], description="What is known of the plant, and fixed.")
     limits: list[LimitRecord] = Field(default=[])
     limit_check: LimitCheckRecord | None = None
     interpolation: InterpolationRecord | None = None

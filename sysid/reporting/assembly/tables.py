@@ -9,6 +9,7 @@ from sysid.reporting.assembly.results import (
     ActiveLearningRecord,
     ActivityRecord,
     AssemblyResults,
+    EquationRecord,
     LimitCheckRecord,
     LimitRecord,
     MonteCarloRecord,
@@ -195,6 +196,27 @@ def limit_text(found: ActiveLearningRecord) -> str:
 def picked_text(found: ActiveLearningRecord) -> str:
     """Which sequences were added."""
     return "at which the whole was worst" if found.pick == "worst" else "in the order of the pool"
+
+
+def equation_table(found: Sequence[EquationRecord]) -> Table:
+    """What is known of the plant and not fitted.
+
+    Args:
+        found: At least one.
+
+    Returns:
+        The table, the equations as a pipeline has them.
+    """
+    several = any(one.instances != [""] for one in found)
+    rows: list[list[Value]] = [[one.equation, "" if one.unit == "1" else one.unit] for one in found]
+    for row, one in zip(rows, found, strict=True) if several else ():
+        row.append(", ".join(name or "nothing" for name in one.instances))
+    return plain_table(
+        "What is known and fixed",
+        [("Equation", ""), ("Unit", "of what it gives"), *([("Instances", "its names end in")] if several else [])],
+        rows,
+        note="[k-1] is the value a sample before. As the pipeline has them: sysid equations PIPELINE.",
+    )
 
 
 def limit_table(found: Sequence[LimitRecord]) -> Table:

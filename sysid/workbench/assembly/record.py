@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.composite import FixedMember
 from sysid.composite.active_learning import ActiveLearned, Assessment
+from sysid.composite.fixed_equations import equation_of
 from sysid.composite.limits_held import Holding
 from sysid.composite.monte_carlo import MonteCarlo
 from sysid.composite.round import TrainedRound
@@ -117,6 +119,7 @@ def assembly_results(
         else [_active_learning(trained.active_learning, found.unseen)],
         "ablation": [asdict(one) for one in found.ablation],
         "monte_carlo": None if found.stressed is None else _stress(found.stressed),
+        "equations": [_equation(one) for one in config.composite.fixed],
         "limits": [_holding(one) for one in found.holding],
         "limit_check": asdict(trained.limits) if trained.limits.limits else None,
         "interpolation": None if found.interpolation is None else _line(found.interpolation),
@@ -124,6 +127,10 @@ def assembly_results(
         "notes": list(notes),
     }
     return parse_record(AssemblyResults, strict(document), where=context.store.path / RESULTS_FILE)
+
+
+def _equation(one: FixedMember) -> dict[str, Any]:
+    return {"output": one.output, "unit": one.unit, "equation": equation_of(one), "instances": list(one.instances)}
 
 
 def write_signals(folder: Path, found: Outcome, outputs: Sequence[str], cases: TraceSet) -> None:

@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
-from sysid.reporting.assembly.results import AssemblyResults
+from sysid.reporting.assembly.results import AssemblyResults, EquationRecord
 from sysid.reporting.assembly.tables import (
     active_learning_table,
+    equation_table,
     limit_check_table,
     limit_table,
     monte_carlo_tables,
@@ -64,6 +65,18 @@ def test_a_round_that_was_not_put_to_them_has_no_figure(results: AssemblyResults
     rounds = [one.model_copy(update={"monte_carlo": None}) if one.number in without else one for one in found.rounds]
     rows = values(active_learning_table(found.model_copy(update={"rounds": rounds}), ""))
     assert rows[0][9:] == ([] if len(without) == 2 else ["", ""])
+
+
+def test_what_is_known_stands_as_the_pipeline_has_it() -> None:
+    known = [
+        EquationRecord(output="RM", unit="psi", equation="RM = clamp(BP - AR, -2, 2)", instances=["", "10"]),
+        EquationRecord(output="RL", unit="1", equation="RL = switch(BP - AR)"),
+    ]
+    assert values(equation_table(known)) == [
+        ["RM = clamp(BP - AR, -2, 2)", "psi", "nothing, 10"],
+        ["RL = switch(BP - AR)", "", "nothing"],
+    ]
+    assert values(equation_table(known[1:])) == [["RL = switch(BP - AR)", ""]]
 
 
 def test_each_side_of_a_limit_has_a_row(results: AssemblyResults) -> None:

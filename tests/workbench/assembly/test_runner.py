@@ -15,7 +15,7 @@ from sysid.composite.round import JointRound
 from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, Status
 from sysid.export import read_bundle
-from sysid.reporting import publish_run
+from sysid.reporting import publish_run, read_run
 from sysid.reporting.assembly.document import headline
 from sysid.reporting.signals import read_signals
 from sysid.workbench.assembly.runner import read_assembly
@@ -334,6 +334,8 @@ def test_what_is_declared_beside_a_member_leaves_its_fit_as_it_was(workspace: Pa
     now = CascadeFit.from_dict(json.loads((folder / "together.json").read_text(encoding="utf-8")))
     assert now.train_time_s == whole.train_time_s, "not trained again"
     assert "LL" in now.model.outputs, "but in the whole as it now is"
+    (said,) = read_run(folder).equations
+    assert (said.output, said.equation) == ("LL", "LL = clamp(-100*upper, 0, 100)")
 
 
 def test_a_limit_that_changes_leaves_the_fits_and_not_what_runs_on_the_others(workspace: Path) -> None:
