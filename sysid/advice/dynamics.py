@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record
-from sysid.estimation.nonparametric.impulse import ImpulseResponse
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 
 TOO_FAST, FAR_TOO_FAST, TOO_SLOW, GOOD = 30.0, 100.0, 1.5, 8.0
 """Samples from 10 to 90 % of a step response: above and below which the rate is not good, and what it should be."""

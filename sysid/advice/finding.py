@@ -8,7 +8,7 @@ from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field
 from typing import Any
 
-from sysid.estimation.nonparametric.impulse import ImpulseResponse
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.models import AbstractStructure, Mapping
 

@@ -21,7 +21,7 @@ from sysid.advice.dynamics import BARELY
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, Residual
 from sysid.estimation.nonparametric.evidence import triangle
-from sysid.estimation.nonparametric.impulse import ImpulseResponse
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.noise import whitener
 from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.estimation.nonparametric.segments import Segment

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UserError
-from sysid.estimation.nonparametric.impulse import ImpulseResponse, estimate_impulse_response
+from sysid.estimation.nonparametric.impulse import estimate_impulse_response
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.response import FrequencyResponse, estimate_frequency_response
 from sysid.estimation.nonparametric.segments import Segment, segments_of
 from sysid.models import Mapping

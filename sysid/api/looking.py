@@ -15,6 +15,7 @@ from sysid.api.notebook import html_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.estimation.nonparametric import impulse, response
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse as Estimated
 from sysid.estimation.nonparametric.kernels import Kernel
 from sysid.estimation.nonparametric.spectra import SpectralMethod
 from sysid.excitation import AbstractExcitation, excitation
@@ -119,7 +120,7 @@ class SystemAdvice:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ImpulseResponse(impulse.ImpulseResponse):
+class ImpulseResponse(Estimated):
     """An impulse response that draws itself."""
 
     def plot(self) -> Figure:
@@ -280,9 +281,7 @@ def impulse_response(
         kernel=None if kernel is None else _choice(kernel, Kernel, "kernel"),
         noise_order=noise_order,
     )
-    return ImpulseResponse(
-        **{field.name: getattr(found, field.name) for field in dataclasses.fields(impulse.ImpulseResponse)}
-    )
+    return ImpulseResponse(**{field.name: getattr(found, field.name) for field in dataclasses.fields(Estimated)})
 
 
 def frequency_response(

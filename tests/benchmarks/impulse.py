@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from sysid.estimation.nonparametric.impulse import ImpulseResponse, estimate_impulse_response
+from sysid.estimation.nonparametric.impulse import estimate_impulse_response
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.models import Mapping
 from sysid.traces import Trace
 from tests.benchmarks._findings import found

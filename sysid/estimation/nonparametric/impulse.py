@@ -7,27 +7,28 @@ the response is estimated again: without that its bands would be too narrow.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.nonparametric.dead_time import shares
-from sysid.estimation.nonparametric.evidence import CHUNK, Posterior, Triangle, posterior, triangle
-from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
+from sysid.estimation.nonparametric.evidence import Posterior, posterior
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse, settled
+from sysid.estimation.nonparametric.kernels import Kernel
+from sysid.estimation.nonparametric.lagged_rows import Regression
 from sysid.estimation.nonparametric.noise import whitener
 from sysid.estimation.nonparametric.prior import DeadTime, Prior, dead_times, tuned, with_doubt
-from sysid.estimation.nonparametric.segments import Segment, columns_of_lags, segments_of
+from sysid.estimation.nonparametric.segments import Segment, segments_of
 from sysid.models import Mapping
 from sysid.traces import Trace
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 FIRST_LENGTH, LONGEST, MOST_COLUMNS = 32, 512, 512
 """Lags that are tried first and at most, and columns at most that all inputs may have together."""
@@ -37,219 +38,6 @@ CLEARLY = 1.5
 FEWEST_ROWS, MOST_ASKED = 8, 4096
 SEEN = 2.5
 """Standard deviations that a response is away from nothing where it is seen to begin."""
-TAIL = 0.04
-"""A response has settled where the end of it, in root mean square, is below this part of its peak."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ImpulseResponse:
-    """What the output does after a pulse of one sample in each input.
-
-    Args:
-        mapping: Which channels go in, which comes out.
-        sample_time: Seconds.
-        input_units: Unit of each input.
-        output_unit: Unit of the output.
-        lags: In samples, shape ``(n_lags,)``.
-        values: Output unit per input unit, shape ``(n_inputs, n_lags)``.
-        covariance: Of the values, input after input, shape ``(n_inputs * n_lags, n_inputs * n_lags)``; zero for lags
-            before a dead time that was given.
-        kernel: The prior that was used.
-        hyperparameters: Of each input.
-        dead_times: Of each input: when it begins to act, and whether it acts at all.
-        noise_variance: Of the innovations, in the output's unit squared.
-        noise_ar: Coefficients of the autoregression that whitens the noise, ``v(t) + a1 v(t-1) + ... = e(t)``.
-        explained: Share of the output's variance that the response explains, at most 1.
-        log_evidence: Logarithm of the marginal likelihood.
-        effective: Number of parameters that the data determine.
-        samples: Rows that took part.
-        notes: What a reader has to know.
-    """
-
-    mapping: Mapping
-    sample_time: float
-    input_units: tuple[str, ...]
-    output_unit: str
-    lags: NDArray[np.int64]
-    values: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    kernel: Kernel
-    hyperparameters: tuple[Hyperparameters, ...]
-    dead_times: tuple[DeadTime, ...]
-    noise_variance: float
-    noise_ar: tuple[float, ...]
-    explained: float
-    log_evidence: float
-    effective: float
-    samples: int
-    notes: tuple[str, ...] = ()
-
-    @property
-    def deviation(self) -> NDArray[np.float64]:
-        """Standard deviation of the values, shape ``(n_inputs, n_lags)``."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.values.shape)
-
-    @property
-    def time(self) -> NDArray[np.float64]:
-        """Seconds after the pulse, shape ``(n_lags,)``."""
-        return self.sample_time * self.lags.astype(np.float64)
-
-    @property
-    def noise_deviation(self) -> float:
-        """Standard deviation of the noise on the output, coloured as it is, in its unit."""
-        pulse = np.zeros(2000)
-        pulse[0] = 1.0
-        return float(
-            np.sqrt(self.noise_variance * np.sum(scipy.signal.lfilter([1.0], [1.0, *self.noise_ar], pulse) ** 2))
-        )
-
-    def step(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Response to a step of one unit in each input, and its standard deviation, shape ``(n_inputs, n_lags)``."""
-        n = len(self.lags)
-        blocks = [self._block(j, j) for j in range(len(self.values))]
-        variances = [np.diag(np.cumsum(np.cumsum(block, axis=0), axis=1)) for block in blocks]
-        deviation = np.sqrt(np.maximum(np.array(variances), 0.0)) if blocks else np.empty((0, n))
-        return np.cumsum(self.values, axis=1), deviation
-
-    def settling(self, share: float = 0.05) -> tuple[int, ...]:
-        """Samples after which the step response of each input stays near its end.
-
-        Args:
-            share: How near, as a part of the step response's span.
-
-        Returns:
-            One number an input; the number of lags where it never does.
-        """
-        found = []
-        for response in self.step()[0]:
-            near = share * max(float(np.ptp(np.append(response, 0.0))), 1e-300)
-            away = np.flatnonzero(np.abs(response - response[-1]) > near)
-            found.append(int(self.lags[away[-1]]) + 1 if len(away) else int(self.lags[0]))
-        return tuple(found)
-
-    @property
-    def settled(self) -> bool:
-        """Whether every response has come to its end within the lags."""
-        return all(_settled(values) for values in self.values)
-
-    def simulate(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Output without noise and level; before the first sample every input stood where it stands then.
-
-        Args:
-            inputs: Shape ``(n_samples, n_inputs)``.
-
-        Returns:
-            Shape ``(n_samples,)``.
-        """
-        u = np.asarray(inputs, dtype=np.float64).reshape(-1, len(self.values))
-        deepest = int(self.lags[-1])
-        held = np.concatenate([np.repeat(u[:1], deepest, axis=0), u])
-        response = np.zeros((len(self.values), deepest + 1))
-        response[:, self.lags] = self.values
-        made = [scipy.signal.lfilter(g, [1.0], x)[deepest:] for g, x in zip(response, held.T, strict=True)]
-        return np.asarray(np.sum(made, axis=0))
-
-    def to_frame(self) -> pd.DataFrame:
-        """A row for each input and lag.
-
-        Returns:
-            Columns ``input``, ``lag``, ``time``, ``value``, ``deviation``, ``low``, ``high`` (95 %).
-        """
-        import pandas as pd
-
-        deviation = self.deviation
-        return pd.concat(
-            [
-                pd.DataFrame(
-                    {
-                        "input": name,
-                        "lag": self.lags,
-                        "time": self.time,
-                        "value": self.values[j],
-                        "deviation": deviation[j],
-                        "low": self.values[j] - 1.96 * deviation[j],
-                        "high": self.values[j] + 1.96 * deviation[j],
-                    }
-                )
-                for j, name in enumerate(self.mapping.inputs)
-            ],
-            ignore_index=True,
-        )
-
-    def _block(self, i: int, j: int) -> NDArray[np.float64]:
-        n = len(self.lags)
-        return self.covariance[i * n : (i + 1) * n, j * n : (j + 1) * n]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Regression:
-    """A record as a regression on past inputs.
-
-    Args:
-        segments: Stretches of the record, long enough.
-        scale: By which inputs and then the output are divided.
-        length: Lags of each input, from 0 on.
-    """
-
-    segments: tuple[Segment, ...]
-    scale: NDArray[np.float64]
-    length: int
-
-    @property
-    def n_inputs(self) -> int:
-        """Inputs."""
-        return len(self.scale) - 1
-
-    def blocks(self, whiten: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-        """Rows of lagged inputs and the output, each trace counted from its mean.
-
-        Args:
-            whiten: Coefficients of the filter that every signal passes, its first being 1.
-
-        Yields:
-            Matrices of shape ``(n_rows, n_inputs * length + 1)``.
-        """
-        first = self.length - 1 + len(whiten) - 1
-        by_trace: dict[str, list[NDArray[np.float64]]] = {}
-        for segment in self.segments:
-            if len(segment) > first:
-                signals = np.column_stack([segment.inputs, segment.output]) / self.scale
-                by_trace.setdefault(segment.trace, []).append(scipy.signal.lfilter(whiten, [1.0], signals, axis=0))
-        lags = range(self.length)
-        for stretches in by_trace.values():
-            rows = sum(len(x) - first for x in stretches)
-            mean = np.sum([_column_sums(x, lags, first) for x in stretches], axis=0) / rows
-            for x in stretches:
-                for start in range(first, len(x), CHUNK):
-                    part = slice(start, min(start + CHUNK, len(x)))
-                    yield np.column_stack([*(columns_of_lags(u, lags, part) for u in x.T[:-1]), x[part, -1]]) - mean
-
-    def count(self, whiten: NDArray[np.float64]) -> tuple[int, int]:
-        """Rows, and traces that have any."""
-        first = self.length - 1 + len(whiten) - 1
-        kept = [segment for segment in self.segments if len(segment) > first]
-        return sum(len(segment) - first for segment in kept), len({segment.trace for segment in kept})
-
-    def triangle(self, whiten: NDArray[np.float64]) -> Triangle:
-        """The triangular factor of the regression; the level of each trace has taken one row."""
-        found = triangle(self.blocks(whiten), free=0)
-        return Triangle(R=found.R, z=found.z, samples=max(found.samples - self.count(whiten)[1], 1))
-
-    def residuals(self, g: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-        """What the scaled response ``g`` leaves, stretch by stretch, each counted from its mean."""
-        found = []
-        for segment in self.segments:
-            if len(segment) > self.length:
-                u, y = segment.inputs / self.scale[:-1], segment.output / self.scale[-1]
-                made = [scipy.signal.lfilter(row, [1.0], x - x.mean()) for row, x in zip(g, u.T, strict=True)]
-                left = (y - np.sum(made, axis=0))[self.length - 1 :]
-                found.append(left - left.mean())
-        return found
-
-
-def _column_sums(x: NDArray[np.float64], lags: Sequence[int], first: int) -> NDArray[np.float64]:
-    sums = [[float(x[first - lag : len(x) - lag, j].sum()) for lag in lags] for j in range(x.shape[1] - 1)]
-    return np.array([value for row in sums for value in row] + [float(x[first:, -1].sum())])
 
 
 @one_blas_thread()
@@ -297,7 +85,7 @@ def estimate_impulse_response(
         problem = Regression(segments=segments, scale=scale, length=length)
         kernels = tuple(Kernel) if kernel is None else (kernel,)
         found = _stage(problem, np.ones(1), given, kernels, None)
-        if length >= most or all(_settled(row) for row in found.response):
+        if length >= most or all(settled(row) for row in found.response):
             return _result(_doubted(_whitened(found, given, kernels, noise_order)), traces, mapping)
         length = min(2 * length, most)
 
@@ -444,12 +232,6 @@ def _doubted(found: _Fitted) -> _Fitted:
     return replace(found, posterior=with_doubt(data, found.prior))
 
 
-def _settled(g: NDArray[np.float64]) -> bool:
-    """Whether a response is near zero over its last tenth."""
-    end = g[-max(len(g) // 10, 3) :]
-    return bool(np.sqrt(np.mean(end**2)) <= TAIL * np.abs(g).max())
-
-
 def _seen(fitted: _Fitted) -> tuple[DeadTime, ...]:
     """The dead times, none of them before a response that can be told from nothing."""
     problem, g = fitted.problem, fitted.response
@@ -473,7 +255,7 @@ def _result(fitted: _Fitted, traces: Sequence[Trace], mapping: Mapping) -> Impul
     left, y = problem.residuals(g), [s.output[n - 1 :] / problem.scale[-1] for s in problem.segments if len(s) > n]
     total = sum(float(np.sum((part - part.mean()) ** 2)) for part in y)
     rest = sum(float(part @ part) for part in left)
-    unsettled = [name for name, row in zip(mapping.inputs, g, strict=True) if not _settled(row)]
+    unsettled = [name for name, row in zip(mapping.inputs, g, strict=True) if not settled(row)]
     seconds = (n - 1) * traces[0].sample_time
     notes = (f"{', '.join(unsettled)}: not settled within {n} samples ({seconds:g} s)",) if unsettled else ()
     return ImpulseResponse(

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sysid.estimation import FitResult
-from sysid.estimation.nonparametric.impulse import ImpulseResponse
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.reporting.figures.style import DASHES, PALETTE, TARGET, new_figure, styled
 from sysid.reporting.linear_view import linear_views

@@ -1,0 +1,84 @@
+"""A record as a regression on past inputs, in blocks of rows: no matrix of the whole record is ever held."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from sysid.estimation.nonparametric.evidence import CHUNK, Triangle, triangle
+from sysid.estimation.nonparametric.segments import Segment, columns_of_lags
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Regression:
+    """A record as a regression on past inputs.
+
+    Args:
+        segments: Stretches of the record, long enough.
+        scale: By which inputs and then the output are divided.
+        length: Lags of each input, from 0 on.
+    """
+
+    segments: tuple[Segment, ...]
+    scale: NDArray[np.float64]
+    length: int
+
+    @property
+    def n_inputs(self) -> int:
+        """Inputs."""
+        return len(self.scale) - 1
+
+    def blocks(self, whiten: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+        """Rows of lagged inputs and the output, each trace counted from its mean.
+
+        Args:
+            whiten: Coefficients of the filter that every signal passes, its first being 1.
+
+        Yields:
+            Matrices of shape ``(n_rows, n_inputs * length + 1)``.
+        """
+        first = self.length - 1 + len(whiten) - 1
+        by_trace: dict[str, list[NDArray[np.float64]]] = {}
+        for segment in self.segments:
+            if len(segment) > first:
+                signals = np.column_stack([segment.inputs, segment.output]) / self.scale
+                by_trace.setdefault(segment.trace, []).append(scipy.signal.lfilter(whiten, [1.0], signals, axis=0))
+        lags = range(self.length)
+        for stretches in by_trace.values():
+            rows = sum(len(x) - first for x in stretches)
+            mean = np.sum([_column_sums(x, lags, first) for x in stretches], axis=0) / rows
+            for x in stretches:
+                for start in range(first, len(x), CHUNK):
+                    part = slice(start, min(start + CHUNK, len(x)))
+                    yield np.column_stack([*(columns_of_lags(u, lags, part) for u in x.T[:-1]), x[part, -1]]) - mean
+
+    def count(self, whiten: NDArray[np.float64]) -> tuple[int, int]:
+        """Rows, and traces that have any."""
+        first = self.length - 1 + len(whiten) - 1
+        kept = [segment for segment in self.segments if len(segment) > first]
+        return sum(len(segment) - first for segment in kept), len({segment.trace for segment in kept})
+
+    def triangle(self, whiten: NDArray[np.float64]) -> Triangle:
+        """The triangular factor of the regression; the level of each trace has taken one row."""
+        found = triangle(self.blocks(whiten), free=0)
+        return Triangle(R=found.R, z=found.z, samples=max(found.samples - self.count(whiten)[1], 1))
+
+    def residuals(self, g: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """What the scaled response ``g`` leaves, stretch by stretch, each counted from its mean."""
+        found = []
+        for segment in self.segments:
+            if len(segment) > self.length:
+                u, y = segment.inputs / self.scale[:-1], segment.output / self.scale[-1]
+                made = [scipy.signal.lfilter(row, [1.0], x - x.mean()) for row, x in zip(g, u.T, strict=True)]
+                left = (y - np.sum(made, axis=0))[self.length - 1 :]
+                found.append(left - left.mean())
+        return found
+
+
+def _column_sums(x: NDArray[np.float64], lags: Sequence[int], first: int) -> NDArray[np.float64]:
+    sums = [[float(x[first - lag : len(x) - lag, j].sum()) for lag in lags] for j in range(x.shape[1] - 1)]
+    return np.array([value for row in sums for value in row] + [float(x[first:, -1].sum())])
