@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,10 @@ SIZES = {"polynomial": (2, 9), "piecewise": (1, 50), "network": (1, 100)}
 LIMITED = {"saturation": 0.8, "dead zone": 0.1}
 """Curves with two limits, and where these start: shares of the range of what they see."""
 PLAIN = (NONE, "absolute", *LIMITED)
+STEEP = 0.02
+"""Part of its largest bend that the slope of a curve has to be, if it is to begin as that of some values."""
+SMALL = 1e-3
+"""Part of others below which a start is 0."""
 REACH = 0.9
 """Breakpoints start evenly between plus and minus this share of the range of what the curve sees."""
 
@@ -91,6 +95,29 @@ class Curve:
         """Whether its numbers are known, in units."""
         return self.limits is not None or self.kind in {"table", "absolute"}
 
+    def like(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, tuple[float, ...]] | None:
+        """Where a learnt curve begins that comes close to some values: ``scale * (x + weights @ bends) + constant``.
+
+        Args:
+            x: Shape ``(n,)``, from -1 to 1.
+            y: Shape ``(n,)``.
+
+        Returns:
+            The scale and the weights; ``None`` for a curve that is not linear in what it learns, or that has no slope
+            where it is straight.
+        """
+        if self.kind == "polynomial":
+            bends = [x**n for n in range(2, self.size + 1)]
+        elif self.kind == "piecewise":
+            bends = [np.maximum(x - place, 0.0) for place in _places(self.size)]
+        else:
+            return None
+        scale, *weights = np.linalg.lstsq(np.column_stack([x, *bends, np.ones(len(x))]), y, rcond=None)[0][:-1]
+        steepest = float(np.abs(weights).max(initial=abs(scale)))
+        if not STEEP * steepest < abs(scale):
+            return None
+        return float(scale), tuple(float(one / scale) for one in weights)
+
     def to_value(self) -> Any:
         """As it is written."""
         if self.limits is not None:
@@ -157,18 +184,38 @@ class Text:
             self.curved.add(found)
         return found
 
-    def curve(self, curve: Curve, x: str, tag: str) -> str:
+    def curve(self, curve: Curve, x: str, tag: str, weights: Sequence[float] | None = None) -> str:
         """What a curve makes of a value.
 
         Args:
             curve: The curve.
             x: The value: in units where the curve is given, else some -1 to 1.
             tag: Part of the names of its parameters.
+            weights: Where what bends a learnt curve begins (:meth:`Curve.like`); the identity by default.
 
         Returns:
             The expression.
         """
-        return _CURVES[curve.kind](self, curve, x, tag)
+        found = _CURVES[curve.kind](self, curve, x, tag)
+        if weights is not None:
+            bends = [at for at, one in enumerate(self.parameters) if one.name in self._bends(curve, tag)]
+            for at, value in zip(bends, weights, strict=True):
+                self.parameters[at] = replace(self.parameters[at], start=sizeable(value, 1.0))
+        return found
+
+    def _bends(self, curve: Curve, tag: str) -> set[str]:
+        word, first = ("c", 2) if curve.kind == "polynomial" else ("slope", 1)
+        return {self.name(f"{tag}_{word}{n}") for n in range(first, curve.size + 1)}
+
+
+def sizeable(value: float, among: float) -> float:
+    """A start that is small beside others as 0: how large a parameter starts says what a large change of it is.
+
+    Example:
+        >>> sizeable(1e-9, 0.5), sizeable(0.1, 0.5)
+        (0.0, 0.1)
+    """
+    return float(value) if abs(value) > SMALL * among else 0.0
 
 
 def number(value: float) -> str:
@@ -205,12 +252,16 @@ def _polynomial(text: Text, curve: Curve, x: str, tag: str) -> str:
     return " + ".join([x, *terms])
 
 
+def _places(size: int) -> Sequence[float]:
+    """Where breakpoints start."""
+    return np.linspace(-REACH, REACH, size + 2)[1:-1].tolist() if size > 1 else [0.01]
+
+
 def _piecewise(text: Text, curve: Curve, x: str, tag: str) -> str:
-    places = np.linspace(-REACH, REACH, curve.size + 2)[1:-1] if curve.size > 1 else [0.01]
     terms = [
         f"{text.estimated(f'{tag}_slope{i}', 0.0, curve=True)}"
         f"*max({x} - {text.estimated(f'{tag}_at{i}', place, curve=True)}, 0)"
-        for i, place in enumerate(places, start=1)
+        for i, place in enumerate(_places(curve.size), start=1)
     ]
     return " + ".join([x, *terms])
 

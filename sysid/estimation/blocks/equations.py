@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from sysid.estimation.blocks.linear_start import LinearStart
-from sysid.estimation.blocks.sections import Block
+from sysid.estimation.blocks.sections import Block, Pair
 from sysid.models import GreyBox, HammersteinWiener, Mapping, WienerHammerstein
-from sysid.models.curves import NONE, Curve, Text, number, quoted
+from sysid.models.curves import NONE, Curve, Text, number, quoted, sizeable
 
 
 def hammerstein_wiener(
@@ -44,7 +45,7 @@ def hammerstein_wiener(
 
 
 def wiener_hammerstein(
-    structure: WienerHammerstein, mapping: Mapping, begun: LinearStart, blocks: tuple[Block, Block]
+    structure: WienerHammerstein, mapping: Mapping, begun: LinearStart, pair: Pair
 ) -> tuple[GreyBox, frozenset[str]]:
     """The equations of a Wiener-Hammerstein model; see :func:`hammerstein_wiener`.
 
@@ -53,10 +54,11 @@ def wiener_hammerstein(
     text = Text(taken=frozenset((*mapping.inputs, *mapping.outputs)))
     n = len(mapping.inputs)
     inputs = _inputs(text, (Curve(kind=NONE),) * n, mapping, begun, structure.lags(n))
-    before, behind = blocks
+    scale, bends = structure.curve.like(pair.x, pair.y) or (1.0, None)
+    behind = replace(pair.behind, gains=scale * pair.behind.gains, direct=scale * pair.behind.direct)
     drift = 0.0 if begun.integrates else None
-    between = text.define("between", write_block(text, before, inputs, "g1", known=True, fed=drift))
-    bent = text.define("bent", text.curve(structure.curve, between, "f"))
+    between = text.define("between", write_block(text, pair.before, inputs, "g1", known=True, fed=drift))
+    bent = text.define("bent", text.curve(structure.curve, between, "f", bends))
     level = text.estimated("level", begun.level)
     linear = write_block(text, behind, [(bent, True)], "g2")
     scaling = begun.scaling
@@ -106,6 +108,7 @@ def write_block(
     """
     states = [text.name(f"{tag}_x{i + 1}") for i in range(block.states)]
     largest = float(np.abs(block.gains).max(initial=0.0)) if known else 0.0
+    sizes = float(np.abs([*block.gains.ravel(), *block.direct]).max(initial=0.0))
     at = 0
     for number_, section in enumerate(block.sections, start=1):
         behind = states[at + len(section)] if at + len(section) < block.states else ""
@@ -117,16 +120,16 @@ def write_block(
                 gain = block.gains[at + i, j]
                 wanted = f"{tag}_b{at + i + 1}" + (f"_{j + 1}" if len(inputs) > 1 else "")
                 prior = largest if abs(gain) == largest > 0.0 else None
-                terms.append(f"{text.estimated(wanted, gain, prior=prior)}*{read}")
+                terms.append(f"{text.estimated(wanted, sizeable(gain, sizes), prior=prior)}*{read}")
             if fed is not None and at + i == block.states - 1:
                 terms.append(text.estimated(f"{tag}_drift", fed))
             text.lines.append(f"{states[at + i]}[k+1] = {' + '.join(term for term in terms if term)}")
         at += len(section)
-    direct = [
-        f"{text.estimated(f'{tag}_d{j + 1}' if len(inputs) > 1 else f'{tag}_d', block.direct[j])}*{read}"
-        for j, (read, now) in enumerate(inputs)
-        if now
-    ]
+    direct = []
+    for j, (read, now) in enumerate(inputs):
+        if now:
+            wanted = f"{tag}_d{j + 1}" if len(inputs) > 1 else f"{tag}_d"
+            direct.append(f"{text.estimated(wanted, sizeable(block.direct[j], sizes))}*{read}")
     return " + ".join([states[0], *direct])
 
 

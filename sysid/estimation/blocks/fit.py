@@ -118,7 +118,8 @@ def fit_wiener_hammerstein(
         begun.scaling.scale_output(longest[mapping.output]),
     )
     rng = np.random.default_rng(training.seed)
-    ways = parted(begun, structure.first, signals, direct=direct, rng=rng)[: training.n_starts]
+    seconds = LINEAR * training.max_time_s
+    ways = parted(begun, structure.first, signals, direct=direct, rng=rng, seconds=seconds)[: training.n_starts]
     greys = [wiener_hammerstein(structure, mapping, begun, pair)[0] for pair in ways]
     template, experiments = built_template(
         traces, mapping, greys[0], built_of=structure, start=start or Start(), rest_output=rest_output

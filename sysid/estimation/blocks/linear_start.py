@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -10,7 +11,18 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.blocks.sections import INTEGRATOR, Block, Poles, block_of, responses, samples_for, sections_of
+from sysid.estimation.blocks.first_block import searched
+from sysid.estimation.blocks.sections import (
+    INTEGRATOR,
+    LARGEST_POLE,
+    Block,
+    Pair,
+    Poles,
+    block_of,
+    responses,
+    samples_for,
+    sections_of,
+)
 from sysid.estimation.networks.neural_state_space import fit_neural_state_space
 from sysid.estimation.networks.training import Training
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
@@ -23,6 +35,9 @@ ROUNDS, DRAWS = 20, 3
 """Alternating least squares between two blocks, and beginnings of it for each way to part the poles."""
 KNOTS = 8
 """Breakpoints of the curve with which ways to part the linear model are compared."""
+SLOWEST, ALIKE = 2.0, 1e-4
+"""How much slower than the linear model's slowest pole a block may be that is looked for, at most; and the relative
+difference of errors below which two ways to part the model are one."""
 COMPARED, SETTLED = 20_000, 0.1
 """Samples over which they are, and the share of these that the blocks take to forget that they began at 0."""
 
@@ -160,12 +175,15 @@ def whole(begun: LinearStart, *, direct: Sequence[bool]) -> Block:
 
 
 def parted(
-    begun: LinearStart, first: int, signals: tuple[Array, Array], *, direct: Sequence[bool], rng: np.random.Generator
-) -> list[tuple[Block, Block]]:
+    begun: LinearStart, first: int, signals: tuple[Array, Array], *, direct: Sequence[bool], rng: np.random.Generator,
+    seconds: float = math.inf,
+) -> list[Pair]:  # fmt: skip
     """Ways to part the linear model around a curve, the most promising first.
 
     Which pole and zero belongs before the curve a linear model cannot say (Sjoberg and Schoukens 2012): every way to
-    part the poles is tried, the gains by alternating least squares, and judged by the best static curve between.
+    part the poles is tried, the gains by alternating least squares, and judged by the best static curve between. Where
+    the curve distorts much, its poles are not the blocks': first blocks are sought without it, too
+    (:mod:`sysid.estimation.blocks.first_block`).
 
     Args:
         begun: The linear model.
@@ -173,16 +191,30 @@ def parted(
         signals: Scaled inputs, shape ``(n_samples, n_inputs)``, and output of a record.
         direct: Of each input whether it is read within the sample.
         rng: Source of randomness.
+        seconds: Wall time at most, once every way to part the poles was tried.
 
     Returns:
-        Pairs of blocks, what lies between scaled to -1 to 1.
+        The pairs, those that are alike once.
     """
-    found = []
-    for before, behind in _ways(begun.poles, first):
-        for _ in range(DRAWS):
-            pair = _factors(before, behind, begun.response, direct, rng)
-            found.append(_judged(pair, signals))
-    return [pair for _, pair in sorted(found, key=lambda one: one[0])]
+    until = time.perf_counter() + seconds
+    found = [
+        _judged(*_factors(*way, begun.response, direct, rng), signals)
+        for way in _ways(begun.poles, first)
+        for _ in range(DRAWS)
+    ]
+    blocks = [pair.before for _, pair in found]
+    second, slowest = len(begun.poles) - first, -SLOWEST / np.log(min(np.abs(begun.poles).max(), LARGEST_POLE))
+    found += searched(blocks, second, signals, direct=direct, slowest=slowest, rng=rng, until=until)
+    return _distinct(sorted(found, key=lambda one: one[0]))
+
+
+def _distinct(found: list[tuple[float, Pair]]) -> list[Pair]:
+    """Of pairs of the same error one."""
+    kept: list[tuple[float, Pair]] = []
+    for error, pair in found:
+        if not kept or error - kept[-1][0] > ALIKE * kept[-1][0]:
+            kept.append((error, pair))
+    return [pair for _, pair in kept]
 
 
 def _ways(poles: Poles, first: int) -> list[tuple[Poles, Poles]]:
@@ -233,22 +265,21 @@ def _factors(
     )
 
 
-def _judged(pair: tuple[Block, Block], signals: tuple[Array, Array]) -> tuple[float, tuple[Block, Block]]:
-    """The squared error with the best curve between two blocks, and these with what lies between from -1 to 1."""
-    before, behind = pair
+def _judged(before: Block, behind: Block, signals: tuple[Array, Array]) -> tuple[float, Pair]:
+    """The squared error with the best curve between two blocks, and both, what lies between from -1 to 1."""
     w, y = signals[0][:COMPARED], signals[1][:COMPARED]
-    between = before.filtered(w - w[0])
-    low, high = float(between.min()), float(between.max())
-    span = max(abs(low), abs(high))
+    x = before.filtered(w - w[0])
+    span = float(np.abs(x).max())
     if not np.isfinite(span) or span == 0.0:
-        return np.inf, pair
+        return np.inf, Pair(before=before, behind=behind, x=x, y=x)
+    x = x / span
     before = replace(before, gains=before.gains / span, direct=before.direct / span)
     behind = replace(behind, gains=behind.gains * span, direct=behind.direct * span)
-    between = between / span
-    knots = np.linspace(low / span, high / span, KNOTS + 2)[1:-1]
-    columns = [between, *(np.maximum(between - at, 0.0) for at in knots)]
+    knots = np.linspace(x.min(), x.max(), KNOTS + 2)[1:-1]
+    columns = [x, *(np.maximum(x - at, 0.0) for at in knots)]
     first = round(SETTLED * len(y))
     design = np.column_stack([np.ones(len(y)), *(behind.filtered(column[:, None]) for column in columns)])[first:]
     found = np.linalg.lstsq(design, y[first:], rcond=None)[0]
     error = float(np.mean((y[first:] - design @ found) ** 2))
-    return (error if np.isfinite(error) else np.inf), (before, behind)
+    pair = Pair(before=before, behind=behind, x=x, y=np.column_stack(columns) @ found[1:])
+    return (error if np.isfinite(error) else np.inf), pair

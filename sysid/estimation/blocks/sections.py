@@ -68,6 +68,23 @@ class Block:
         return y
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pair:
+    """Two blocks around a curve.
+
+    Args:
+        before: The first, whose output ranges over -1 to 1.
+        behind: The second, as it is behind the curve.
+        x: What the curve is given, shape ``(n,)``.
+        y: What it gives, as large as it is on the whole, shape ``(n,)``.
+    """
+
+    before: Block
+    behind: Block
+    x: Array
+    y: Array
+
+
 def sections_of(poles: Poles) -> tuple[tuple[float, ...], ...]:
     """Sections of first and second order with some poles, complex ones in pairs.
 

@@ -1,0 +1,82 @@
+"""Two blocks around a curve are found from the first, whatever the best linear model looks like."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from sysid.estimation.blocks.first_block import searched
+from sysid.estimation.blocks.sections import Block, Pair
+from sysid.models.curves import Curve
+
+BEFORE, BEHIND = [1.0, -1.2, 0.45], [1.0, -0.6, 0.0]
+
+
+def record(seed: int = 0, n: int = 500) -> tuple[np.ndarray, np.ndarray]:
+    u = np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, n // 4), 4)
+    u[:20] = 0.0
+    z = lfilter([0.0, 0.2, 0.05], BEFORE, u)
+    return u[:, None], lfilter([0.0, 1.0], BEHIND[:2], z + 2.0 * z**3 + 0.5 * z**2)
+
+
+def begun(states: int) -> Block:
+    """One that says nothing of the system."""
+    return Block(sections=((0.0,),) * states, gains=np.ones((states, 1)), direct=np.zeros(1))
+
+
+def found(until: float, direct: bool = False) -> list[tuple[float, Pair]]:
+    return searched([begun(2)], 1, record(), direct=[direct], slowest=20.0, rng=np.random.default_rng(0), until=until)
+
+
+@pytest.fixture(scope="module")
+def pairs() -> list[tuple[float, Pair]]:
+    return found(np.inf)
+
+
+def test_the_first_block_is_found_among_drawn_ones(pairs: list[tuple[float, Pair]]) -> None:
+    error, best = pairs[0]
+    assert error < 1e-9 * np.var(record()[1])
+    assert best.before.sections[0] == pytest.approx(BEFORE[1:], abs=1e-3)
+    assert best.behind.sections == (pytest.approx((0.6,), abs=1e-3),)
+    assert [error for error, _ in pairs] == sorted(error for error, _ in pairs)
+
+
+def test_blocks_and_curve_of_a_pair_are_the_system(pairs: list[tuple[float, Pair]]) -> None:
+    _, best = pairs[0]
+    u, y = record()
+    assert best.x == pytest.approx(best.before.filtered(u))
+    assert np.abs(best.x).max() == pytest.approx(1.0)
+    run = best.behind.filtered(best.y[:, None])
+    assert np.std(run - y) < 1e-3 * np.std(y)
+    assert np.cov(best.x, best.y)[0, 1] / np.var(best.x) == pytest.approx(1.0, rel=1e-2)
+
+
+def test_no_time_leaves_one_pair_that_can_be_begun_with() -> None:
+    ((error, pair),) = found(-np.inf)
+    assert np.isfinite(error)
+    assert np.isfinite(pair.y).all()
+
+
+def test_a_block_reads_its_input_within_the_sample_only_where_it_may() -> None:
+    assert found(-np.inf)[0][1].before.direct == 0.0
+    assert found(-np.inf, direct=True)[0][1].before.direct != 0.0
+
+
+@pytest.mark.parametrize(
+    ("written", "y", "wanted"),
+    [
+        ("polynomial 3", lambda x: 2.0 * x + 3.0 * x**2 - x**3 + 5.0, (2.0, [1.5, -0.5])),
+        ("polynomial 2", lambda x: 0.5 * x, (0.5, [0.0])),
+        ("piecewise 1", lambda x: 2.0 * x - np.maximum(x - 0.01, 0.0), (2.0, [-0.5])),
+    ],
+)
+def test_a_learnt_curve_begins_like_some_values(written: str, y, wanted) -> None:  # type: ignore[no-untyped-def]
+    x = np.linspace(-1.0, 1.0, 50)
+    scale, weights = Curve.parse(written, "curve").like(x, y(x)) or (0.0, ())
+    assert scale == pytest.approx(wanted[0])
+    assert list(weights) == pytest.approx(wanted[1], abs=1e-12)
+
+
+@pytest.mark.parametrize(("written", "y"), [("saturation", np.abs), ("network 3", np.abs), ("polynomial 2", np.square)])
+def test_a_curve_that_cannot_begin_like_them_begins_as_it_is(written: str, y) -> None:  # type: ignore[no-untyped-def]
+    x = np.linspace(-1.0, 1.0, 50)
+    assert Curve.parse(written, "curve").like(x, y(x)) is None
