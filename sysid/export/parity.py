@@ -6,6 +6,7 @@ number rounded otherwise in its last digit comes out larger by :attr:`ParityCase
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,13 @@ from numpy.typing import NDArray
 from sysid.errors import ParityError
 from sysid.export.exporter import ExportedFile, Runner
 from sysid.export.exporters import exporter
+from sysid.export.stage import Port
 from sysid.export.surrogate import Surrogate
 from sysid.models import AbstractModel, History, Start, beginning
 from sysid.traces import Trace, TraceSet
 
+SHARES: Mapping[str, float] = {"float64": 1e-9, "float32": 1e-5}
+"""How far a file may be from its model by default, as a share of an output's size, by the type of its numbers."""
 RANDOM_SEQUENCES = 100
 RANDOM_SAMPLES = 400
 RANDOM_SEED = 7
@@ -54,12 +58,15 @@ class Parity:
     """How far an exported file is from its model.
 
     Args:
-        largest_difference: Over all samples of all cases, in the output's unit.
+        largest_difference: Over all samples of all cases, in the output's unit; of several outputs, of the one that is
+            nearest to what is allowed.
         case: Where it occurred.
         random_difference: The same over the random sequences.
         random_sequences: Their number.
         tolerance: What is allowed, in the same unit, in cases and sequences.
-        unit: The output's unit.
+        share: The same as a share of the output's size; ``None`` where it was given in the output's unit.
+        output: The output's name.
+        unit: Its unit.
         samples: Number of samples compared.
     """
 
@@ -68,6 +75,8 @@ class Parity:
     random_difference: float
     random_sequences: int
     tolerance: float
+    share: float | None
+    output: str
     unit: str
     samples: int
 
@@ -79,9 +88,46 @@ class Parity:
             "random_difference": self.random_difference,
             "random_sequences": self.random_sequences,
             "tolerance": self.tolerance,
+            "share": self.share,
+            "output": self.output,
             "unit": self.unit,
             "samples": self.samples,
         }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Allowed:
+    """How far a file may be from its model.
+
+    Args:
+        each: Largest difference of each output, in its unit, shape ``(n_outputs,)``.
+        share: The same as a share of each output's size; ``None`` where it was given.
+    """
+
+    each: NDArray[np.float64]
+    share: float | None = None
+
+    @classmethod
+    def of(cls, cases: Sequence[ParityCase], dtype: str, given: float | None = None) -> Allowed:
+        """What is allowed.
+
+        A number in an output's unit would ask another thing of pascals than of bars. Rounding is in proportion to what
+        is rounded: to the level that an output stands at, as well as to how far it moves.
+
+        Args:
+            cases: The model's runs over the cases.
+            dtype: Of the file's numbers.
+            given: Largest difference in the outputs' unit, where one was asked for.
+
+        Returns:
+            It; by default :data:`SHARES` of the largest magnitude that each output has over the cases.
+        """
+        sizes = np.max([np.abs(case.output).max(axis=0, initial=0.0) for case in cases], axis=0)
+        if given is not None:
+            return cls(each=np.full(sizes.shape, given))
+        # One that is 0 throughout has no size of its own.
+        usable = np.isfinite(sizes) & (sizes > 0.0)
+        return cls(each=SHARES[dtype] * np.where(usable, sizes, 1.0), share=SHARES[dtype])
 
 
 def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[ParityCase, ...]:
@@ -225,8 +271,8 @@ def check_parity(
     cases: tuple[ParityCase, ...],
     sequences: tuple[ParityCase, ...],
     *,
-    tolerance: float,
-    unit: str,
+    allowed: Allowed,
+    outputs: Sequence[Port],
 ) -> Parity:
     """Run an exported file on every case and on the random sequences.
 
@@ -235,8 +281,8 @@ def check_parity(
         folder: Where it lies.
         cases: From :func:`parity_cases`; at least one.
         sequences: From :func:`random_cases`, all of one length; may be empty.
-        tolerance: Largest difference allowed, in the output's unit.
-        unit: The output's unit.
+        allowed: Largest difference of each output.
+        outputs: The outputs.
 
     Returns:
         The largest differences, and where they occurred.
@@ -245,30 +291,34 @@ def check_parity(
         ParityError: If a difference is larger than the tolerance, or not a number.
     """
     runner = exporter(file.format).load(file, folder)
-    differences = {case.name: _compare(runner, (case,))[0] for case in cases}
-    drawn = _compare(runner, sequences)
-    differences_drawn = {case.name: difference for case, difference in zip(sequences, drawn, strict=True)}
-    for found in (differences, differences_drawn):
-        where = max(found, key=lambda name: found[name], default="")
-        if where and not found[where] <= tolerance:
-            raise ParityError(file.name, where, found[where], tolerance, unit)
+    differences = np.concatenate([_compare(runner, (case,)) for case in cases])
+    drawn = _compare(runner, sequences) if sequences else differences[:0]
+    for found, runs in ((differences, cases), (drawn, sequences)):
+        ratios = found / allowed.each
+        if (ratios > 1.0).any():
+            row, column = divmod(int(ratios.argmax()), ratios.shape[1])
+            each, port = float(allowed.each[column]), outputs[column]
+            raise ParityError(file.name, runs[row].name, float(found[row, column]), each, port.unit)
+    every = np.concatenate([differences, drawn])
+    near = int((every / allowed.each).max(axis=0).argmax())
     return Parity(
-        largest_difference=max(differences.values()),
-        case=max(differences, key=lambda name: differences[name]),
-        random_difference=max(drawn, default=0.0),
+        largest_difference=float(differences[:, near].max()),
+        case=cases[int(differences[:, near].argmax())].name,
+        random_difference=float(drawn[:, near].max(initial=0.0)),
         random_sequences=len(sequences),
-        tolerance=tolerance,
-        unit=unit,
+        tolerance=float(allowed.each[near]),
+        share=allowed.share,
+        output=outputs[near].name,
+        unit=outputs[near].unit,
         samples=sum(len(case.output) for case in (*cases, *sequences)),
     )
 
 
-def _compare(runner: Runner, cases: tuple[ParityCase, ...]) -> list[float]:
-    """The largest difference of each case, all run side by side as cars."""
-    if not cases:
-        return []
+def _compare(runner: Runner, cases: tuple[ParityCase, ...]) -> NDArray[np.float64]:
+    """The largest difference of each case and output, all run side by side as cars; shape ``(n_cases, n_outputs)``."""
     run = runner(np.stack([case.inputs for case in cases], axis=1), np.stack([case.state for case in cases]))
-    return [largest_difference(run.output[:, i], case.output) for i, case in enumerate(cases)]
+    found = [_differences(run.output[:, i], case.output).max(axis=0, initial=0.0) for i, case in enumerate(cases)]
+    return np.array(found).reshape(len(cases), -1)
 
 
 def largest_difference(output: NDArray[Any], expected: NDArray[np.float64]) -> float:

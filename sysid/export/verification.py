@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sysid.export.exporter import ExportedFile, Kind
 from sysid.export.flags import expected_flags
 from sysid.export.layout import EquationState
-from sysid.export.parity import ParityCase
+from sysid.export.parity import Allowed, ParityCase
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import render
 from sysid.names import csv_cell
@@ -31,7 +31,7 @@ def write_verification(
     files: Sequence[ExportedFile],
     runs: tuple[ParityCase, ParityCase],
     folder: Path,
-    tolerances: dict[str, float],
+    allowed: Mapping[str, Allowed],
 ) -> dict[str, str]:
     """Write records, the states before them where these are searched for, and a program for each kind of file.
 
@@ -41,7 +41,7 @@ def write_verification(
         runs: A case whose beginning is the first record, and a random sequence whose beginning is the second; the
             third leaves the declared range with it, and has an input that is not a number near its end.
         folder: The bundle's.
-        tolerances: What the programs allow, by number type.
+        allowed: What the programs allow, by number type.
 
     Returns:
         What each written file is, by its path in the bundle.
@@ -57,15 +57,16 @@ def write_verification(
     values = {
         "p": surrogate.identifier,
         "P": surrogate.identifier.upper(),
-        "tolerance": repr(tolerances["float64"]),
-        "tolerance_float32": repr(tolerances["float32"]),
+        "allowed": ", ".join(map(repr, allowed["float64"].each.tolist())),
+        "allowed_float32": ", ".join(map(repr, allowed["float32"].each.tolist())),
     }
     if any(isinstance(stage.state, EquationState) for stage in surrogate.stages):
         begins = {name: surrogate.at_rest(inputs[0]).tolist() for name, (inputs, _) in records.items()}
         texts["states.json"] = (json.dumps(begins, indent=1) + "\n", "the state before each record, at rest")
     networks = [file for file in files if file.name.endswith(".onnx") and file.kind is Kind.SEQUENCE]
     for network in networks[:1]:
-        python = values | {"onnx": network.name, "dtype": network.dtype, "tolerance": repr(tolerances[network.dtype])}
+        each = repr(allowed[network.dtype].each.tolist())
+        python = values | {"onnx": network.name, "dtype": network.dtype, "allowed": each}
         texts["verify.py"] = (render("verify.py.j2", **python), f"runs {network.name} over the records")
     if any(file.name.endswith(".c") for file in files):
         texts["verify.c"] = (render("verify.c.j2", **values), f"runs {surrogate.identifier}.c over the records")

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as Dict
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ from sysid.export.manifest import (
     seal,
     sha256,
 )
-from sysid.export.parity import check_parity, parity_cases, random_cases
+from sysid.export.parity import Allowed, check_parity, parity_cases, random_cases
 from sysid.export.stability import WORST, check_free_run, state_stability
 from sysid.export.surrogate import Surrogate
 from sysid.export.verification import write_verification
@@ -53,8 +54,8 @@ def export_bundle(
     start: Start | None = None,
     outputs: Sequence[str] | None = None,
     formats: Sequence[str] | None = None,
-    tolerance: float = 1e-9,
-    tolerance_float32: float = 1e-3,
+    tolerance: float | None = None,
+    tolerance_float32: float | None = None,
     metrics: Metrics | CascadeMetrics | None = None,
     fits: Dict[str, FitResult] | None = None,
     provenance: Dict[str, Any] | None = None,
@@ -80,8 +81,10 @@ def export_bundle(
             computed, and nobody is told that it is at a limit.
         formats: Names of exporters; by default ONNX and C, as far as they can be written here. What is left out is
             said in a warning.
-        tolerance: Largest difference from the model allowed, in the outputs' unit.
-        tolerance_float32: The same for files that compute in float32.
+        tolerance: Largest difference from the model allowed, in the outputs' unit; by default 1e-9 of the largest value
+            that each output has over the cases, which is the same whatever the unit.
+        tolerance_float32: The same for files that compute in float32; by default 1e-5 of it, and never less than
+            ``tolerance``.
         metrics: The figures on the cases, as :func:`sysid.validation.evaluate` or ``evaluate_cascade`` give them.
         fits: Where a cascade's models come from, by mapping.
         provenance: JSON values about where the fit comes from, kept as they are. A ``training`` among them,
@@ -108,12 +111,14 @@ def export_bundle(
     surrogate = _surrogate(source, traces, outputs)
     cases, sequences = parity_cases(surrogate, traces, start), random_cases(surrogate)
     stability = None if source.single is None else check_free_run(source.single, traces)
-    unit = ", ".join(dict.fromkeys(port.unit for port in surrogate.outputs))
-    allowed = {"float64": tolerance, "float32": max(tolerance, tolerance_float32)}
+    allowed = {"float64": Allowed.of(cases, "float64", tolerance)}
+    coarse = Allowed.of(cases, "float32", tolerance_float32)
+    allowed["float32"] = replace(coarse, each=np.maximum(coarse.each, allowed["float64"].each))
     with _published(Path(folder)) as draft:
         written = [file for writer in writers for file in writer.write(surrogate, draft)]
         checked = [
-            check_parity(file, draft, cases, sequences, tolerance=allowed[file.dtype], unit=unit) for file in written
+            check_parity(file, draft, cases, sequences, allowed=allowed[file.dtype], outputs=surrogate.outputs)
+            for file in written
         ]
         purposes = {name: f"needed by {file.name}" for file in written for name in file.companions}
         purposes |= write_verification(surrogate, written, (cases[0], sequences[0]), draft, allowed)

@@ -62,7 +62,7 @@ def test_folder_holds_the_files_and_nothing_else(bundle):
 def test_each_file_is_recorded_with_its_difference(bundle, traces):
     assert sorted(file.name for file in bundle.files) == FILES
     for file in bundle.files:
-        assert 0.0 <= file.largest_difference <= file.tolerance == 1e-9
+        assert 0.0 <= file.largest_difference <= file.tolerance
         assert file.case in traces.names
 
 
@@ -281,8 +281,18 @@ def test_importing_the_package_imports_no_heavy_library():
 
 def test_a_model_too_fine_for_float_is_still_exported_in_double(fit, traces, start, tmp_path, models):
     fine = replace(fit, model=models["ARX, two inputs, dead times"]())
-    kept = export_bundle(fine, traces, tmp_path / "b", start=start, formats=["c"], tolerance_float32=1e-9)
+    kept = export_bundle(
+        fine, traces, tmp_path / "b", start=start, formats=["c"], tolerance=1e-9, tolerance_float32=1e-9
+    )
     assert [(file.name, file.dtype) for file in kept.files] == [("bp_ar_to_bc.c", "float64")]
     assert "float, which was not compared with the model" in (tmp_path / "b" / "MODEL_CARD.md").read_text("utf-8")
     with pytest.raises(ParityError, match=r"bp_ar_to_bc\.c does not reproduce"):
-        export_bundle(fine, traces, tmp_path / "b", start=start, formats=["c", "c-float32"], tolerance_float32=1e-9)
+        export_bundle(
+            fine,
+            traces,
+            tmp_path / "b",
+            start=start,
+            formats=["c", "c-float32"],
+            tolerance=1e-9,
+            tolerance_float32=1e-9,
+        )

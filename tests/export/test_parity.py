@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from sysid.errors import ParityError
 from sysid.export import EXPORTERS, Surrogate, check_parity, parity_cases, random_cases
-from sysid.export.parity import largest_difference
+from sysid.export.parity import SHARES, Allowed, ParityCase, largest_difference
+from sysid.export.stage import Port
 from sysid.models import ARX, NARX, ARXModel, Mapping, Start, StartKind
 from tests.export.conftest import ROWS, usable
 
@@ -36,10 +39,14 @@ def test_largest_difference(output, expected, difference):
 def passes(row, model, surrogate, traces, begin, folder):  # noqa: PLR0917 - called twice, just below
     cases, sequences = parity_cases(surrogate, traces, begin), random_cases(surrogate, sequences=3, samples=50)
     for file in written(row, surrogate, folder):
-        parity = check_parity(file, folder, cases, sequences, tolerance=row.tolerance, unit="psi")
-        assert max(parity.largest_difference, parity.random_difference) <= parity.tolerance == row.tolerance
+        allowed = Allowed.of(cases, file.dtype)
+        parity = check_parity(file, folder, cases, sequences, allowed=allowed, outputs=surrogate.outputs)
+        largest = max(np.abs(case.output).max() for case in cases)
+        assert parity.tolerance == pytest.approx(SHARES[row.dtype] * largest, rel=1e-12)
+        assert max(parity.largest_difference, parity.random_difference) <= parity.tolerance
         assert parity.case in traces.names
-        assert (parity.unit, parity.random_sequences) == ("psi", 3)
+        assert (parity.output, parity.unit, parity.random_sequences) == (surrogate.outputs[0].name, "psi", 3)
+        assert parity.share == SHARES[row.dtype]
         assert parity.samples == sum(len(trace) for trace in traces) - 3 * begin.n_measured + 3 * 50
 
 
@@ -71,7 +78,8 @@ def test_files_of_another_model_are_refused_with_the_worst_case(*, row, fit, dec
     worst = max(expected, key=expected.get)
     for file in written(row, declared(other), tmp_path):
         with pytest.raises(ParityError, match=f"(?s){file.name} does not reproduce.*case {worst}"):
-            check_parity(file, tmp_path, cases, (), tolerance=row.tolerance, unit="psi")
+            allowed = Allowed.of(cases, file.dtype)
+            check_parity(file, tmp_path, cases, (), allowed=allowed, outputs=declared(other).outputs)
 
 
 def test_a_difference_on_a_random_sequence_alone_is_refused(fit, declared, traces, tmp_path):
@@ -83,7 +91,49 @@ def test_a_difference_on_a_random_sequence_alone_is_refused(fit, declared, trace
     sequences[1].output[7] += 1e-6
     (file, _) = EXPORTERS["onnx"].write(surrogate, tmp_path)
     with pytest.raises(ParityError, match=r"(?s)case random 2.*1e-06 psi"):
-        check_parity(file, tmp_path, cases, sequences, tolerance=1e-9, unit="psi")
+        check_parity(
+            file, tmp_path, cases, sequences, allowed=Allowed.of(cases, "float64", 1e-9), outputs=surrogate.outputs
+        )
+
+
+def run_of(*outputs: list[float]) -> ParityCase:
+    values = np.array(outputs).T
+    return ParityCase(name="a", inputs=values, state=values[0], output=values, amplification=1.0)
+
+
+@pytest.mark.parametrize("unit", [1e6, 1.0, 1e-6], ids="{:g}".format)
+def test_what_is_allowed_is_the_same_in_whatever_unit_and_for_each_output_its_own(unit):
+    cases = (run_of([0.0, 300.0 * unit], [0.0, -2e-6]), run_of([310.0 * unit], [1e-6]))
+    np.testing.assert_allclose(Allowed.of(cases, "float64").each, [310e-9 * unit, 2e-15])
+    np.testing.assert_allclose(Allowed.of(cases, "float32").each, [310e-5 * unit, 2e-11])
+    # A number that was asked for is in the outputs' unit; what is 0 throughout has no size.
+    assert Allowed.of(cases, "float64", 0.25).each.tolist() == [0.25, 0.25]
+    assert Allowed.of((run_of([0.0]),), "float64").each.tolist() == [1e-9]
+
+
+def test_of_several_outputs_each_is_held_to_its_own_and_the_nearest_is_told(tmp_path, monkeypatch):
+    small, large = (
+        Port(name=name, unit=unit, identifier=name, level=0.0) for name, unit in (("small", "m"), ("large", "Pa"))
+    )
+    case = run_of([1e-6, 2e-6], [1e6, 2e6])
+    file = SimpleNamespace(name="a", format="c", dtype="float64")
+
+    def off_by(*by: float) -> None:
+        def run(*_: object) -> SimpleNamespace:
+            return SimpleNamespace(output=case.output[:, np.newaxis] + np.array(by))
+
+        monkeypatch.setattr("sysid.export.parity.exporter", lambda _: SimpleNamespace(load=lambda *_: run))
+
+    off_by(1e-15, 1e-4)
+    allowed = Allowed.of((case,), "float64")
+    found = check_parity(file, tmp_path, (case,), (), allowed=allowed, outputs=(small, large))
+    assert (found.output, found.unit) == ("small", "m")
+    assert found.largest_difference == pytest.approx(1e-15, rel=1e-3)
+    assert found.tolerance == pytest.approx(2e-15)
+    off_by(1e-12, 1e-4)  # far less than the other may be off, and far too much for this one
+    with pytest.raises(ParityError, match=r"(?s)1e-12 m") as caught:
+        check_parity(file, tmp_path, (case,), (), allowed=allowed, outputs=(small, large))
+    assert caught.value.tolerance == pytest.approx(2e-15)
 
 
 def test_random_sequences_fill_the_declared_range_and_never_leave_it(fit, declared):

@@ -9,13 +9,14 @@ from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.models import ARX, AbstractStructure
+from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import SweepRecord, Trial
 from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
 from sysid.workbench.auto.plan import AGAIN, Plan, ranked_by
-from sysid.workbench.auto.race import Race
+from sysid.workbench.auto.race import Race, trains_on
 from sysid.workbench.auto.trials import Trials
 from sysid.workbench.auto.words import Choice, choose, sentence
 from sysid.workbench.fits.config import FitConfig
@@ -212,7 +213,10 @@ class Search:
             plan.trials[:], spent = race.run(plan.trials)
             kept, raced = kept - spent, len(race.in_it)
         checks = Checks(driver=first, bench=self.bench.fold(0))
-        choice = choose(plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance)
+        choice = choose(
+            plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance,
+            goes_on=lambda trial: self.parts.trained_on and trains_on(structure_from_dict(trial.structure)),
+        )  # fmt: skip
         shown = {FOUND: choice.chosen}
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear

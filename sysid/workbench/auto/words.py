@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.numbers import number, quantity
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.plan import ALIKE, ranked_by
+from sysid.workbench.auto.plan import ALIKE, RIVAL, ranked_by
 
 Error = Callable[[Trial], float]
 
@@ -26,6 +26,7 @@ class Choice:
         nonlinear: Trials that are no linear model.
         more_within: Over how many of the traces that choose it stays within the tolerance, in words, where that is
             why it comes before one of less error; empty elsewhere.
+        stable: The best stable one, where that was passed over for one whose training goes on.
     """
 
     chosen: Trial
@@ -34,6 +35,7 @@ class Choice:
     refused: int
     nonlinear: int
     more_within: str = ""
+    stable: Trial | None = None
 
 
 def choose(
@@ -42,6 +44,7 @@ def choose(
     first_stable: Callable[[Sequence[Trial]], tuple[Trial, int]],
     *,
     tolerance: float | None = None,
+    goes_on: Callable[[Trial], bool] = lambda _: False,
 ) -> Choice:
     """The smallest of those whose error is as good as the least.
 
@@ -50,6 +53,8 @@ def choose(
         error: What chooses, as a mean square.
         first_stable: The first of some whose free run is stable, and how many were passed over.
         tolerance: As for :func:`~sysid.workbench.auto.plan.ranked_by`.
+        goes_on: Whether a trial's training goes on once it is chosen. A network that few iterations have brought far
+            ahead of all that is stable is not passed over for what those few iterations have left in it.
 
     Returns:
         The choice.
@@ -67,10 +72,15 @@ def choose(
     smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
     linear = [t for t in usable if ESTIMATORS[t.structure["kind"]].linear]
     nonlinear = sum(not ESTIMATORS[t.structure["kind"]].linear for t in trials)
-    return Choice(
+    found = Choice(
         chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=nonlinear,
         more_within=f"{1.0 - outside(chosen):.0%} of what chose within {tolerance:.0%} of its range" if more else "",
     )  # fmt: skip
+    ahead = [k for k, t in enumerate(usable[:refused]) if goes_on(t) and RIVAL**2 * error(t) < error(chosen)]
+    if not ahead:
+        return found
+    first = usable[ahead[0]]
+    return replace(found, chosen=first, least=first, refused=ahead[0], more_within="", stable=smallest)
 
 
 def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit: str, ended: str, error: Error) -> str:
@@ -112,6 +122,11 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit
     elif choice.linear is not None:
         parts.append("and no nonlinear model does better" if choice.nonlinear else "no nonlinear model was tried")
     said = f"{'; '.join(parts)}; {ended}."
+    if choice.stable is not None:
+        said += (
+            f" Its free run was not stable yet: its error is less than half of that of {choice.stable.label}, the best "
+            "stable one, and its training goes on. Allow more minutes if it is not stable in the end."
+        )
     if choice.refused:
         said += f" {choice.refused} of less error were passed over: their free run is not stable."
     return said

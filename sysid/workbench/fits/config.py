@@ -87,7 +87,8 @@ class ExportConfig(BaseModel):
     Args:
         fit: Name of a fit, or ``best``: least free-run error on the selection traces.
         formats: File formats; by default ONNX and C, as far as they can be written here.
-        tolerance: Largest difference allowed between a file and its model, in the output's unit.
+        tolerance: Largest difference allowed between a file and its model, in the output's unit; by default 1e-9 of the
+            largest value that each output has over the cases.
         run_times: Whether every file is timed beside the model's own free run; some seconds a format.
         case: Of parameters that differ by case, the case whose values the files have; by default they are inputs.
         unstable: Whether a fit whose free run is unstable (status ``UNSTABLE``) may leave. Without, ``best`` is the
@@ -98,7 +99,7 @@ class ExportConfig(BaseModel):
 
     fit: str = "best"
     formats: tuple[FormatField, ...] | None = None
-    tolerance: float = Field(default=1e-9, gt=0.0)
+    tolerance: float | None = Field(default=None, gt=0.0)
     run_times: bool = False
     case: str | None = None
     unstable: bool = True

@@ -56,10 +56,8 @@ TIMES = "search-seconds.txt"
 """The search's time: decided once, so that a run that was killed finds its trials again."""
 TOLERANCE = 0.01
 """Share of an output's range: what a proof counts, and what models are chosen by."""
-FORMATS = ("c", "fmi2", "fmi3")
-PARITY = 1e-7
-"""Share of the least output's range that a file may be from its model: a bound in an output's own unit would ask
-another thing of pascals than of bars, and of kelvins more than the rounding of a slow model at 300 of them leaves."""
+EXPORT: dict[str, Any] = {"formats": ("c", "fmi2", "fmi3")}
+"""What leaves the workbench as a surrogate."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -206,7 +204,7 @@ class _Work:
             **{"mapping": self.mapping, "start": Start(), "rest": dict(found.before), "seed": self.seed},
             **({"iterations": self.iterations} if self.iterations else {"minutes": minutes}),
             **{"workers": self.config.workers, "tolerance": TOLERANCE},
-            **{"export": exported(found.traces, self.mapping.outputs)},
+            **{"export": EXPORT},
         }
         search = check(AutoConfig, fields, where=self.pipeline)
         auto = replace(auto_of(search, load=lambda: data_of(found.traces, self.mapping)), before_page=before_page)
@@ -219,7 +217,7 @@ class _Work:
         return pipeline_of(
             self.config, self.mapping, where=self.pipeline, data=data, rest={} if found is None else found.before,
             seconds=seconds, seed=self.seed,
-            export={"formats": FORMATS} if found is None else exported(found.traces, self.mapping.outputs),
+            export=EXPORT,
         )  # fmt: skip
 
     def fitted(self, found: Experimented, minutes: float) -> None:
@@ -270,8 +268,7 @@ def _grown(
     grower, grown = grow(ground, how, searched, seconds=seconds, say=say)
     place = ground.folder / (GROWN if grown.best.added else "model")
     if grown.best.added:
-        leaves = exported(ground.found.traces, tuple(ground.reference.outputs))
-        perform(grown_program(ground, grower, grown, leaves), place)
+        perform(grown_program(ground, grower, grown, EXPORT), place)
     else:
         write_record(place / FILE, grown.record)
     return place, grown.record.sentence
@@ -283,20 +280,6 @@ def _kept(file: Path, seconds: float) -> float:
         return float(read_bounded(file))
     write_bytes(file, f"{seconds:.1f}\n".encode())
     return round(seconds, 1)
-
-
-def exported(traces: TraceSet, outputs: Sequence[str]) -> dict[str, Any]:
-    """What leaves the workbench as a surrogate.
-
-    Args:
-        traces: The experiments.
-        outputs: Of the reference.
-
-    Returns:
-        The fields of an export.
-    """
-    spans = [by for by in (span_of(traces.traces, name) for name in outputs) if by > 0.0]
-    return {"formats": FORMATS, "tolerance": PARITY * min(spans, default=1.0)}
 
 
 def restless(found: Experimented, mapping: Mapping) -> list[str]:

@@ -89,3 +89,17 @@ def test_the_sentence_says_what_against_what_and_why_it_ended() -> None:
 def test_a_pure_number_has_no_unit_in_the_sentence() -> None:
     said = sentence(choose(TRIALS, error, stable), len(TRIALS), unit="1", ended="", error=error)
     assert "1.02 (root mean square)" in said
+
+
+def test_a_network_far_ahead_whose_training_goes_on_is_not_passed_over_for_not_being_stable_yet() -> None:
+    def third(trials: Sequence[Trial]) -> tuple[Trial, int]:
+        return next((one, k) for k, one in enumerate(trials) if one.number == 3)
+
+    trials = [network(1, 0.4, 20), network(2, 0.9, 60), network(3, 1.0, 10)]
+    found = choose(trials, error, third, goes_on=lambda _: True)
+    assert (found.chosen.number, found.stable) == (1, trials[2])
+    said = sentence(found, 3, unit="V", ended="", error=error)
+    assert "Its free run was not stable yet: its error is less than half of that of NSS 2/3" in said
+    # Where training ends with the choice, or what is stable is nearly as good, the stable one is taken.
+    assert choose(trials, error, third).chosen.number == 3
+    assert choose([network(1, 0.6, 20), *trials[1:]], error, third, goes_on=lambda _: True).chosen.number == 3

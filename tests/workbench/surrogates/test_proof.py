@@ -112,16 +112,6 @@ def test_a_search_has_the_time_that_experiments_proof_and_report_leave_and_what_
     assert "about 52.9 min in all, more than the 5.0 min that were asked for" in slow.sentence(1000)
 
 
-def test_a_file_may_be_off_by_a_share_of_the_range_whatever_the_unit() -> None:
-    """An absolute bound refused the export of a wall at 300 K, for what its rounding comes to over hours."""
-    u, y = np.arange(40.0), np.linspace(0.0, 2.0, 40)
-    for scale in (1e-6, 1.0, 1e6):
-        traces = sysid.data(
-            {"u": u, "y": scale * y, "z": 5.0 * scale * y}, inputs="u", outputs=["y", "z"], sample_time=0.5
-        )
-        assert make.exported(traces, ("y", "z"))["tolerance"] == pytest.approx(2e-7 * scale)
-
-
 @pytest.mark.usefixtures("undrawn")
 def test_the_page_of_a_search_is_made_once_and_has_the_proof(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its pictures take longer than all else after a short search."""
