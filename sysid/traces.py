@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, TraceError
-from sysid.units import Reference
+from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.units import Reference, is_same_unit
 
 SMALLEST, LARGEST = 1e-150, 1e150
 """Magnitudes between which a channel's largest value may lie: beyond them a sum of squares is none in float64."""
@@ -454,3 +454,26 @@ def _share_samples(one: Trace, other: Trace) -> bool:
     mine, theirs = one.values[max(later, 0) :], other.values[max(-later, 0) :]
     n = min(len(mine), len(theirs))
     return n > 1 and np.array_equal(mine[:n], theirs[:n]) and bool((np.ptp(mine[:n], axis=0) > 0.0).any())
+
+
+def check_units(units: Mapping[str, str], trace: Trace) -> None:
+    """Refuse a record whose numbers would be taken for others.
+
+    Args:
+        units: The unit of each channel that is read, of which the record may lack some.
+        trace: The record.
+
+    Raises:
+        ConfigError: If a channel is in another unit.
+    """
+    there = {channel.name: channel.unit for channel in trace.channels}
+    for name, unit in units.items():
+        if name in there and not is_same_unit(there[name], unit):
+            raise ConfigError(
+                "the record has a channel in another unit than the model",
+                where=f"trace {trace.name}, channel {name}",
+                expected=unit,
+                got=there[name],
+                remedy=f"read it in {unit}: the channel's unit in a dataset.yaml converts it; sysid.data takes numbers "
+                f"as they are, so bring them to {unit} first and say units={{{name!r}: {unit!r}}}",
+            )

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from sysid.api.comparison import compare
 from sysid.api.saving import save
-from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.errors import ChannelError, TraceError
 from sysid.estimation import FitResult
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.grey_box.again import profile_again
 from sysid.estimation.grey_box.by_case import for_case
 from sysid.estimation.grey_box.profile import Profile
-from sysid.ingest.arrays import inputs_of
+from sysid.ingest.arrays import inputs_of, level_of
 from sysid.ingest.frames import as_array
 from sysid.models import Cascade, History, Start
 from sysid.models.curve_values import curve_values
@@ -218,7 +218,8 @@ class Fit(FitResult):
         return compare(self.traces, self, start=self.start)
 
     def _inputs(self, u: Any) -> NDArray[np.float64]:
-        return inputs_of(u, self.model.mapping.inputs, sample_time=self.model.sample_time)
+        model = self.model
+        return inputs_of(u, model.mapping.inputs, sample_time=model.sample_time, units=model.ends.units)
 
     def _outputs(self, y: Any) -> NDArray[np.float64]:
         output = np.asarray(as_array(y), dtype=np.float64)
@@ -229,7 +230,16 @@ class Fit(FitResult):
         if initial is None or isinstance(initial, History):
             return initial
         if isinstance(initial, tuple):
-            return History(inputs=inputs_of(initial[0], model.mapping.inputs), output=self._outputs(initial[1]))
+            before = self._outputs(initial[1])
+            if not np.isfinite(before).all():
+                raise TraceError(
+                    "a sample before the first is missing",
+                    where="initial",
+                    expected="finite numbers: a run goes on from them",
+                    got="nan or infinity",
+                    remedy="give the samples after the last one that is missing, or one number",
+                )
+            return History(inputs=inputs_of(initial[0], model.mapping.inputs), output=before)
         if not model.structure.several_outputs and not isinstance(initial, Dict):
             return History.at_rest(inputs=inputs[0], output=level_of(initial))
         names = model.mapping.outputs
@@ -238,19 +248,6 @@ class Fit(FitResult):
         pairs = zip(names, model.ends.rest_outputs, strict=True)
         rest = np.array([level_of(given.get(name, level)) for name, level in pairs])
         return History.at_rest(inputs=inputs[0], output=rest if model.structure.several_outputs else float(rest[0]))
-
-
-def level_of(initial: Any) -> float:
-    """A level that an output has stood at: one finite number."""
-    if np.ndim(initial) == 0 and isinstance(initial, int | float | np.number) and np.isfinite(initial):
-        return float(initial)
-    raise ConfigError(
-        "the output before the first sample is one finite number",
-        where="initial",
-        expected="a number, in the output's unit",
-        got=repr(initial)[:60],
-        remedy="samples before the first are a pair: initial=(u_before, y_before); several outputs are a dict by name",
-    )
 
 
 def check_outputs(given: Iterable[str], names: tuple[str, ...]) -> None:

@@ -11,8 +11,9 @@ import numpy as np
 
 from sysid.errors import ChannelError
 from sysid.export.surrogate import Surrogate
-from sysid.ingest.arrays import inputs_of
+from sysid.ingest.arrays import inputs_of, level_of
 from sysid.models import AbstractModel, Cascade
+from sysid.traces import Trace
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +75,9 @@ class Bundle:
         """Free run of the model over inputs that are in memory.
 
         Args:
-            u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the bundle's order, or a frame
-                or dict with columns by name, in the bundle's units; for a model without input the number of samples.
+            u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the bundle's order, a frame or
+                dict with columns by name, in the bundle's units, or a trace; for a model without input the number of
+                samples.
             initial: Output before the first sample, in its unit, or one for each output by name; the declared levels
                 where nothing is said.
 
@@ -85,23 +87,22 @@ class Bundle:
 
         Raises:
             ChannelError: If an input is missing, or ``initial`` names no output.
-            ConfigError: If an array has another number of columns, its samples are at another distance, or ``initial``
-                says nothing to the model.
+            ConfigError: If an array has another number of columns, its samples are at another distance, a trace is in
+                other units, or ``initial`` is no finite number or says nothing to the model.
         """
         names = tuple(str(entry["name"]) for entry in self.outputs)
         surrogate = Surrogate.of(self.model, {}, outputs=names)
         if surrogate.ticks:
             inputs = np.zeros((len(inputs_of(u, ())), 1))
         else:
-            inputs = inputs_of(
-                u, tuple(str(entry["name"]) for entry in self.inputs), sample_time=self.model.sample_time
-            )
+            units = {str(entry["name"]): str(entry["unit"]) for entry in self.inputs}
+            inputs = inputs_of(u, tuple(units), sample_time=self.model.sample_time, units=units)
         given = dict(initial) if isinstance(initial, Dict) else {} if initial is None else dict.fromkeys(names, initial)
         strangers = [name for name in given if name not in names]
         if strangers:
             raise ChannelError(strangers, names, where="initial")
-        found = surrogate.chosen(surrogate.run_from(inputs, {name: float(level) for name, level in given.items()}))
-        if hasattr(u, "columns") and hasattr(u, "index"):
+        found = surrogate.chosen(surrogate.run_from(inputs, {name: level_of(level) for name, level in given.items()}))
+        if hasattr(u, "columns") and hasattr(u, "index") and not isinstance(u, Trace):
             return type(u)(found, index=u.index, columns=list(names))
         return found[:, 0] if len(names) == 1 else found
 

@@ -21,7 +21,7 @@ from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, Repair
 from sysid.ingest.split import Split, split_traces
 from sysid.ingest.table import RawTable, array_column, by_length, recognise_time
 from sysid.ingest.timing import survey
-from sysid.traces import Channel, Trace, TraceSet
+from sysid.traces import Channel, Trace, TraceSet, check_units
 from sysid.units import Reference, check_unit
 from sysid.yaml_files import check
 
@@ -162,20 +162,28 @@ def _columns(
     return _of_matrix(_two_dimensional(one, where=where), inputs, outputs, where=where)
 
 
-def inputs_of(values: Any, names: tuple[str, ...], *, sample_time: float | None = None) -> NDArray[np.float64]:
+def inputs_of(
+    values: Any,
+    names: tuple[str, ...],
+    *,
+    sample_time: float | None = None,
+    units: Mapping[str, str] | None = None,
+) -> NDArray[np.float64]:
     """Inputs as a matrix in a mapping's order.
 
     Args:
         values: An array, a frame, a dict of columns, or a trace; for a model without input the number of samples.
         names: The inputs.
         sample_time: Of the model, in seconds: a trace, and a frame whose index or column is time, must have it.
+        units: Of the model's channels: a trace, whose channels have units, must be in them.
 
     Returns:
         Shape ``(n_samples, n_inputs)``, float64.
 
     Raises:
         ChannelError: If one is missing.
-        ConfigError: If an array has another number of columns, or the samples are at another distance.
+        ConfigError: If an array has another number of columns, the samples are at another distance, or a trace is in
+            other units.
         TraceError: If a value is missing or not finite.
     """
     where = "the inputs of a simulation"
@@ -183,7 +191,9 @@ def inputs_of(values: Any, names: tuple[str, ...], *, sample_time: float | None 
         return np.zeros((values, 0))
     if isinstance(values, Trace):
         _check_step(values.sample_time, sample_time, where=where)
-        return values.columns(names)
+        found = values.columns(names)
+        check_units({name: unit for name, unit in (units or {}).items() if name in names}, values)
+        return found
     named = columns_by_name(values, where=where)
     if named is None:
         array = as_array(values)
@@ -219,6 +229,29 @@ def inputs_of(values: Any, names: tuple[str, ...], *, sample_time: float | None 
             remedy="fill them before, for example frame.interpolate() or frame.ffill()",
         )
     return found
+
+
+def level_of(initial: Any) -> float:
+    """A level that an output has stood at before a run.
+
+    Args:
+        initial: What was given.
+
+    Returns:
+        The number.
+
+    Raises:
+        ConfigError: If it is not one finite number.
+    """
+    if np.ndim(initial) == 0 and isinstance(initial, int | float | np.number) and np.isfinite(initial):
+        return float(initial)
+    raise ConfigError(
+        "the output before the first sample is one finite number",
+        where="initial",
+        expected="a number, in the output's unit",
+        got=repr(initial)[:60],
+        remedy="samples before the first are a pair: initial=(u_before, y_before); several outputs are a dict by name",
+    )
 
 
 def _check_step(step: float, sample_time: float | None, *, where: str) -> None:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from sysid.errors import ConfigError
-from sysid.traces import Trace
-from sysid.units import is_same_unit
+from sysid.traces import Trace, check_units
 
 
 class HasEnds(Protocol):
@@ -70,17 +69,7 @@ def check_record(units: Mapping[str, str], sample_time: float, trace: Trace) -> 
             got=f"{trace.sample_time:g} s",
             remedy="a model holds at its own sample time: resample the record at ingest (grid), or fit it anew",
         )
-    there = {channel.name: channel.unit for channel in trace.channels}
-    for name, unit in units.items():
-        if name in there and not is_same_unit(there[name], unit):
-            raise ConfigError(
-                "the record has a channel in another unit than the model",
-                where=f"trace {trace.name}, channel {name}",
-                expected=unit,
-                got=there[name],
-                remedy=f"read it in {unit}: units={{{name!r}: {unit!r}}} of sysid.data takes the numbers as they are, "
-                "the channel's unit in a dataset.yaml converts them",
-            )
+    check_units(units, trace)
 
 
 def read_now(inputs: Sequence[str], lags: Sequence[Sequence[int]]) -> frozenset[str]:

@@ -199,3 +199,18 @@ def test_a_structure_with_several_outputs_is_saved_as_one_model(whole: sysid.Fit
     assert_allclose(bundle.simulate(U), whole.simulate(U), atol=1e-9)
     again = sysid.read_bundle(tmp_path / "bundle")
     assert_array_equal(again.simulate(U, initial={"y": 0.3}), bundle.simulate(U, initial={"y": 0.3}))
+
+
+def test_a_trace_in_other_units_is_no_input() -> None:
+    """Its numbers would be taken for others: a thousand volts for one."""
+    (same,) = sysid.data((U, Y), sample_time=0.1, units={"u": "V"})
+    fit = sysid.fit(same, "u -> y", ORDERS)
+    assert_array_equal(fit.simulate(same), fit.simulate(U))
+    (other,) = sysid.data((1000.0 * U, Y), sample_time=0.1, units={"u": "mV"})
+    with pytest.raises(ConfigError, match="in another unit than the model"):
+        fit.simulate(other)
+
+
+def test_samples_before_a_run_are_numbers(fit: sysid.Fit) -> None:
+    with pytest.raises(TraceError, match="a sample before the first is missing"):
+        fit.simulate(U, initial=(U[:3], [0.0, float("nan"), 0.0]))

@@ -296,3 +296,18 @@ def test_a_model_too_fine_for_float_is_still_exported_in_double(fit, traces, sta
             tolerance=1e-9,
             tolerance_float32=1e-9,
         )
+
+
+def test_a_trace_runs_in_the_units_of_the_bundle_alone(bundle, traces):
+    trace = traces.traces[0]
+    names = [entry["name"] for entry in bundle.inputs]
+    assert np.array_equal(bundle.simulate(trace), bundle.simulate(trace.columns(names)))
+    other = tuple(replace(one, unit="kA") if one.name == names[0] else one for one in trace.channels)
+    with pytest.raises(ConfigError, match="in another unit than the model"):
+        bundle.simulate(replace(trace, channels=other))
+
+
+@pytest.mark.parametrize("initial", [float("nan"), float("inf"), "5"])
+def test_a_level_that_is_no_number_is_refused(bundle, traces, initial):
+    with pytest.raises(ConfigError, match="one finite number"):
+        bundle.simulate(traces.traces[0], initial=initial)
