@@ -59,7 +59,7 @@ class Race:
         iterations: Of the search; ``None`` where time is.
         workers: Who train side by side.
         clock: Seconds that the search has taken, over all its sessions.
-        kept: Share of the time that is left to the last fit in any case.
+        kept: Share of the time by whose beginning a look at more than two has to be over.
         in_it: Numbers of those that were trained on.
     """
 
@@ -85,10 +85,14 @@ class Race:
             took.
         """
         best, spent = {trial.number: trial for trial in trials}, 0.0
+        rungs: tuple[float, ...] = RACE
         alive = self._finalists(trials)
-        for share in RACE if len(alive) > 2 else RACE[1:]:
+        if len(alive) <= 2 or not self._in_time([self.points[number] for number in alive], RACE[0]):
+            # Trials that have overrun, as under load, are those whose order says least: two go on in any case.
+            alive, rungs = alive[:2], RACE[1:]
+        for share in rungs:
             points = [self.points[number] for number in alive]
-            if len(points) < 2 or not self._in_time(points, share):
+            if len(points) < 2:
                 break
             spent += share
             self.in_it.update(alive)
@@ -125,7 +129,7 @@ class Race:
         return {**FURTHER, "max_time_s": round(seconds, 3)}
 
     def _in_time(self, points: Sequence[Point], share: float) -> bool:
-        """Whether the last fit keeps its time; what was done by an earlier session takes none."""
+        """Whether there is time for a look at all; what was done by an earlier session takes none."""
         if self.wall_s is None or self.clock() + share * self.wall_s <= (1.0 - self.kept) * self.wall_s:
             return True
         return self.driver.is_stored_on(points, partial(self._options, share, len(points)))

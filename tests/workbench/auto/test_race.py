@@ -1,4 +1,4 @@
-"""The best networks are trained on side by side: who comes from behind is chosen, and the last fit keeps its time."""
+"""The best networks are trained on side by side: who comes from behind is chosen, at a known price."""
 
 from __future__ import annotations
 
@@ -118,12 +118,19 @@ def test_of_what_stays_within_the_tolerance_on_more_traces_a_mean_says_nothing()
     assert ranked_by(error, 0.01)(tried(3, math.inf)) > ranked_by(error, 0.01)(less)
 
 
-def test_the_last_fit_keeps_its_time() -> None:
+def test_each_is_trained_on_for_its_share_of_the_time() -> None:
     trials = [tried(1, 1.0), tried(2, 2.0)]
     track = Track(lambda number, look: 1.0 / look / number)
     _, _, spent = raced(track, trials, wall_s=100.0)
     assert spent == pytest.approx(0.12)
     # Two workers train two networks side by side: each has all of the share.
     assert [[one["max_time_s"] for one in options] for _, options in track.looks] == [[12.0, 12.0]]
-    late = Track(lambda *_: 0.0)
-    assert raced(late, trials, wall_s=100.0, at=0.75)[2] == 0.0
+
+
+def test_where_trials_have_overrun_the_two_best_go_on_all_the_same() -> None:
+    trials = [tried(number, float(number)) for number in range(1, NETWORKS + 1)]
+    late = Track(lambda number, _: 0.1 / number)
+    _, found, spent = raced(late, trials, wall_s=100.0, at=0.75)
+    assert [numbers for numbers, _ in late.looks] == [[1, 2]]
+    assert spent == pytest.approx(0.12)
+    assert [one.selection_free_run_mse for one in found[:3]] == [0.1, 0.05, 3.0]
