@@ -6,6 +6,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+BLOCK, LAGS, LONGER = 2**17, 2**14, 8
+"""Samples of a block of a long residual; lags that are looked at first, and how many times more of them then."""
+
 
 def correlation_time(residual: NDArray[np.float64]) -> float:
     r"""Integrated autocorrelation time of a residual, in samples.
@@ -26,11 +29,28 @@ def correlation_time(residual: NDArray[np.float64]) -> float:
         (True, True)
     """
     n = len(residual)
-    size = scipy.fft.next_fast_len(2 * n, real=True)
-    spectrum = np.abs(scipy.fft.rfft(residual, size)) ** 2
-    covariance = scipy.fft.irfft(spectrum, size)[:n]
-    if not covariance[0] > 0.0 or not np.isfinite(covariance[0]):
-        return 1.0
-    tau = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
-    inside = np.arange(n) >= 5.0 * tau
-    return float(max(1.0, tau[int(np.argmax(inside))] if inside.any() else tau.max()))
+    lags = n if n <= BLOCK else LAGS
+    while True:
+        tau = _covariance(residual, lags)
+        if not tau[0] > 0.0 or not np.isfinite(tau[0]):
+            return 1.0
+        tau = 2.0 * np.cumsum(tau / tau[0]) - 1.0
+        inside = np.arange(lags) >= 5.0 * tau
+        if inside.any() or lags == n:
+            return float(max(1.0, tau[int(np.argmax(inside))] if inside.any() else tau.max()))
+        lags = min(LONGER * lags, n)
+
+
+def _covariance(residual: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
+    """Sums of the products of samples so far apart, shape ``(lags,)``.
+
+    In blocks: of a million samples one transform has some 50 MB, and a fit takes one in every iteration.
+    """
+    total, block = np.zeros(lags), max(BLOCK, lags)
+    for first in range(0, len(residual), block):
+        here, ahead = residual[first : first + block], residual[first : first + block + lags - 1]
+        size = scipy.fft.next_fast_len(len(here) + max(len(ahead), lags), real=True)
+        spectrum = scipy.fft.rfft(ahead, size)
+        spectrum *= np.conj(scipy.fft.rfft(here, size)) if len(here) < len(ahead) else np.conj(spectrum)
+        total += scipy.fft.irfft(spectrum, size)[:lags]
+    return total

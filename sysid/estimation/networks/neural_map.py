@@ -17,6 +17,8 @@ Limits: one linear map cannot give both of a strongly nonlinear plant. Several s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,10 +48,14 @@ def learnt_map(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[
         return theta
     width = provider.template.sizes.inputs + provider.template.sizes.outputs + 1
     square, across = np.zeros((width, width)), np.zeros((width, provider.template.sizes.states))
-    for z, x in (_visited(provider, theta), _equilibria(provider, theta)):
-        if len(z):
-            square += z.T @ z / len(z)
-            across += z.T @ x / len(z)
+    for pairs in (_visited(provider, theta), _equilibria(provider, theta)):
+        own, joint, counted = np.zeros_like(square), np.zeros_like(across), 0
+        for z, x in pairs:
+            own += z.T @ z
+            joint += z.T @ x
+            counted += len(z)
+        square += own / max(counted, 1)
+        across += joint / max(counted, 1)
     if not np.isfinite(square).all() or not np.isfinite(across).all():
         return theta
     found = theta.copy()
@@ -57,23 +63,27 @@ def learnt_map(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[
     return found
 
 
-def _visited(provider: NeuralProvider, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Samples that count as the map reads them, and the states before them."""
-    samples, states = [], []
-    for (u, y), counts, path in zip(provider.signals, provider.counted, provider.states(theta), strict=True):
-        samples.append(np.column_stack([u, y, np.ones(len(u))])[counts])
-        states.append(path[counts])
-    return np.concatenate(samples), np.concatenate(states)
+Pairs = Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]
+"""Some samples as the map reads them, and the states before them."""
 
 
-def _equilibria(
-    provider: NeuralProvider, theta: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _visited(provider: NeuralProvider, theta: NDArray[np.float64]) -> Pairs:
+    """Samples that count and states of the records, in blocks."""
+    for (u, y), counts, blocks in zip(provider.signals, provider.counted, provider.paths(theta), strict=True):
+        for rows, path in blocks:
+            kept = counts[rows]
+            yield np.column_stack([u[rows], y[rows], np.ones(len(path))])[kept], path[kept]
+
+
+def _equilibria(provider: NeuralProvider, theta: NDArray[np.float64]) -> Pairs:
     """Inputs of the records and the outputs at which the model settles with them, and the states there."""
     form: NeuralForm = provider.at(theta)
-    inputs = np.concatenate([u for u, _ in provider.signals])
+    records = [u for u, _ in provider.signals]
+    ends = np.cumsum([len(u) for u in records])
     samples, states = [], []
-    for u in inputs[np.linspace(0, len(inputs) - 1, HELD).astype(np.int64)]:
+    for place in np.linspace(0, ends[-1] - 1, HELD).astype(np.int64):
+        of = int(np.searchsorted(ends, place, side="right"))
+        u = records[of][place - ends[of]]
         x, n = np.zeros(form.sizes.states), 64
         while n <= LONGEST:
             form.run(np.tile(u, (n, 1)), x)
@@ -86,4 +96,4 @@ def _equilibria(
                 break
             n *= 2
     width = form.sizes.inputs + form.sizes.outputs + 1
-    return np.reshape(samples, (-1, width)), np.reshape(states, (-1, form.sizes.states))
+    yield np.reshape(samples, (-1, width)), np.reshape(states, (-1, form.sizes.states))

@@ -146,8 +146,26 @@ class NeuralProvider(AbstractProvider):
         Returns:
             One array of shape ``(n_samples, n_states)`` per record.
         """
+        return tuple(np.concatenate([path for _, path in blocks]) for blocks in self.paths(theta))
+
+    def paths(self, theta: NDArray[np.float64]) -> Iterator[Iterator[tuple[slice, NDArray[np.float64]]]]:
+        """The states of :meth:`states` in blocks, so that no record's lie side by side.
+
+        Args:
+            theta: Flat parameters.
+
+        Yields:
+            For each record its blocks: which samples, and the states before them.
+        """
         form = self.at(theta)
-        return tuple(form.path(record.u, self._begin(record, theta)) for record in self._records)
+
+        def blocks(record: _Record) -> Iterator[tuple[slice, NDArray[np.float64]]]:
+            x = self._begin(record, theta)
+            for first in range(0, len(record.u), BLOCK):
+                rows = slice(first, min(first + BLOCK, len(record.u)))
+                yield rows, form.path(record.u[rows], x)
+
+        yield from map(blocks, self._records)
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""

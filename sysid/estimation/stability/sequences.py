@@ -168,7 +168,7 @@ class Excursions(AbstractSequences):
     _to_plateau: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        rows = np.concatenate(self.records)
+        rows = self.records[0] if len(self.records) == 1 else np.concatenate(self.records)
         span = np.ptp(rows, axis=0)
         scale = np.where(span > 0.0, span, 1.0)
         slopes, left, still = [], [], []
@@ -185,9 +185,13 @@ class Excursions(AbstractSequences):
             ends = [np.zeros_like(flags) for flags in still]
         reach = [_next(flags) for flags in ends]
         firsts = np.cumsum([0, *(len(record) for record in self.records[:-1])])
-        moves = np.concatenate(slopes)
-        largest = np.abs(moves).max(axis=0)
-        features = np.hstack([rows / scale, 0.5 * moves / np.where(largest > 0.0, largest, 1.0)])
+        width = rows.shape[1]
+        features = np.empty((len(rows), 2 * width))
+        np.divide(rows, scale, out=features[:, :width])
+        moves = np.concatenate(slopes, out=features[:, width:])
+        del slopes
+        largest = np.maximum(moves.max(axis=0), -moves.min(axis=0))
+        moves /= np.where(largest > 0.0, 2.0 * largest, 2.0)
         object.__setattr__(self, "_rows", rows)
         object.__setattr__(self, "_features", features)
         object.__setattr__(self, "_left", np.concatenate(left))
@@ -204,7 +208,8 @@ class Excursions(AbstractSequences):
         """What the sequences depend on, beside their seed and number and which columns are inputs."""
         content = hashlib.blake2b(repr((self.samples, self.passage, self.hold, self.warp)).encode())
         for record in self.records:
-            content.update(repr(record.shape).encode() + record.astype("<f8", copy=False).tobytes())
+            content.update(repr(record.shape).encode())
+            content.update(np.ascontiguousarray(record, dtype="<f8").data)
         return content.digest()
 
     @cached_property
@@ -421,9 +426,13 @@ def _plateaus(scaled: NDArray[np.float64], window: int) -> NDArray[np.bool_]:
     # The filter at t looks from t - size // 2 on; the window that ends at s is that of the filter a lead before s.
     size = min(window, len(scaled) - 1) + 1
     lead = size - 1 - size // 2
-    spread = scipy.ndimage.maximum_filter1d(scaled, size, axis=0) - scipy.ndimage.minimum_filter1d(scaled, size, axis=0)
+    stands = np.ones(len(scaled), dtype=bool)
+    for column in scaled.T:
+        spread = scipy.ndimage.maximum_filter1d(column, size)
+        spread -= scipy.ndimage.minimum_filter1d(column, size)
+        stands &= spread <= STILL
     still = np.zeros(len(scaled), dtype=bool)
-    still[window:] = np.all(spread <= STILL, axis=1)[window - lead : len(scaled) - lead]
+    still[window:] = stands[window - lead : len(scaled) - lead]
     return still
 
 
