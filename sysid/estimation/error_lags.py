@@ -74,7 +74,9 @@ def _elsewhere(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j
     before = f"{lag} sample{'s' if lag > 1 else ''} before"
     moves = f"{100 * share:.0f} % of what is new in {target} moves with {name} of {before},"
     if first is None:
-        deaf = share > 0.0 and _deaf(model, run, j, i)
+        # What it leaves out must be in its error: not so of an input that goes with another which it has.
+        left = _lag(error, run.inputs[:, j], run.usable, slice(0, 1))[1] if share > 0.0 else 0.0
+        deaf = left > 0.0 and _deaf(model, run, j, i)
         return [f"{moves} and in the model {target} does not depend on {name}. {_begin(model, lag, lag)}"] * deaf
     own = slice(first, first + LAGS + 1)
     if share <= 0.0 or lag in range(own.start, own.stop) or not _lag(error, run.inputs[:, j], run.usable, own)[1]:

@@ -211,6 +211,15 @@ def test_an_input_that_the_model_let_go_is_told_with_its_dead_time() -> None:
     assert "y does not depend on u. Begin there (input_delays from 30)," in told
 
 
+def test_an_input_that_goes_with_another_is_no_input_let_go() -> None:
+    u = _u()
+    both = np.column_stack([u, u + 1e-4 * np.random.default_rng(3).standard_normal(N)])
+    (trace,) = sysid.data((both, _noisy(_y(u, dead=1))), sample_time=1.0)
+    grey = sysid.GreyBox(equations="x[k+1] = 0.9*x + 0.1*u1; y = g*x", parameters={"g": 0.5})
+    told = sysid.fit(trace, "u1+u2 -> y", grey, stability=sysid.StabilityOptions(count=0)).warnings
+    assert not [note for note in told if "does not depend" in note]
+
+
 def test_a_dead_time_that_is_too_long_is_told_with_the_right_one() -> None:
     u = _u()
     for structure in (sysid.ARX(na=1, nb=1, nk=12), sysid.OE(nb=1, nf=1, nk=12)):
