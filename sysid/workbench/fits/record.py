@@ -168,7 +168,7 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: Tr
         "status": fit.status.name,
         "seed": fit.seed,
         "initial": ready.config.initial,
-        "notes": [*fit.notes, *further],
+        "notes": [*further, *fit.notes],
         "warnings": [*fit.warnings, *further],
         "evidence": stored["evidence"],
         "attempts": stored["attempts"],
