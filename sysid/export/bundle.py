@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
 from sysid.export.surrogate import Surrogate
@@ -71,7 +73,7 @@ class Bundle:
         """The same of each output; before version 3 there was one."""
         return tuple(self.metadata.get("outputs") or [self.metadata["output"]])
 
-    def simulate(self, u: Any, *, initial: float | Dict[str, float] | None = None) -> Any:
+    def simulate(self, u: Any, *, initial: float | Dict[str, float] | None = None, warn: bool = True) -> Any:
         """Free run of the model over inputs that are in memory.
 
         Args:
@@ -80,6 +82,7 @@ class Bundle:
                 samples.
             initial: Output before the first sample, in its unit, or one for each output by name; the declared levels
                 where nothing is said.
+            warn: Whether inputs beyond their declared ranges are told, by an :class:`OutsideRangeWarning`.
 
         Returns:
             For a pandas frame a frame of the outputs with the same index; else an array of shape ``(n_samples,)``, or
@@ -97,6 +100,9 @@ class Bundle:
         else:
             units = {str(entry["name"]): str(entry["unit"]) for entry in self.inputs}
             inputs = inputs_of(u, tuple(units), sample_time=self.model.sample_time, units=units)
+            told = self._outside(inputs) if warn else ""
+            if told:
+                warnings.warn(told, OutsideRangeWarning, stacklevel=2)
         given = dict(initial) if isinstance(initial, Dict) else {} if initial is None else dict.fromkeys(names, initial)
         strangers = [name for name in given if name not in names]
         if strangers:
@@ -105,6 +111,23 @@ class Bundle:
         if hasattr(u, "columns") and hasattr(u, "index") and not isinstance(u, Trace):
             return type(u)(found, index=u.index, columns=list(names))
         return found[:, 0] if len(names) == 1 else found
+
+    def _outside(self, inputs: NDArray[np.float64]) -> str:
+        """A sentence on the inputs that are beyond their declared ranges; empty where none is."""
+        told = []
+        for column, entry in zip(inputs.T, self.inputs, strict=True):
+            low, high = entry["range"] or (-np.inf, np.inf)
+            share = float(np.mean((column < low) | (column > high)))
+            if share:
+                unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
+                told.append(
+                    f"{entry['name']} is beyond {low:g} to {high:g}{unit} in {100.0 * share:.3g} % of the samples"
+                )
+        return f"{'; '.join(told)}: nothing there was fitted, and the accuracy is unknown" if told else ""
+
+
+class OutsideRangeWarning(UserWarning):
+    """Inputs that are beyond what a bundle was made from, so that nobody knows how accurate its answer is."""
 
 
 def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:

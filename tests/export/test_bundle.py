@@ -14,6 +14,7 @@ import pytest
 
 from sysid.errors import ChannelError, ConfigError, ParityError
 from sysid.export import EXPORTERS, export_bundle, read_bundle
+from sysid.export.bundle import OutsideRangeWarning
 from sysid.models import NARX, History
 from sysid.traces import TraceSet
 from sysid.validation import evaluate
@@ -305,6 +306,16 @@ def test_a_trace_runs_in_the_units_of_the_bundle_alone(bundle, traces):
     other = tuple(replace(one, unit="kA") if one.name == names[0] else one for one in trace.channels)
     with pytest.raises(ConfigError, match="in another unit than the model"):
         bundle.simulate(replace(trace, channels=other))
+
+
+def test_inputs_beyond_what_was_fitted_are_told(bundle, traces):
+    names = [entry["name"] for entry in bundle.inputs]
+    u = traces.traces[0].columns(names)
+    far = u.copy()
+    far[:5, 0] = 1000.0 * np.abs(u).max()
+    with pytest.warns(OutsideRangeWarning, match=f"{names[0]} is beyond .* in {100 * 5 / len(u):.3g} % of the samples"):
+        told = bundle.simulate(far)
+    assert np.array_equal(told, bundle.simulate(far, warn=False))
 
 
 @pytest.mark.parametrize("initial", [float("nan"), float("inf"), "5"])

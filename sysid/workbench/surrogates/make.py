@@ -315,7 +315,10 @@ def beginning_of(bundle: Bundle, traces: Sequence[Trace]) -> list[str]:
     names = [str(entry["name"]) for entry in bundle.outputs]
     inputs = [str(entry["name"]) for entry in bundle.inputs]
     off = [
-        np.abs(np.asarray(bundle.simulate({name: trace[name][:2] for name in inputs})).reshape(2, -1) - measured)[0]
+        np.abs(
+            np.asarray(bundle.simulate({name: trace[name][:2] for name in inputs}, warn=False)).reshape(2, -1)
+            - measured
+        )[0]
         for trace in traces
         for measured in [trace.columns(names)[:2]]
     ]
