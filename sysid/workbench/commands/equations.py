@@ -6,6 +6,7 @@ import sys
 
 from sysid.errors import ConfigError
 from sysid.workbench.fits.config import find_pipeline
+from sysid.workbench.kinds import DEFAULT
 
 
 def equations_command(pipeline: str) -> None:
@@ -24,13 +25,14 @@ def equations_command(pipeline: str) -> None:
 
     path = find_pipeline(pipeline)
     joined = read_joined(path)
-    fixed = check(AssemblyConfig, joined.data, where=joined.origins).composite.fixed
+    kind = joined.data.get("kind", DEFAULT)
+    fixed = check(AssemblyConfig, joined.data, where=joined.origins).composite.fixed if kind == "assembly" else ()
     if not fixed:
         raise ConfigError(
             "nothing is fixed in the pipeline",
             where=path,
             expected="a pipeline of kind assembly with fixed",
-            got="fixed: none",
-            remedy="add what is known: docs/assemblies.md",
+            got="fixed: none" if kind == "assembly" else f"kind: {kind}",
+            remedy="name an assembly, and add what is known to it: docs/assemblies.md",
         )
     sys.stdout.write(equations_text(fixed))

@@ -81,6 +81,10 @@ def test_the_command_prints_what_is_read_as_the_same(tmp_path, capsys):
     config(tmp_path, PIPELINE)
     with pytest.raises(ConfigError, match="nothing is fixed"):
         equations_command(str(tmp_path / "tanks.yaml"))
+    (tmp_path / "fits.yaml").write_text("name: fits\ndata: tanks\nmapping: u -> y\nfits: []\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="nothing is fixed") as refused:
+        equations_command(str(tmp_path / "fits.yaml"))
+    assert refused.value.got == "kind: fits"
 
 
 BUILT_IN = [
