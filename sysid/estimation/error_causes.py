@@ -8,11 +8,11 @@ that the model leaves out, nothing of the inputs at all, and an error that lasts
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal, special
 
 from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.informative import informative, unit
+from sysid.estimation.informative import by_chance, informative, unit, with_past
 from sysid.estimation.input_features import CURVES, LINEAR, PLAYS, features
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.models import AbstractModel
@@ -104,7 +104,7 @@ def _lone(y: Array, s: Array, usable: Mask) -> Mask:
 
 
 def _off_neighbours(x: Array) -> Array:
-    return np.asarray(x - signal.medfilt(x, 3), dtype=np.float64)
+    return np.asarray(x - scipy.signal.medfilt(x, 3), dtype=np.float64)
 
 
 def _of_lone(error: Array, lone: Mask, usable: Mask, name: str) -> str:
@@ -205,8 +205,7 @@ def _moves_with(y: Array, s: Array, usable: Mask, parameters: int) -> bool:
 
     Both are taken less what the error's own past says of them, which leaves an error that is news at every sample.
     """
-    whole = np.all([np.roll(usable, lag) for lag in range(OWN_PAST + 1)], axis=0)
-    whole[:OWN_PAST] = False
+    whole = with_past(usable, OWN_PAST)
     y, s = y - y[usable].mean(), s - s[usable].mean()
     past = [np.column_stack([np.roll(x, lag) for lag in range(1, OWN_PAST + 1)])[whole] for x in (y - s, y, s)]
     weights = np.linalg.lstsq(past[0], (y - s)[whole], rcond=None)[0]
@@ -215,9 +214,7 @@ def _moves_with(y: Array, s: Array, usable: Mask, parameters: int) -> bool:
     if not product > 0.0:
         return False
     share, used = product**2, max(1, min(parameters, len(new) // 4))
-    free = max(1, len(new) - used)
-    ratio = share / used * free / max(1.0 - share, float(np.finfo(np.float64).eps))
-    return bool(special.fdtrc(used, free, ratio) < BY_CHANCE)
+    return by_chance(share, used, max(1, len(new) - used)) < BY_CHANCE
 
 
 def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[str, Array], usable: Mask) -> str:

@@ -7,7 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.informative import SAME, informative, unit
+from sysid.estimation.informative import SAME, by_chance, informative, unit, with_past
 from sysid.models import AbstractModel
 
 LAGS = 5
@@ -160,7 +160,7 @@ def _lag(
 
     What is new in each is what its own past leaves; masked samples, and those that follow them, count as nothing.
     """
-    whole = _whole(usable)
+    whole = with_past(usable, LAGS)
     left, new = (_innovations(x, whole) for x in (target, column))
     most = len(left) // 3
     if whole.sum() < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(column[whole]):
@@ -169,7 +169,7 @@ def _lag(
     shares = both[len(left) - 1 : len(left) - 1 + most] ** 2
     shares[but] = 0.0
     share, free = float(shares.max()), int(whole.sum()) - LAGS - 2
-    if share <= ELSEWHERE or most * _by_chance(share, free) >= SURE:
+    if share <= ELSEWHERE or most * by_chance(share, 1, free) >= SURE:
         return 0, 0.0
     lag = int(np.flatnonzero(shares >= FIRST * share)[0])
     return lag, share
@@ -187,7 +187,7 @@ def _innovations(x: NDArray[np.float64], whole: NDArray[np.bool_]) -> NDArray[np
 def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usable: NDArray[np.bool_]) -> float:
     """The part of the error's innovation that an input of the same sample explains; 0 where chance may do it."""
     past = [np.roll(column, lag) for column in (error, *inputs.T) for lag in range(1, LAGS + 1)]
-    whole = _whole(usable)
+    whole = with_past(usable, LAGS)
     base = np.column_stack([*past, np.ones(len(error))])[whole]
     basis, _ = np.linalg.qr(unit(base))
     left, new = (x[whole] - basis @ (basis.T @ x[whole]) for x in (error, inputs[:, j]))
@@ -196,20 +196,8 @@ def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usab
         return 0.0
     # Of length 1 first: the square of a free run that grows without bound is no number.
     share = float(_direction(left) @ _direction(new)) ** 2
-    return share if share > SHARE and _by_chance(share, free) < SURE else 0.0
-
-
-def _whole(usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Samples that are not masked, nor any of the last ones before them."""
-    whole = np.all([np.roll(usable, lag) for lag in range(LAGS + 1)], axis=0)
-    whole[:LAGS] = False
-    return np.asarray(whole)
+    return share if share > SHARE and by_chance(share, 1, free) < SURE else 0.0
 
 
 def _direction(x: NDArray[np.float64]) -> NDArray[np.float64]:
     return unit(x[:, np.newaxis])[:, 0]
-
-
-def _by_chance(share: float, free: int) -> float:
-    """How probable it is that one column explains that much of noise (F test with 1 and ``free`` degrees)."""
-    return float(scipy.special.fdtrc(1, free, share * free / max(1.0 - share, float(np.finfo(np.float64).eps))))

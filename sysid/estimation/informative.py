@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 STILL = 8.0 * np.finfo(np.float64).eps
@@ -56,3 +57,33 @@ def unit(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     tiny = float(np.finfo(np.float64).tiny)
     lengths = np.maximum(np.sqrt(np.sum(columns**2, axis=0)), tiny)
     return np.asarray(columns / lengths, dtype=np.float64)
+
+
+def with_past(usable: NDArray[np.bool_], lags: int) -> NDArray[np.bool_]:
+    """Samples that are not masked, nor any of the last ones before them.
+
+    Args:
+        usable: Which are not masked, shape ``(n_samples,)``.
+        lags: How many before.
+
+    Returns:
+        The same shape.
+    """
+    whole = np.all([np.roll(usable, lag) for lag in range(lags + 1)], axis=0)
+    whole[:lags] = False
+    return np.asarray(whole)
+
+
+def by_chance(share: float, used: int, free: int) -> float:
+    """How probable it is that columns explain so much of noise (F test).
+
+    Args:
+        share: The part of its squares that they explain.
+        used: The columns, or the parameters that they stand for.
+        free: Degrees of freedom that are left.
+
+    Returns:
+        The probability.
+    """
+    left = max(1.0 - share, float(np.finfo(np.float64).eps))
+    return float(scipy.special.fdtrc(used, free, share / used * free / left))

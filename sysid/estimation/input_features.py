@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def _slowed(x: Array, memory: float) -> Array:
     """What follows a signal with a time constant, from the next sample on, settled at its first value."""
     pole = float(np.exp(-1.0 / memory))
     late = _late(x)
-    out, _ = signal.lfilter([1.0 - pole], [1.0, -pole], late, axis=0, zi=pole * late[:1])
+    out, _ = scipy.signal.lfilter([1.0 - pole], [1.0, -pole], late, axis=0, zi=pole * late[:1])
     return np.asarray(out, dtype=np.float64)
 
 

@@ -116,7 +116,7 @@ class Bundle:
         """A sentence on the inputs that are beyond their declared ranges; empty where none is."""
         told = []
         for column, entry in zip(inputs.T, self.inputs, strict=True):
-            low, high = entry["range"] or (-np.inf, np.inf)
+            low, high = entry.get("range") or (-np.inf, np.inf)
             share = float(np.mean((column < low) | (column > high)))
             if share:
                 unit = "" if entry["unit"] == "1" else f" {entry['unit']}"

@@ -36,8 +36,18 @@ def number(value: float, *, digits: int = 3, missing: str = "not defined") -> st
         # A narrow space between thousands, which is not a decimal sign in any language.
         text = f"{rounded:,.0f}".replace(",", "\u202f") if power >= 4 else text
     else:
-        text = f"{mantissa}\u00a0×\u00a010{str(power).translate(_SUPERSCRIPT)}"
+        text = f"{mantissa}\u00a0×\u00a010{superscript(power)}"
     return text.replace("-", "−")
+
+
+def superscript(power: int) -> str:
+    """A whole number as it stands above the line.
+
+    Example:
+        >>> superscript(-12)
+        '⁻¹²'
+    """
+    return str(power).translate(_SUPERSCRIPT)
 
 
 def quantity(value: float, unit: str, *, digits: int = 3, missing: str = "not defined") -> str:

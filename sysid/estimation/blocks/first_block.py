@@ -19,9 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
 from sysid.estimation.blocks.sections import LARGEST_POLE, Block, Pair, block_of, samples_for, sections_of
 
@@ -134,11 +133,11 @@ def _behind(z: Array, y: Array, second: int, *, rounds: int = ROUNDS) -> _Rest |
     powers = [between**k for k in range(1, POWERS + 1)]
     first, n, A = round(SETTLED * len(y)), second, np.eye(1, second + 1)[0]
     for _ in range(rounds):
-        filtered = lfilter([1.0], A, [y, *powers, np.ones(len(y))])
+        filtered = scipy.signal.lfilter([1.0], A, [y, *powers, np.ones(len(y))])
         rows = np.column_stack([_lagged(-filtered[0], n)[:, 1:], *(_lagged(one, n) for one in filtered[1:-1])])
         found = np.linalg.lstsq(np.column_stack([rows, filtered[-1]])[first:], filtered[0][first:], rcond=None)[0]
         A = _stable(np.concatenate([[1.0], found[:n]]))
-    filtered = lfilter([1.0], A, powers)
+    filtered = scipy.signal.lfilter([1.0], A, powers)
     rows = np.column_stack([*(_lagged(one, n) for one in filtered), np.ones(len(y))])
     found = np.linalg.lstsq(rows[first:], y[first:], rcond=None)[0]
     residual = (rows @ found - y)[first:]
@@ -194,7 +193,7 @@ def _moved(block: Block, w: Array, y: Array, second: int, direct: Sequence[bool]
         return np.full(length, FAR) if rest is None else rest.residual
 
     begun = np.concatenate([*map(np.array, block.sections), block.gains.ravel(), block.direct])
-    return of(least_squares(residual, begun, max_nfev=EVALUATIONS, x_scale="jac", diff_step=1e-6).x)
+    return of(scipy.optimize.least_squares(residual, begun, max_nfev=EVALUATIONS, x_scale="jac", diff_step=1e-6).x)
 
 
 def _inside(section: tuple[float, ...]) -> bool:
@@ -214,7 +213,7 @@ def _pair(before: Block, rest: _Rest, w: Array) -> Pair:
     size = slope if abs(slope) > FLAT * spread else spread
     poles = np.roots(rest.denominator).astype(np.complex128)
     impulse = np.eye(1, samples_for(poles))[0]
-    response = size * values[0] * lfilter(right[0], rest.denominator, impulse)
+    response = size * values[0] * scipy.signal.lfilter(right[0], rest.denominator, impulse)
     return Pair(
         before=replace(before, gains=before.gains / span, direct=before.direct / span),
         behind=block_of(poles, response[:, None], direct=True),

@@ -16,6 +16,7 @@ from matplotlib.ticker import Formatter, LogFormatterSciNotation, NullFormatter,
 
 from sysid.names import visible
 from sysid.reporting.figures import palette
+from sysid.reporting.numbers import superscript
 
 PALETTE: Final = palette.PALETTE
 DASHES: Final = ("-", (0, (6, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2)), (0, (3, 1.5)), (0, (8, 2, 1, 2, 1, 2)))
@@ -149,7 +150,6 @@ def _fitting(text: str, length: int) -> str:
 
 
 _NUMBERS: Final = (ScalarFormatter, NullFormatter)
-_SUPERSCRIPT: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _numbers_of(axis: Any) -> set[Text]:
@@ -185,7 +185,7 @@ class _Powers(LogFormatterSciNotation):
     def _words(self, formula: str) -> str:
         plain = re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", formula)
         plain = plain.removesuffix(r"\times10^{0}").replace(r"\times", "×")
-        return re.sub(r"\^\{(-?\d+)\}", lambda found: found[1].translate(_SUPERSCRIPT), plain)
+        return re.sub(r"\^\{(-?\d+)\}", lambda found: superscript(int(found[1])), plain)
 
 
 class _Words(Formatter):
