@@ -13,6 +13,7 @@ from scipy.stats import qmc
 from sysid.excitation import excite
 from sysid.excitation.kinds import KINDS, kind_of
 from sysid.references.config import InputPort, ReferenceConfig
+from sysid.references.coverage import cells, most_seen
 from sysid.references.events import Events
 from sysid.references.runs import Case
 from sysid.yaml_files import FieldError
@@ -85,6 +86,8 @@ class Design(BaseModel):
         hold: Shortest and longest time in seconds at a level; a fiftieth and a tenth of the duration by default.
         lead: Seconds at the start of the inputs before anything moves; one sample at least, half the shortest hold by
             default.
+        among: Random experiments among which each run that is fitted is chosen: that whose inputs add most to where
+            those of the runs before it have been, at present and of late; 1 takes them as they come.
         sampling: How parameters are spread: ``sobol`` or ``latin-hypercube``.
         seed: Of everything random.
     """
@@ -95,6 +98,7 @@ class Design(BaseModel):
     excitations: tuple[Excited, ...] = tuple(Excited(kind=kind) for kind in USUAL)
     hold: tuple[float, float] | None = None
     lead: Annotated[float, Field(ge=0.0)] | None = None
+    among: Annotated[int, Field(ge=1, le=1000)] = 1
     sampling: Literal["sobol", "latin-hypercube"] = "sobol"
     seed: Annotated[int, Field(ge=0)] = 0
 
@@ -135,9 +139,7 @@ def designed(config: ReferenceConfig, design: Design) -> dict[str, list[Case]]:
     """
     counts = {role: getattr(design.runs, role) for role in PREFIX}
     return {
-        role: drawn(
-            config, design, count, seed=(design.seed, place), prefix=PREFIX[role], to_the_ends=role == "estimation"
-        )
+        role: drawn(config, design, count, seed=(design.seed, place), prefix=PREFIX[role], fitted=role == "estimation")
         for place, (role, count) in enumerate(counts.items())
         if count
     }
@@ -150,7 +152,7 @@ def drawn(
     *,
     seed: Sequence[int],
     prefix: str,
-    to_the_ends: bool = False,
+    fitted: bool = False,
 ) -> list[Case]:
     """Some experiments.
 
@@ -160,14 +162,19 @@ def drawn(
         count: How many.
         seed: Of everything random; others give others.
         prefix: Of their names.
-        to_the_ends: Whether both ends of each parameter's range are among its values: a model of what lies between is
-            asked for what lies there, and is worst beyond what it was fitted to.
+        fitted: Whether a model is fitted to them. Both ends of each parameter's range are then among its values: a
+            model of what lies between is asked for what lies there, and is worst beyond what it was fitted to. And each
+            is chosen among as many as the design says.
 
     Returns:
         The experiments.
     """
-    parameters = _spread(config, design, count, np.random.default_rng([*seed, 1]), to_the_ends=to_the_ends)
+    parameters = _spread(config, design, count, np.random.default_rng([*seed, 1]), to_the_ends=fitted)
     seeds = np.random.default_rng([*seed, 2]).integers(2**31, size=count)
+    if fitted and design.among > 1 and config.inputs:
+        seeds = _seeing_most(
+            config, design, np.random.default_rng([*seed, 3]).integers(2**31, size=(count, design.among))
+        )
     width = max(3, len(str(count)))
     cases = []
     for k in range(count):
@@ -183,6 +190,18 @@ def drawn(
             )
         )
     return cases
+
+
+def _seeing_most(config: ReferenceConfig, design: Design, seeds: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Of each row of seeds, one an experiment, that which sees most beside those before it."""
+    ranges = np.array([port.range for port in config.inputs.values()])
+    shortest, longest = design.holds(config.sample_time)
+    kinds = [design.excitations[k % len(design.excitations)] for k in range(len(seeds))]
+    groups = [
+        [cells(moved(config, design, kind, int(seed)), ranges, (shortest, longest)) for seed in row]
+        for kind, row in zip(kinds, seeds, strict=True)
+    ]
+    return seeds[np.arange(len(seeds)), most_seen(groups)]
 
 
 def _spread(

@@ -46,6 +46,9 @@ class Trial(Record):
     reason: str = Field(default="", description="Why it failed.")
     dropped_at: int | None = Field(default=None, description="Rung after which it was dropped, from 1 on.")
     iterations: int = Field(default=0, description="Of all of its training.")
+    iteration_s: Number = Field(
+        default=math.nan, description="Seconds of one iteration of a network's training; null of what has none."
+    )
     seconds: Number = Field(default=math.nan, description="Wall time of all of its training.")
     cpu_s: Number = Field(default=math.nan, description="Processor time of all of its training and scoring.")
     parameters: int = Field(default=0, description="Fitted parameters.")

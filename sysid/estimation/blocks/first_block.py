@@ -14,7 +14,6 @@ singular value.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -23,6 +22,7 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.blocks.sections import LARGEST_POLE, Block, Pair, block_of, samples_for, sections_of
+from sysid.estimation.clock import now
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def searched(
         direct: Of each input whether it is read within the sample.
         slowest: The longest time constant that is drawn, in samples.
         rng: Source of randomness.
-        until: When no more is tried, on the clock of ``time.perf_counter``.
+        until: When no more is tried, on the clock of ``sysid.estimation.clock.now``.
 
     Returns:
         Mean squared errors and the pairs that leave them, the best first.
@@ -81,12 +81,12 @@ def searched(
     tried = [*begun, *(_drawn(begun[0], direct, slowest, rng) for _ in range(DRAWN))]
     ranked: list[tuple[float, int]] = []
     for at, block in enumerate(tried):
-        if ranked and time.perf_counter() > until:
+        if ranked and now() > until:
             break
         ranked.append((_size(_behind(block.filtered(w), y, second, rounds=RANKED)), at))
     found: list[tuple[float, Pair]] = []
     for at in _apart(sorted(ranked))[:MOVED]:
-        if found and time.perf_counter() > until:
+        if found and now() > until:
             break
         block = _moved(tried[at], w, y, second, direct)
         rest = _behind(block.filtered(w), y, second)

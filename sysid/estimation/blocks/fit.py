@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.blocks.equations import hammerstein_wiener, wiener_hammerstein
 from sysid.estimation.blocks.linear_start import LinearStart, integrating_start, linear_start, parted, shifted, whole
+from sysid.estimation.clock import now
 from sysid.estimation.grey_box.fit import built_template, fit_equations
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.result import FitResult
@@ -63,7 +63,7 @@ def fit_hammerstein_wiener(
         ConfigError: If an option does not apply.
         TraceError: If no sample counts, or there is no linear model to start from.
     """
-    began, training = time.perf_counter(), (training or Training()).with_starts(STARTS)
+    began, training = now(), (training or Training()).with_starts(STARTS)
     rectified = structure.output.kind == "absolute"
     begun = _begun(
         traces, mapping, structure, structure.states, start=start, rest_output=rest_output, rectified=rectified,
@@ -105,7 +105,7 @@ def fit_wiener_hammerstein(
 
     The starts are ways to part the best linear model around the curve, the most promising first.
     """
-    began = time.perf_counter()
+    began = now()
     training = (training or Training()).with_starts(STARTS)
     begun = _begun(
         traces, mapping, structure, structure.first + structure.second, start=start, rest_output=rest_output,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -23,6 +22,7 @@ from sysid.estimation.blocks.sections import (
     samples_for,
     sections_of,
 )
+from sysid.estimation.clock import now
 from sysid.estimation.networks.neural_state_space import fit_neural_state_space
 from sysid.estimation.networks.training import Training
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
@@ -196,7 +196,7 @@ def parted(
     Returns:
         The pairs, those that are alike once.
     """
-    until = time.perf_counter() + seconds
+    until = now() + seconds
     found = [
         _judged(*_factors(*way, begun.response, direct, rng), signals)
         for way in _ways(begun.poles, first)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError
 from sysid.estimation.blocks.selection import Chosen, choose_terms
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.grey_box.fit import built_template, fit_equations
 from sysid.estimation.linear.arx import first_output
@@ -70,7 +70,7 @@ def fit_polynomial_narx(
         FitDivergedError: If no number of terms has a free run.
         TraceError: If no sample counts.
     """
-    began = time.perf_counter()
+    began = now()
     training = (training or Training()).with_starts(1)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     start = start or Start()
@@ -180,7 +180,7 @@ def _best(
         price = 0.0 if selection else n * math.log(max(count, 1)) / max(count, 1)
         value = math.log(max(squares / max(count, 1), 1e-300)) + price if math.isfinite(squares) else math.inf
         tried.append(_Candidate(terms=n, grey=grey, criterion=value))
-        if time.perf_counter() > until and math.isfinite(min(one.criterion for one in tried)):
+        if now() > until and math.isfinite(min(one.criterion for one in tried)):
             break
     usable = [one for one in tried if math.isfinite(one.criterion)]
     if not usable:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from sysid.estimation.clock import now
 from sysid.models.polynomial_narx import Term
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ def choose_terms(
         output: Shape ``(n_samples,)``.
         candidates: Products of regressors.
         most: Terms at most.
-        until: When it ends with the terms that it has, on the clock of ``time.perf_counter``.
+        until: When it ends with the terms that it has, on the clock of ``sysid.estimation.clock.now``.
 
     Returns:
         What was chosen.
@@ -92,7 +92,7 @@ def choose_terms(
             along = products(scaled, [candidates[i] for i in part]) @ q
             energy[part] -= along**2
             agreement[part] -= along * shown
-        late = time.perf_counter() > until
+        late = now() > until
     # Where nothing is explained, the constant is what there is.
     terms = [candidates[i] for i in taken] or [()]
     return Chosen(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.clock import now
 from sysid.estimation.grey_box.findings import with_evidence
 from sysid.estimation.grey_box.named import Named, named_of
 from sysid.estimation.grey_box.preparing import ROUNDS, SHARPER, seen_terms
@@ -101,7 +101,7 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, unti
         ready: What the fit began with.
         chosen: The candidate.
         training: How it was trained.
-        until: When it has to have ended, on the clock of ``time.perf_counter``.
+        until: When it has to have ended, on the clock of ``sysid.estimation.clock.now``.
         stopped: Whether somebody asked it to stop: then nothing is trained any more.
 
     Returns:
@@ -210,7 +210,7 @@ def _sharpened(
 
 def _gone_on(provider: EquationProvider, solution: Solution, training: Training, until: float) -> Solution:
     """The same fit under records that are run otherwise."""
-    seconds = max(until - time.perf_counter(), 0.0)
+    seconds = max(until - now(), 0.0)
     iterations = max(20, training.max_iterations // 5)
     engine = LevenbergMarquardt(
         termination=Termination(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import replace
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.equations import ROSENBROCK, RUNGE_KUTTA, Lowered
 from sysid.errors import TraceError
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.grey_box.by_case import case_notes, with_cases
 from sysid.estimation.grey_box.findings import Findings
@@ -229,7 +229,7 @@ def fit_equations(
     Returns:
         The fit.
     """
-    began = time.perf_counter() if began is None else began
+    began = now() if began is None else began
     training = (training or Training()).with_starts(STARTS)
     check_training(training)
     template = with_cases(template, experiments, data[1], data[2])
@@ -269,7 +269,7 @@ def fit_equations(
     choice = replace(choice, chosen=done.candidate)
     records = [(e.inputs, e.history) for e in experiments]
     status = multistart_status(done.candidate, candidates, records, interrupted=multistart.stop.is_set())
-    seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
+    seconds = multistart.checkpoints.earlier_s + now() - began
     found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
     return _told(found, done, data, ready.named)
 

@@ -11,11 +11,11 @@ Whom a fit tells of its progress also says where its checkpoints go: :class:`Wat
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, State
@@ -60,8 +60,8 @@ class Checkpoints:
     every_s: float = EVERY_S
     _runs: dict[str, _Run] = field(default_factory=dict)
     _guard: threading.Lock = field(default_factory=threading.Lock)
-    _began: float = field(default_factory=time.perf_counter)
-    _saved: float = field(default_factory=time.perf_counter)
+    _began: float = field(default_factory=now)
+    _saved: float = field(default_factory=now)
 
     @property
     def earlier_s(self) -> float:
@@ -163,7 +163,7 @@ class Checkpoints:
             return
         with self._guard:
             self._runs[name] = run
-            if time.perf_counter() - self._saved >= self.every_s:
+            if now() - self._saved >= self.every_s:
                 self._write()
 
     def _write(self) -> None:
@@ -171,8 +171,8 @@ class Checkpoints:
             return
         # Runs that this session has not come to yet are as they were.
         runs = {**self.kept.get("runs", {}), **{name: run.to_dict() for name, run in self._runs.items()}}
-        self.save({"spent_s": self.earlier_s + time.perf_counter() - self._began, "runs": runs})
-        self._saved = time.perf_counter()
+        self.save({"spent_s": self.earlier_s + now() - self._began, "runs": runs})
+        self._saved = now()
 
 
 @dataclass(kw_only=True, eq=False)

@@ -53,7 +53,6 @@ parameters at most.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -61,6 +60,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.clock import now
 from sysid.estimation.least_squares.damping import DAMPINGS, DEFAULT
 from sysid.estimation.least_squares.damping.base import AbstractDamping
 from sysid.estimation.least_squares.evidence import Prior, update
@@ -240,18 +240,18 @@ class LevenbergMarquardt:
             The solution; it is never worse than the state.
         """
         first, before = state.at.loss if first_loss is None else first_loss, state.curve[-1].elapsed_s
-        started = time.perf_counter()
+        started = now()
         status: Status | None = None
         with one_blas_thread():
             try:
                 while status is None:
-                    elapsed = spent_s + time.perf_counter() - started
+                    elapsed = spent_s + now() - started
                     status = self.termination.check(
                         iteration=state.iteration, elapsed=elapsed, losses=state.losses, damping=state.damping.factor
                     )
                     if status is None:
                         state = self._step(state, provider)
-                        state = self._record(state, provider, before + time.perf_counter() - started)
+                        state = self._record(state, provider, before + now() - started)
                     if self.should_stop():
                         status = Status.INTERRUPTED
             except KeyboardInterrupt:

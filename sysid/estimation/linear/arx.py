@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.regression import Solution, deviation, solve, stack
@@ -48,7 +48,7 @@ def fit_arx(
         ChannelError: If a trace lacks a channel of the mapping.
         TraceError: If there are fewer samples than parameters, or the orders do not fit the inputs.
     """
-    began = time.perf_counter()
+    began = now()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = arx_experiments(
         traces, mapping, orders, start=start or Start(), rest_output=rest, operating_point=operating_point
@@ -65,7 +65,7 @@ def fit_arx(
         status=Status.EXACT,
         loop=Loop.OPEN,
         history={"iteration": np.array([0.0]), "mse": np.array([residual @ residual / n_counted])},
-        train_time_s=time.perf_counter() - began,
+        train_time_s=now() - began,
         uncertainty=arx_uncertainty(solution, residual, n_counted, orders, mapping),
         notes=(*_rank_note(solution), stability_note(model)),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
+from sysid.estimation.clock import now
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import scattered, sections_of, stabilised
@@ -130,7 +130,7 @@ def fit_spectra(
         TraceError: If the orders do not fit the data.
         FitDivergedError: If no start gives a finite model.
     """
-    began = time.perf_counter()
+    began = now()
     m = len(mapping.inputs)
     if orders.intercept or len(orders.poles) != m or any(s.inputs.shape[1] != m for s in spectra):
         raise TraceError(

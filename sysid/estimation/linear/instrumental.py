@@ -14,7 +14,6 @@ Limits: the noise must not depend on the inputs, so not for data from a closed l
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.arx import arx_experiments, arx_model, arx_uncertainty, first_output, stability_note
 from sysid.estimation.linear.regression import Solution, regressor_matrix, solve, stack
@@ -57,7 +57,7 @@ def fit_iv4(
         ChannelError: If a trace lacks a channel of the mapping.
         TraceError: If there are fewer samples than parameters, or the orders do not fit the inputs.
     """
-    began = time.perf_counter()
+    began = now()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = arx_experiments(
         traces, mapping, orders, start=start or Start(), rest_output=rest, operating_point=operating_point
@@ -82,7 +82,7 @@ def fit_iv4(
         status=Status.EXACT,
         loop=Loop.OPEN,
         history={"iteration": np.array([0.0]), "mse": np.array([residual @ residual / n_counted])},
-        train_time_s=time.perf_counter() - began,
+        train_time_s=now() - began,
         uncertainty=arx_uncertainty(solution, residual, n_counted, orders, mapping),
         notes=("Instrumental variables (IV4): the mean squared error is that of the whitened equation error.",
                stability_note(model)),

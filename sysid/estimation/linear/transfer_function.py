@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -10,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from sysid.errors import TraceError
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
@@ -69,7 +69,7 @@ def fit_transfer_function(
         TraceError: If the orders do not fit the inputs, or there are fewer samples than parameters.
         FitDivergedError: If no start gives a finite free run.
     """
-    began = time.perf_counter()
+    began = now()
     start = start or Start()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     whole = tuple(_bridged(experiment) for experiment in experiments_of(traces, mapping, start, rest))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.clock import now
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
 from sysid.estimation.least_squares.termination import Termination
@@ -28,7 +28,7 @@ class Watch:
     """When a fit began, and who watches.
 
     Args:
-        began: By ``time.perf_counter``.
+        began: By ``sysid.estimation.clock.now``.
         on_iteration: Called after every iteration of a long run.
     """
 
@@ -163,7 +163,7 @@ def long_run(candidate: Candidate, training: TransferFunctionTraining, watch: Wa
     Returns:
         The minimum.
     """
-    left = training.max_time_s - (time.perf_counter() - watch.began)
+    left = training.max_time_s - (now() - watch.began)
     limits = Termination(max_iterations=training.max_iterations, max_time_s=left, tolerance=1e-7, patience=6)
     engine = LevenbergMarquardt(termination=limits, evidence_after=None, on_iteration=watch.on_iteration)
     solution = engine.minimise(candidate.provider, candidate.theta, flat_prior(len(candidate.theta)))

@@ -8,7 +8,6 @@ them all the same, it goes on from there.
 from __future__ import annotations
 
 import dataclasses
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError
+from sysid.estimation.clock import now
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.linear.delay_search import FEW, searched_delays
 from sysid.estimation.linear.pole_moves import at_one, filled_up, next_smaller, slowness
@@ -169,7 +169,7 @@ class AbstractProblem(ABC):
         """Search dead times, run all starts to their minima, and take the best.
 
         Args:
-            began: When the fit began, by ``time.perf_counter``.
+            began: When the fit began, by ``sysid.estimation.clock.now``.
             on_iteration: Called after every iteration of the final run.
             score: What chooses between the minima of all starts, smaller is better; ``None`` to choose by the loss.
 
@@ -193,7 +193,7 @@ class AbstractProblem(ABC):
                 "iteration": np.array([float(entry.iteration) for entry in end.curve]),
                 "mse": np.array([entry.mse * unit for entry in end.curve]),
             },
-            train_time_s=time.perf_counter() - began,
+            train_time_s=now() - began,
             seed=self.training.seed,
             uncertainty=uncertainty,
             notes=(
@@ -236,7 +236,7 @@ class AbstractProblem(ABC):
         """What the structures that this one contains reach, each as it would alone."""
         found = []
         for orders in next_smaller(replace(self.orders, delays=delays)) if self.training.max_iterations else []:
-            if orders not in known and time.perf_counter() - watch.began < self.training.max_time_s:
+            if orders not in known and now() - watch.began < self.training.max_time_s:
                 known[orders] = self.with_orders(orders)._reached(delays, watch.unseen(), None, known)
             reached = known.get(orders)
             if reached is not None:

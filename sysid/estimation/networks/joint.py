@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.attempts import Attempt
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
@@ -263,7 +263,7 @@ class Joint:
         Returns:
             The best state seen; a start that was given is one of them.
         """
-        training, began = self.training, time.perf_counter() - checkpoints_of(self.on_progress).earlier_s
+        training, began = self.training, now() - checkpoints_of(self.on_progress).earlier_s
         numbers = {seed: number for number, (seed, _) in enumerate(starts, start=1)}
         seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
         alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
@@ -281,10 +281,10 @@ class Joint:
                     break
             reached.sort(key=lambda entry: entry[1].at.loss)
             alive = list(reached[: max(1, (len(reached) + 1) // 2)])
-            late = time.perf_counter() - began > training.max_time_s
+            late = now() - began > training.max_time_s
             if interrupted or late or not any(_unfinished(one) for _, one in reached):
                 break
-        return self._result(seen, interrupted=interrupted, seconds=time.perf_counter() - began)
+        return self._result(seen, interrupted=interrupted, seconds=now() - began)
 
     def _advance(
         self, where: Solution | NDArray[np.float64], checkpoint: int, began: float, which: str, name: str
@@ -319,7 +319,7 @@ class Joint:
 
         limits = Termination(
             max_iterations=max(1, round(training.max_iterations * checkpoint / training.checkpoints)),
-            max_time_s=max(0.0, training.max_time_s - (time.perf_counter() - began)),
+            max_time_s=max(0.0, training.max_time_s - (now() - began)),
             tolerance=training.tolerance,
             patience=training.patience,
         )

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
+from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints, checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
@@ -40,6 +40,10 @@ RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
 """Shares of the iterations after which the starts are looked at and, but for the last, half of them dropped
 (successive halving, Jamieson and Talwalkar 2016). Who stays is decided by the error on the estimation traces: early
 on, what the selection traces say of a start is noise; they choose at the end, among all states looked at."""
+
+FEWEST = 5
+"""Iterations for which there has to be time in its first part for a start to be begun, or that part where it has fewer:
+where an iteration is slow, few starts that come somewhere tell more than many that stand where they began."""
 
 SETTLED = 5
 """Iterations after which a candidate with other weights of its residuals is near a minimum again."""
@@ -73,7 +77,7 @@ class Multistart:
         on_progress: Called after every iteration, from the threads that train.
         resume: Where the first start was put aside; ``None`` to begin it.
         pretraining: Where a random start is drawn and trained one step ahead before anything else; ``None`` for none.
-        until: When the fit has to have ended, on the clock of ``time.perf_counter``; infinity for no limit.
+        until: When the fit has to have ended, on the clock of ``sysid.estimation.clock.now``; infinity for no limit.
     """
 
     training: Training
@@ -104,7 +108,7 @@ class Multistart:
 
     def left(self, run: str) -> float:
         """Seconds that a run may take, what earlier sessions have spent on it included."""
-        return max(0.0, self.until - time.perf_counter()) + self.checkpoints.spent_s(run)
+        return max(0.0, self.until - now()) + self.checkpoints.spent_s(run)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,7 +152,7 @@ def deadline(began: float, training: Training, on_progress: Callable[[FitProgres
     """When a fit has to have ended: its time is that of all that it does, over all its sessions.
 
     Args:
-        began: When this session of it began, on the clock of ``time.perf_counter``.
+        began: When this session of it began, on the clock of ``sysid.estimation.clock.now``.
         training: How long it may take.
         on_progress: Whom it tells, who also knows what earlier sessions have spent.
 
@@ -203,6 +207,8 @@ def run(multistart: Multistart) -> list[Candidate]:
             before = rungs[rung - 1] if rung else 0.0
             seconds = training.max_time_s * (share - before) / total
             reached = _rung(multistart, numbers, latest, share, seconds)
+            if rung == 0:  # the time of those that were left out is the others'
+                total = _turns(len(reached), rungs, training.workers)
             seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
             if multistart.stop.is_set():
                 break
@@ -235,7 +241,7 @@ def _rung(
     reached: dict[int, Candidate] = {}
 
     def work(number: int) -> None:
-        if not multistart.stop.is_set():
+        if not multistart.stop.is_set() and (latest or _in_time(multistart, reached, share, seconds)):
             reached[number] = _advance(multistart, number, latest.get(number), share, seconds)
 
     with ThreadPoolExecutor(
@@ -252,6 +258,14 @@ def _rung(
     if not reached and not latest:  # interrupted before anything had begun: the start as it is
         reached[numbers[0]] = _advance(multistart, numbers[0], None, share, seconds)
     return reached
+
+
+def _in_time(multistart: Multistart, reached: dict[int, Candidate], share: float, seconds: float) -> bool:
+    """Whether there is time for another start, by what an iteration of those before it took."""
+    curves = [one.solution.curve[-1] for one in list(reached.values())]
+    each = [one.elapsed_s / one.iteration for one in curves if one.iteration]
+    first = min(FEWEST, max(1, round(share * multistart.training.max_iterations)))
+    return not each or min(each) * first <= seconds
 
 
 def _rungs(training: Training) -> tuple[float, ...]:

@@ -117,7 +117,13 @@ def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Tra
         by_evidence = choice.by != "loss" and choice.chosen.solution.evidence is not None
         how = "the largest evidence" if by_evidence else "the least error on the estimation traces"
         how = "the least error on the selection traces (geometric mean)" if by_selection else how
-        notes.append(f"Chosen by {how} among {training.n_starts} starts looked at {len(candidates)} times.")
+        begun = len({one.number for one in candidates if not one.members})
+        notes.append(f"Chosen by {how} among {begun} starts looked at {len(candidates)} times.")
+        if begun < training.n_starts and np.isfinite(training.max_time_s):
+            notes.append(
+                f"Of {training.n_starts} starts {begun} had a place in {training.max_time_s:.3g} s, as iterations are "
+                "slow; more time (max_time_s) lets the others begin."
+            )
     if choice.chosen.members:
         single = [
             c.score

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
@@ -78,7 +78,7 @@ def fit_narx(
         ConfigError: If the structure does not fit the mapping, ``initial`` has another structure, or limits that are to
             be found are not there.
     """
-    began = time.perf_counter()
+    began = now()
     training, start = training or Training(), start or Start()
     ensemble.check(training, selection)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
@@ -128,7 +128,7 @@ def fit_narx(
         posterior = calibrate(
             posterior, chosen.model, [Experiment.for_model(t, chosen.model, start) for t in selection]
         )
-    seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
+    seconds = multistart.checkpoints.earlier_s + now() - began
     fit = with_note(multistart_result(choice, list(tasks), training, status, seconds), windows)
     # All of them have the template's limits.
     held = (told(template.between, mapping.output, template.output_unit),) if template.limits else ()

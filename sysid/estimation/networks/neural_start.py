@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import UserError
+from sysid.estimation.clock import now
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.termination import Termination
@@ -186,8 +186,8 @@ def linear_start(provider: NeuralProvider, *, until: float = math.inf) -> NDArra
 
     Args:
         provider: The records, and the sizes wanted.
-        until: When it has to have ended, on the clock of ``time.perf_counter``; what is not fitted by then is taken as
-            it is.
+        until: When it has to have ended, on the clock of ``sysid.estimation.clock.now``; what is not fitted by then is
+            taken as it is.
 
     Returns:
         Flat parameters, shape ``(provider.n_parameters,)``; the neurons' are zero.
@@ -200,12 +200,12 @@ def linear_start(provider: NeuralProvider, *, until: float = math.inf) -> NDArra
     )
     linear = replace(provider, template=template)
     with one_blas_thread():  # more threads than one cost more than they give at these sizes
-        began, fits = time.perf_counter(), list[NDArray[np.float64]]()
+        began, fits = now(), list[NDArray[np.float64]]()
         for left, order in zip(range(len(ARX_ORDERS), 0, -1), ARX_ORDERS, strict=True):
-            fits.append(_fitted(linear, _realised(linear, order), (until - time.perf_counter()) / (left + 1)))
+            fits.append(_fitted(linear, _realised(linear, order), (until - now()) / (left + 1)))
         # What it takes cannot be bounded closely: it is left out where the others took most of the time.
-        if s.outputs > 1 and not whole.rectified and until - time.perf_counter() >= time.perf_counter() - began:
-            fits += [_fitted(linear, one, until - time.perf_counter()) for one in _by_subspace(linear, until)]
+        if s.outputs > 1 and not whole.rectified and until - now() >= now() - began:
+            fits += [_fitted(linear, one, until - now()) for one in _by_subspace(linear, until)]
     theta = _levelled(linear, _unit_states(linear, min(fits, key=linear.loss)))
     base = np.zeros(provider.n_parameters)
     for to, of in ((whole.sizes.linear, s.linear), (whole.sizes.output_linear, s.output), (whole.sizes.start, s.start)):
@@ -221,7 +221,7 @@ def _by_subspace(provider: NeuralProvider, until: float) -> list[NDArray[np.floa
         return []
     orders = LinearStateSpace(states=s.states, feedthrough=True, noise=False)
     try:
-        seconds = max(0.5 * (until - time.perf_counter()), 1e-3)
+        seconds = max(0.5 * (until - now()), 1e-3)
         training = StateSpaceTraining(max_iterations=LINEAR_ITERATIONS, max_time_s=seconds)
         found = search(provider.segments, orders, training).system
     except (UserError, np.linalg.LinAlgError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
@@ -12,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sysid.errors import ConfigError
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
@@ -201,14 +201,14 @@ def _fit(
     on_progress: Callable[[FitProgress], None],
 ) -> FitResult:
     """Fit a model of any number of outputs."""
-    began = time.perf_counter()
+    began = now()
     training = (training or Training()).with_starts(STARTS)
     check_training(training)
     experiments, windows = records.experiments, Windows.of(records.experiments, training)
     provider = NeuralProvider(template=template.recursion, experiments=windows.experiments)
     starts.check_samples(provider)
     share = LINEAR_SHARE if records.initial is None else LINEAR_SHARE_GIVEN
-    base = linear_start(provider, until=time.perf_counter() + share * training.max_time_s)
+    base = linear_start(provider, until=now() + share * training.max_time_s)
     provider = weighed(provider, base)
     multistart = starts.Multistart(
         training=training,
@@ -223,9 +223,7 @@ def _fit(
         learnt=partial(learnt_map, provider),
         checkpoints=checkpoints_of(on_progress),
         # A fit whose linear start took all of its time would be that start alone.
-        until=max(
-            starts.deadline(began, training, on_progress), time.perf_counter() + LEAST_FREE * training.max_time_s
-        ),
+        until=max(starts.deadline(began, training, on_progress), now() + LEAST_FREE * training.max_time_s),
     )
     candidates = starts.run(multistart)
     candidates += reweighted(multistart, provider, choose(candidates, training.choose_by).chosen)
@@ -251,7 +249,7 @@ def _fit(
         interrupted=multistart.stop.is_set(),
     )
     posterior = _posterior(choice.chosen, provider, records)
-    seconds = multistart.checkpoints.earlier_s + time.perf_counter() - began
+    seconds = multistart.checkpoints.earlier_s + now() - began
     found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
     return replace(found, posterior=posterior)
 

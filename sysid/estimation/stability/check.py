@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError, shortened
+from sysid.estimation.clock import now
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability
@@ -187,16 +187,16 @@ class PoleCheck(AbstractStabilityCheck):
 class _Clock:
     """What the checks of one fit have taken, beside what the fit has."""
 
-    began: float = field(default_factory=time.perf_counter)
+    began: float = field(default_factory=now)
     spent_s: float = 0.0
 
     @contextmanager
     def left(self, share: float, trained_s: float) -> Iterator[float]:
         """Counts what is done in it, which may take so many seconds."""
-        at = time.perf_counter()
+        at = now()
         fitted_s = max(trained_s, at - self.began) - self.spent_s
         yield max(LEAST_S, share * fitted_s) - self.spent_s
-        self.spent_s += time.perf_counter() - at
+        self.spent_s += now() - at
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

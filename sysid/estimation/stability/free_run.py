@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
+from sysid.estimation.clock import now
 from sysid.estimation.stability.sequences import AbstractSequences, InputSequence
 from sysid.models import AbstractModel
 from sysid.names import csv_cell
@@ -186,7 +186,7 @@ def check_stability(
         True
     """
     low, high = sequences.output_range
-    width, until = np.where(high > low, high - low, 1.0), time.perf_counter() + seconds
+    width, until = np.where(high > low, high - low, 1.0), now() + seconds
     unbounded = judged = unsettled = drawn = further = 0
     largest = np.nan
     worst: tuple[tuple[bool, float], InputSequence, NDArray[np.float64]] | None = None
@@ -229,7 +229,7 @@ def check_stability(
 def _in_time(sequences: Iterable[InputSequence], until: float) -> Iterator[InputSequence]:
     """Sequences for which there is time."""
     for number, sequence in enumerate(sequences):
-        if number >= FEWEST and time.perf_counter() > until:
+        if number >= FEWEST and now() > until:
             return
         yield sequence
 

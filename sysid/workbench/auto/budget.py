@@ -7,20 +7,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from sysid.estimation import Training
+from sysid.estimation.clock import SLOWEST
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.networks.multistart import planned_iterations
 from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
+from sysid.workbench.auto.finish import slowness
 from sysid.workbench.sweep.search_space import Point
 
 REFIT, TRIAL = 0.2, 0.15
-"""Shares of the time: what is kept for the last fit, and what one trial may take."""
+"""Shares of the time: what is kept for the last fit, and what one trial may take, that in processor time."""
 GOING_ON, TRIAL_OF_MANY = 0.4, 0.1
 """The same where the chosen network is trained on from where its trial had ended. Trials then have to tell which one is
 worth that, no more; what the others would have got is the chosen one's."""
 RACE = (0.08, 0.12)
 """Shares of the same in which the best networks are trained on side by side before one is chosen: four, then two."""
+TELLING_S, LATELY = 0.5, 8
+"""Seconds of a trial from which on it says how slow the machine is, and trials by which that is judged."""
 UNKNOWN = 0.5
 """Share of its limit that a trial is taken to last where no other of its kind has told."""
 LINEAR = 0.5
@@ -77,6 +83,7 @@ class Budget:
     kept: float = FINAL
     most: float = 1.0
     unlimited: int = 0
+    _worked: list[tuple[float, float]] = field(default_factory=list)
     _rates: dict[str, float] = field(default_factory=dict)
     _open: list[Point] = field(default_factory=list)
 
@@ -114,6 +121,27 @@ class Budget:
             rate = trial.seconds / (price(point, self.folds) * size_of(point.structure))
             if math.isfinite(rate):
                 self._rates[kind] = max(rate, 0.5 * self._rates.get(kind, 0.0))
+            if trial.seconds >= TELLING_S and math.isfinite(trial.cpu_s):
+                self._worked.append((trial.seconds, trial.cpu_s))
+
+    @property
+    def slowed(self) -> float:
+        """Seconds by the clock that a second of work takes, as trials have shown lately; at first, as is seen now."""
+        if not self._worked:
+            self._worked.append((slowness() * TELLING_S, TELLING_S))
+        wall, worked = np.sum(self._worked[-LATELY:], axis=0)
+        return float(np.clip(wall / worked, 1.0, SLOWEST))
+
+    def has_room(self, seconds: float) -> bool:
+        """Whether trials that train for so long, all together, still end in time.
+
+        Args:
+            seconds: Of work.
+
+        Returns:
+            Whether they do; always where iterations are counted.
+        """
+        return self._fits(0, self.slowed * seconds / self.side_by_side, paid=self.wall_s is None)
 
     def fraction(self) -> float:
         """Share that is spent, 0 to 1."""
@@ -155,7 +183,7 @@ class Budget:
         """How long a trial will take; of a kind that was not tried yet, a part of its limit, or at least something."""
         if self.wall_s is None:
             return 0.0
-        limit = self.trial * self.wall_s if point.training else self.wall_s
+        limit = self.slowed * self.trial * self.wall_s if point.training else self.wall_s
         rate = self._rates.get(point.structure.kind)
         if rate is None:
             return UNKNOWN * limit if "max_time_s" in point.training else 1e-3

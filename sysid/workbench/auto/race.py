@@ -22,6 +22,7 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import RACE
 from sysid.workbench.auto.parts import FURTHER
 from sysid.workbench.auto.plan import Rank
+from sysid.workbench.auto.ripe import gone_on
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.search_space import Point
 
@@ -60,6 +61,7 @@ class Race:
         workers: Who train side by side.
         clock: Seconds that the search has taken, over all its sessions.
         kept: Share of the time by whose beginning a look at more than two has to be over.
+        slowed: Seconds by the clock that a second of training takes.
         in_it: Numbers of those that were trained on.
     """
 
@@ -72,6 +74,7 @@ class Race:
     workers: int
     clock: Callable[[], float]
     kept: float
+    slowed: float = 1.0
     in_it: set[int] = field(default_factory=set)
 
     def run(self, trials: Sequence[Trial]) -> tuple[list[Trial], float]:
@@ -96,13 +99,8 @@ class Race:
                 break
             spent += share
             self.in_it.update(alive)
-            before = dict(self.driver.last)
-            for trial in self.driver.run_on(points, best, partial(self._options, share, len(points))):
-                if math.isfinite(self.rank(trial)[1]) and self.rank(trial) < self.rank(best[trial.number]):
-                    best[trial.number] = trial
-                else:  # what it was is kept, and it has nothing more to give
-                    self.driver.last[trial.number] = before[trial.number]
-                    alive.remove(trial.number)
+            better = gone_on(self.driver, points, best, partial(self._options, share, len(points)), self.rank)
+            alive = [number for number in alive if number in better]  # the others have nothing more to give
             alive = self._left([best[number] for number in alive], least=min(map(self.rank, best.values())))
         return [best[trial.number] for trial in trials], spent
 
@@ -130,7 +128,7 @@ class Race:
 
     def _in_time(self, points: Sequence[Point], share: float) -> bool:
         """Whether there is time for a look at all; what was done by an earlier session takes none."""
-        if self.wall_s is None or self.clock() + share * self.wall_s <= (1.0 - self.kept) * self.wall_s:
+        if self.wall_s is None or self.clock() + self.slowed * share * self.wall_s <= (1.0 - self.kept) * self.wall_s:
             return True
         return self.driver.is_stored_on(points, partial(self._options, share, len(points)))
 

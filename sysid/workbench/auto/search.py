@@ -15,8 +15,9 @@ from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRI
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
-from sysid.workbench.auto.plan import AGAIN, Plan, ranked_by
+from sysid.workbench.auto.plan import AGAIN, Plan, Rank, ranked_by
 from sysid.workbench.auto.race import Race, trains_on
+from sysid.workbench.auto.ripe import Ripening, young_told
 from sysid.workbench.auto.trials import Trials
 from sysid.workbench.auto.words import Choice, choose, sentence
 from sysid.workbench.fits.config import FitConfig
@@ -33,6 +34,8 @@ from sysid.workbench.sweep.workers import AbstractWorkers
 FOUND, LINEAR = "best found", "best linear"
 """Names of the fits that a search hands to the pipeline."""
 TITLE = "Searching for a model"
+BUSY = 1.5
+"""Seconds by the clock that a second of training takes from which on it is said."""
 CHECKED = 50
 """Sequences over which a trial's free run is checked, or one for each second of the search where that is more: all of
 them took longer than the training of a short search. The last fit is checked over all."""
@@ -138,6 +141,7 @@ class Search:
             selection=first.chooses,
             sequences=data.sequences,
             folds=tuple((fold.fitted, fold.chooses) for fold in parts.folds),
+            processor_time=True,
         )
         looked = look(data, config.mapping, config.start)
         return cls(config=config, data=data, run=run, parts=parts, bench=bench, looked=looked)
@@ -189,8 +193,11 @@ class Search:
             looked=self.looked, budget=budget, error=error, training=training, seed=self.config.seed, again=again,
             tolerance=self.config.tolerance,
         )  # fmt: skip
+        # What was held out of a fold is fitted in the end by another training: its trials are not trained on.
+        ripening = Ripening(driver=trials.drivers[0], budget=budget, rank=self._rank, n_outputs=self._n_outputs)
         while points := plan.ask():
-            plan.tell(trials.run(points))
+            found = trials.run(points)
+            plan.tell(ripening(points, found) if self.parts.trained_on else found)
         if not math.isfinite(plan.least()):
             raise ConfigError(
                 "nothing that was tried can be used",
@@ -205,10 +212,9 @@ class Search:
         first, kept, raced = trials.drivers[0], refit_share(self.parts), 0
         if self.parts.trained_on:
             race = Race(
-                driver=first, points=plan.points, rank=ranked_by(error, self.config.tolerance),
-                n_outputs=len(self.config.mapping.outputs), wall_s=self.config.wall_s,
+                driver=first, points=plan.points, rank=self._rank, n_outputs=self._n_outputs, wall_s=self.config.wall_s,
                 iterations=self.config.iterations, workers=self.config.workers, clock=lambda: clock.total,
-                kept=kept - sum(RACE),
+                kept=kept - sum(RACE), slowed=1.0 if self.config.wall_s is None else plan.budget.slowed,
             )  # fmt: skip
             plan.trials[:], spent = race.run(plan.trials)
             kept, raced = kept - spent, len(race.in_it)
@@ -227,9 +233,22 @@ class Search:
             training={name: first.last[trial.number].training for name, trial in shown.items()},
             parts=self.parts,
             kept=kept,
-            told=(*self.parts.told, *_left_out(plan), *(f"Look at the data: {one}" for one in self.looked.cautions)),
+            told=(
+                *self.parts.told,
+                *_busy(plan),
+                *_left_out(plan),
+                *(f"Look at the data: {one}" for one in self.looked.cautions),
+            ),
             done_now=trials.done_now,
         )
+
+    @property
+    def _rank(self) -> Rank:
+        return ranked_by(error, self.config.tolerance)
+
+    @property
+    def _n_outputs(self) -> int:
+        return len(self.config.mapping.outputs)
 
     def _record(self, plan: Plan, choice: Choice, wall_s: float, raced: int) -> SweepRecord:
         outputs = self.config.mapping.outputs
@@ -238,6 +257,7 @@ class Search:
         said = sentence(
             choice, len(plan.trials), again=plan.n_again, raced=raced, unit=unit, ended=plan.ended, error=error
         )
+        young = young_told(plan.trials, self._rank, self._n_outputs, len(self.parts.folds))
         return SweepRecord(
             name=self.config.name,
             mapping=str(self.config.mapping),
@@ -248,12 +268,22 @@ class Search:
             objectives=list(OBJECTIVES),
             choose_by="free_run_mse",
             choose_on="selection",
-            chosen_by=" ".join([said, *self.parts.told]),
+            chosen_by=" ".join(one for one in (said, young, *self.parts.told) if one),
             workers=self.config.workers,
             wall_s=wall_s,
             winner=choice.chosen.number,
             trials=list(plan.trials),
         )
+
+
+def _busy(plan: Plan) -> list[str]:
+    """What a machine that does other things meanwhile has to do with it."""
+    if plan.budget.wall_s is None or plan.budget.slowed < BUSY:
+        return []
+    return [
+        f"The machine was busy: a second of training took {plan.budget.slowed:.1f} s. Fewer structures were tried for "
+        "it, each as far as on a quiet one."
+    ]
 
 
 def _left_out(plan: Plan) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -14,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from sysid.errors import SysidError
 from sysid.estimation import FitProgress, FitResult, StabilityOptions, Training, estimators
+from sysid.estimation.clock import processor_time
 from sysid.estimation.estimator import Estimator, Options
 from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.estimation.least_squares.checkpoint import Checkpoint
@@ -44,6 +46,8 @@ class Bench:
         sequences: Traces over which a free run has to stay stable, where a data set of them is declared.
         folder: The run folder, where the workers can write there: a trial that is cut off then goes on where it was.
         folds: Other ways to part what is fitted from what chooses, where trials are told which one they are of.
+        processor_time: Whether limits of time count the processor time of a trial, so that each comes as far beside
+            whatever else the machine does; else the wall's.
     """
 
     pipeline: Mapping[str, Any]
@@ -52,6 +56,7 @@ class Bench:
     sequences: tuple[Trace, ...] = ()
     folder: Path | None = None
     folds: tuple[tuple[TraceSet, tuple[Trace, ...]], ...] = ()
+    processor_time: bool = False
 
     def fold(self, number: int) -> Bench:
         """The bench with the traces of a fold.
@@ -122,7 +127,7 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     bench = bench.fold(job.fold)
     outcome: dict[str, Any] = {"key": job.key, "number": job.number, "structure": dict(job.structure)}
     try:
-        with threadpool_limits(1):
+        with threadpool_limits(1), processor_time() if bench.processor_time else nullcontext():
             watch = _watch(bench, job)
             trained_models = train(bench, job, before, watch)
             trained = watch.checkpoints.earlier_s + time.perf_counter() - began
@@ -137,6 +142,7 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
                 "status": worst.status.name,
                 "usable": worst.status.usable,
                 "iterations": sum(_iterations(fit) for fit in fits),
+                "iteration_s": max((s for s in map(_iteration_s, fits) if math.isfinite(s)), default=None),
                 "parameters": sum(fit.model.n_parameters for fit in fits),
                 "operations": sum(operations(fit.model) for fit in fits),
                 "pole_radius": max((r for fit in fits if (r := fit.model.pole_radius) is not None), default=None),
@@ -273,6 +279,12 @@ def _shortened(traces: TraceSet, share: float) -> TraceSet:
 
 def _iterations(fit: FitResult) -> int:
     return int(fit.history["iteration"][-1]) if len(fit.history.get("iteration", ())) else 0
+
+
+def _iteration_s(fit: FitResult) -> float:
+    """Seconds of one iteration, on the clock that limits count by; NaN where none was made."""
+    made = _iterations(fit)
+    return float(fit.history["elapsed_s"][-1]) / made if made and "elapsed_s" in fit.history else math.nan
 
 
 def operations(model: AbstractModel) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from sysid.estimation.clock import SLOWEST
 from sysid.models import ARX, NeuralStateSpace
 from sysid.workbench.auto.budget import REFIT, Budget, price
 from sysid.workbench.sweep.search_space import Point
@@ -75,3 +76,20 @@ def test_a_share_is_kept_until_it_is_let_go() -> None:
     assert found.take([point(1, 5)]) == []
     found.kept = 0.0
     assert len(found.take([point(1, 5)])) == 1
+
+
+def test_limits_count_processor_time_and_a_slow_machine_has_room_for_fewer_trials() -> None:
+    """What comes as far as on a quiet machine takes longer there: there are fewer of it."""
+    limited = [point(n, 4) for n in range(1, 30)]
+    for one in limited:
+        one.training["max_time_s"] = 10.0
+    found = budget(100.0, refit=0.4, trial=0.1)
+    (first,) = found.take(limited[:1])
+    found.tell([trial(first, 1.0).model_copy(update={"seconds": 24.0, "cpu_s": 8.0})])
+    assert found.slowed == pytest.approx(3.0, rel=0.05)  # what was seen before counts a little
+    assert found.limits(0.1) == {"max_time_s": 10.0}
+    assert len(found.take(limited[1:])) == 2  # of 24 s, until 60 s are spent
+    assert (found.has_room(20.0), found.has_room(21.0)) == (True, False)
+    found.tell([trial(one, 1.0).model_copy(update={"seconds": 4000.0, "cpu_s": 8.0}) for one in limited[1:3]])
+    assert found.slowed == SLOWEST
+    assert budget(None, iterations=10).has_room(1e9)

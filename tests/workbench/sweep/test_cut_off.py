@@ -57,7 +57,7 @@ def run(workspace: Path, folder: str) -> Swept:
 
 def found(swept: Swept) -> str:
     """All of the trials but how long they took."""
-    trials = [one.model_dump(exclude={"seconds", "cpu_s"}) for one in swept.record.trials]
+    trials = [one.model_dump(exclude={"seconds", "cpu_s", "iteration_s"}) for one in swept.record.trials]
     return re.sub(r"'run_time_s': [^,}]+", "", repr(trials))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import ConfigError, FitDivergedError, TraceError
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.provider import Linearisation
@@ -97,7 +97,7 @@ def fit_polynomial(
         TraceError: If there are fewer samples than parameters, or the orders do not fit the inputs.
         FitDivergedError: If no start gives a finite prediction.
     """
-    began, training = time.perf_counter(), training or PolynomialTraining()
+    began, training = now(), training or PolynomialTraining()
     orders.check_inputs(len(mapping.inputs))
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = experiments_of(traces, mapping, start or Start(), rest)
@@ -130,7 +130,7 @@ def fit_polynomial(
             "iteration": np.array([one.iteration for one in solution.curve], dtype=np.float64),
             "mse": unit * np.array([one.mse for one in solution.curve]),
         },
-        train_time_s=time.perf_counter() - began,
+        train_time_s=now() - began,
         uncertainty=_uncertainty(model, at, hang, errors.n_samples, variance * unit),
         notes=(*slow_poles.notes(model.pole_radius, lengths, told), slow_poles.stability(model.pole_radius)),
     )
@@ -192,7 +192,7 @@ def _straight(
 
 def _within(training: PolynomialTraining, until: float) -> PolynomialTraining:
     """The same training in what is left of its time."""
-    return replace(training, max_time_s=max(until - time.perf_counter(), 0.0))
+    return replace(training, max_time_s=max(until - now(), 0.0))
 
 
 def _minimum(errors: PredictionErrors, starts: Sequence[Array], training: PolynomialTraining, until: float) -> Solution:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
+from sysid.estimation.clock import now
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
@@ -60,7 +60,7 @@ def fit_state_space(
         TraceError: If there are fewer samples than parameters, or no record is long enough.
         FitDivergedError: If no start gives a finite prediction.
     """
-    began, training = time.perf_counter(), training or StateSpaceTraining()
+    began, training = now(), training or StateSpaceTraining()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     (scaling,), segments = records_of(traces, mapping, orders, start=start, rests=(rest,))
     orders, segments, told = behind_dead_times(segments, orders, training)
@@ -106,7 +106,7 @@ def fit_vector_state_space(
         TraceError: If there are fewer samples than parameters, or no record is long enough.
         FitDivergedError: If no start gives a finite prediction.
     """
-    began, training, given = time.perf_counter(), training or StateSpaceTraining(), rest_output or {}
+    began, training, given = now(), training or StateSpaceTraining(), rest_output or {}
     rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
     scalings, segments = records_of(traces, mapping, orders, start=start, rests=rests)
     known, segments, told = behind_dead_times(segments, orders, training)
@@ -203,7 +203,7 @@ def _result(
             "iteration": np.array([one.iteration for one in found.curve], dtype=np.float64),
             "mse": unit * np.array([one.mse for one in found.curve]),
         },
-        train_time_s=time.perf_counter() - began,
+        train_time_s=now() - began,
         uncertainty=None if by_subspace else state_space_uncertainty(model, found),
         notes=(*_notes(found, orders), *found.notes, slow_poles.stability(model.pole_radius)),
     )

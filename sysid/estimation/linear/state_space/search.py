@@ -7,7 +7,6 @@ anew, and a new chart is laid there, until that changes nothing either.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import ConfigError, FitDivergedError
+from sysid.estimation.clock import now
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
 from sysid.estimation.least_squares.provider import Linearisation
@@ -150,7 +150,7 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         TraceError: If no record is long enough.
         FitDivergedError: If no start gives a finite prediction.
     """
-    began, whole = time.perf_counter(), _whole(segments, orders)
+    began, whole = now(), _whole(segments, orders)
     with one_blas_thread():
         subspace = Subspace.of(
             segments, states=orders.states, horizon=training.horizon, feedthrough=orders.feedthrough, noise=orders.noise
@@ -283,7 +283,7 @@ class _Problem:
             What was found: over these records never worse than with fewer states.
         """
         start, one = self.start(subspace, weighting)
-        found = replace(self.refined(start, iterations, until - time.perf_counter()), weighting=one)
+        found = replace(self.refined(start, iterations, until - now()), weighting=one)
         if not iterations or self.orders.states == 1 or sum(self.lengths) * self.orders.states**2 > NESTED:
             return found
         fewer = replace(self, orders=replace(self.orders, states=self.orders.states - 1))
@@ -296,7 +296,7 @@ class _Problem:
         wider = self._widened(lower.system)
         if wider is None or wider[0] >= _size(found.covariance) - CLEARLY:
             return found
-        other = self.refined(wider[1], iterations, until - time.perf_counter())
+        other = self.refined(wider[1], iterations, until - now())
         better = _size(other.covariance) < _size(found.covariance)
         return replace(other, weighting=lower.weighting) if better else found
 
@@ -307,7 +307,7 @@ class _Problem:
         """
         if not subspace.yardstick.reached(found.covariance, found.chart.n_parameters):
             return False
-        start, seconds = self.start(subspace, weighting)[0], until - time.perf_counter()
+        start, seconds = self.start(subspace, weighting)[0], until - now()
 
         def behind(lower: Found) -> float:
             fewer = found.chart.n_parameters - lower.chart.n_parameters
@@ -387,7 +387,7 @@ class _Problem:
 
     def refined(self, system: Innovations, iterations: int, seconds: float, *, tolerance: float = FINE) -> Found:
         """The system with the least prediction error nearby."""
-        began, status = time.perf_counter(), Status.EXACT if iterations == 0 else Status.MAX_ITERATIONS
+        began, status = now(), Status.EXACT if iterations == 0 else Status.MAX_ITERATIONS
         curve: list[Iteration] = []
         whitening = self._whitening(system)
         for _ in range(CHARTS):
@@ -398,7 +398,7 @@ class _Problem:
             left = iterations - (curve[-1].iteration if curve else 0)
             if left <= 0:
                 break
-            spent = time.perf_counter() - began
+            spent = now() - began
             limits = Termination(max_iterations=left, max_time_s=seconds - spent, tolerance=tolerance, patience=2)
             engine = LevenbergMarquardt(termination=limits, evidence_after=None)
             solution = engine.minimise(errors, zero, flat_prior(len(zero)))
