@@ -52,7 +52,7 @@ def check_dynamics(record: Record) -> Iterator[Finding]:
 def _dead_time(found: ImpulseResponse, j: int, name: str) -> Finding:
     dead, T = found.dead_times[j], found.sample_time
     peak = np.abs(found.values[j])
-    visible = int(np.argmax(peak >= VISIBLE * peak.max()))
+    visible = int(found.lags[np.argmax(peak >= VISIBLE * peak.max())])
     figures = {"best": dead.best, "low": dead.low, "high": dead.high, "seconds": dead.best * T, "visible": visible}
     if not dead.acts or found.explained < BARELY:
         code, verdict = "dead_time.unknown", Verdict.UNKNOWN

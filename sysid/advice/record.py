@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UserError
+from sysid.estimation.nonparametric.feedback import Feedback, find_feedback
 from sysid.estimation.nonparametric.impulse import estimate_impulse_response
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.response import FrequencyResponse, estimate_frequency_response
@@ -75,6 +76,11 @@ class Record:
             return [segment.output for segment in self.segments]
         j = self.mapping.inputs.index(channel)
         return [segment.inputs[:, j] for segment in self.segments]
+
+    @cached_property
+    def feedback(self) -> Feedback | str:
+        """Whether the output acts on the inputs that move, or why that cannot be said."""
+        return find_feedback(self.some.segments) if self.moving else "no input moves"
 
     @cached_property
     def impulse(self) -> ImpulseResponse | str:

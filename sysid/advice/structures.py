@@ -61,6 +61,8 @@ def _arx(record: Record) -> tuple[ARX, int] | None:
         return None
     # The grid has the same range of dead times for each input: what they have in common is taken off the inputs.
     low = max(min(dead, default=0) - 1, 0)
+    if not isinstance(some.feedback, str) and some.feedback.at_once:
+        low = max(low, 1)
     spread = min(max(dead, default=0) + 1 - low, 4) if dead else 0
     samples = sum(map(len, some.segments))
     order = next(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sysid.api.given import TracesLike, traces_of
 from sysid.api.several import Several
+from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.extras import need
 from sysid.models import Start, StartKind, StartLike
@@ -110,22 +112,27 @@ class Comparison:
         return comparison_figure(list(panels.values()))
 
 
-def compare(traces: TracesLike, *fits: FitResult | Several, start: StartLike = ESTIMATED) -> Comparison:
+def compare(
+    traces: TracesLike, *fits: FitResult | Several | Sequence[FitResult | Several], start: StartLike = ESTIMATED
+) -> Comparison:
     """Run fitted models over every case: fed with nothing but inputs and their own past output.
 
     Args:
         traces: The cases; those for validation count.
-        fits: What is compared; a fit of several outputs has a row for each.
+        fits: What is compared, or lists of it; a fit of several outputs has a row for each.
         start: How each free run begins, and from which sample on it is scored, as for :func:`~sysid.fit`.
 
     Returns:
         The figures; printing them shows a table, ``plot()`` draws them.
+
+    Raises:
+        ConfigError: If something else is compared, or nothing.
     """
     evaluations: dict[str, Evaluation] = {}
     outputs: dict[str, tuple[str, str]] = {}
     notes: dict[str, None] = {}
     traces, start = traces_of(traces, word="compare"), Start.of(start)
-    for fit in fits:
+    for fit in _fits(fits):
         members = [fit] if isinstance(fit, FitResult) else list(fit.fits.values())
         several = len(members) > 1 or len(members[0].model.mapping.outputs) > 1
         for one in members:
@@ -136,6 +143,23 @@ def compare(traces: TracesLike, *fits: FitResult | Several, start: StartLike = E
                 label = label if label not in evaluations else f"{label} ({len(evaluations) + 1})"
                 evaluations[label], outputs[label] = found, (output, units[output])
     return Comparison(evaluations=evaluations, outputs=outputs, notes=tuple(notes))
+
+
+def _fits(given: Sequence[Any]) -> list[FitResult | Several]:
+    """One after the other, whether they were given one by one or in lists."""
+    found = [one for part in given for one in (part if isinstance(part, list | tuple) else (part,))]
+    strangers = dict.fromkeys(
+        type(one).__name__ for one in found if not isinstance(one, FitResult) and not hasattr(one, "fits")
+    )
+    if strangers or not found:
+        raise ConfigError(
+            "sysid.compare takes fits",
+            where="fits",
+            expected="what sysid.fit gives, one or several",
+            got=", ".join(strangers) or "none",
+            remedy="write sysid.compare(traces, fit, other); of a model, the fit that it is of",
+        )
+    return found
 
 
 def _beyond(fit: FitResult, traces: TraceSet) -> tuple[str, ...]:

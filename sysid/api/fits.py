@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.api.comparison import compare
+from sysid.api.given import TracesLike, traces_of
 from sysid.api.saving import save
 from sysid.errors import ChannelError, TraceError
 from sysid.estimation import FitResult
@@ -139,7 +140,7 @@ class Fit(FitResult):
         return profile_again(self, self.traces.with_role(Role.ESTIMATION), self.start, name, level)
 
     def residuals(
-        self, traces: TraceSet | None = None, *, free_run: bool = False, output: str | None = None
+        self, traces: TracesLike | None = None, *, free_run: bool = False, output: str | None = None
     ) -> ResidualAnalysis:
         """Are the residuals white, and independent of the inputs?
 
@@ -151,7 +152,7 @@ class Fit(FitResult):
         Returns:
             Correlations with their bounds, and the Ljung-Box test.
         """
-        records = tuple(traces) if traces is not None else self.traces.with_role(Role.ESTIMATION)
+        records = self.traces.with_role(Role.ESTIMATION) if traces is None else traces_of(traces, word="fit").traces
         return analyse_residuals(self.model, records, self.start, free_run=free_run, output=output)
 
     def plot(self, traces: TraceSet | None = None) -> Figure:
@@ -179,7 +180,7 @@ class Fit(FitResult):
         """
         from sysid.reporting.figures.curves_figure import curves_figure
 
-        records = tuple(traces) if traces is not None else self.traces.with_role(Role.ESTIMATION)
+        records = self.traces.with_role(Role.ESTIMATION) if traces is None else traces_of(traces, word="fit").traces
         runs = [Experiment.for_model(trace, self.model, self.start) for trace in records]
         curves = curve_values(self.model, [(run.inputs, run.history) for run in runs])
         return curves_figure([curve.drawn() for curve in curves])

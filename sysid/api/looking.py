@@ -119,9 +119,21 @@ class SystemAdvice:
         return html_of(self)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ImpulseResponse(Estimated):
-    """An impulse response that draws itself."""
+    """An impulse response that draws itself; printed, it is what it says of each input."""
+
+    def __str__(self) -> str:
+        step, deviation = self.step()
+        lines = [f"impulse response, {self.mapping}: {100 * self.explained:.1f} % of the output explained"]
+        ends = zip(self.mapping.inputs, self.dead_times, self.settling(), step, deviation, strict=True)
+        for name, dead, settling, rise, error in ends:
+            acts = f"dead time {dead.best} ({dead.low} to {dead.high}) samples, settled after {settling} of them"
+            gain = f"gain {rise[-1]:.4g} +- {1.96 * error[-1]:.2g} (95 %)"
+            lines.append(f"{name}: {acts}, {gain}" if dead.acts else f"{name}: no effect that can be measured")
+        return "\n".join([*lines, *self.notes])
+
+    __repr__ = __str__
 
     def plot(self) -> Figure:
         """The response of every input with its 95 % band.
@@ -134,9 +146,16 @@ class ImpulseResponse(Estimated):
         return impulse_figure(self)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FrequencyResponse(response.FrequencyResponse):
-    """A frequency response that draws itself, beside models if asked."""
+    """A frequency response that draws itself, beside models if asked; printed, it says what it is."""
+
+    def __str__(self) -> str:
+        low, high = self.frequency[[0, -1]]
+        head = f"frequency response, {self.mapping}: {self.method.value}, {len(self.frequency)} points"
+        return "\n".join([f"{head} from {low:.4g} to {high:.4g} rad/s, averages {self.averages:.3g}", *self.notes])
+
+    __repr__ = __str__
 
     def plot(self, *fits: FitResult) -> Figure:
         """Gain, phase and coherence with 95 % bands, and the responses of linear models over them.

@@ -17,6 +17,7 @@ from sysid.errors import ConfigError
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
+from sysid.estimation.nonparametric.feedback import feedback_of
 from sysid.extras import need
 from sysid.models import ARX, Mapping, Start, StartLike
 from sysid.reporting.numbers import pole
@@ -33,6 +34,7 @@ LARGEST = 400_000
 """Candidates that a search without orders of its own tries at most: some seconds."""
 
 BY_SELECTION = "sorted by the free run over the selection traces"
+CLOSED_LOOP = "The output acts on an input within the sample (closed loop): dead times are searched from 1 on."
 FINALISTS = 40
 """Candidates that are run freely."""
 
@@ -126,7 +128,8 @@ class OrderSearch:
             if found == largest > 0
         ]
         arx = "The best" if self.others is None else "The best ARX model"
-        told = [f"{arx} stands at the end of what was tried ({', '.join(at_end)}): allow more."] if at_end else []
+        told = [CLOSED_LOOP] if grid.min_nk else []
+        told += [f"{arx} stands at the end of what was tried ({', '.join(at_end)}): allow more."] if at_end else []
         if self.others is not None:
             first = self.contenders[0].fit.model.structure.label
             at_largest = first in self.others.largest
@@ -219,7 +222,8 @@ def search_orders(
         max_na: Largest number of past outputs; by default as large as the record and the number of inputs allow, ten
             at most.
         max_nb: Largest number of past values of each input, likewise.
-        max_nk: Largest dead time, likewise.
+        max_nk: Largest dead time, likewise. The smallest is 0, and 1 where an input is set from the output of its own
+            sample (closed loop).
         start: How each free run begins.
         structures: Kinds beside ARX: ``SS``, ``TF``, ``OE``, ``ARMAX``, ``BJ``.
         most: Largest order of those.
@@ -254,7 +258,9 @@ def search_orders(
             got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
             remedy="give one that role",
         )
-    grid = _grid(sum(len(trace) for trace in estimation), len(chosen.inputs), (max_na, max_nb, max_nk))
+    feedback = feedback_of(estimation, chosen) if chosen.inputs and max_nk != 0 else ""
+    first = int(not isinstance(feedback, str) and feedback.at_once)
+    grid = _grid(sum(len(trace) for trace in estimation), len(chosen.inputs), (max_na, max_nb, max_nk), first)
     losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
     selection = traces.with_role(Role.SELECTION) if selection is None else tuple(selection)
     found = run_finalists(
@@ -278,12 +284,12 @@ def search_orders(
     )  # fmt: skip
 
 
-def _grid(samples: int, inputs: int, asked: tuple[int | None, int | None, int | None]) -> OrderGrid:
+def _grid(samples: int, inputs: int, asked: tuple[int | None, int | None, int | None], first: int) -> OrderGrid:
     """The orders that were asked for; those that were not, up to ten, as far as record and patience allow."""
-    grid = OrderGrid(max_na=1, max_nb=1, max_nk=0)
+    grid = OrderGrid(max_na=1, max_nb=1, max_nk=first, min_nk=first)
     for largest in range(1, 11):
         na, nb, nk = (largest if one is None else one for one in asked)
-        tried = OrderGrid(max_na=na, max_nb=nb, max_nk=nk, min_na=min(1, na), min_nb=min(1, nb))
+        tried = OrderGrid(max_na=na, max_nb=nb, max_nk=nk, min_na=min(1, na), min_nb=min(1, nb), min_nk=first)
         parameters = na + inputs * (nb + nk) + 1
         if largest > 1 and (tried.size(inputs) > LARGEST or 4 * parameters > samples):
             break

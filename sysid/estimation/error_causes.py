@@ -7,6 +7,8 @@ that the model leaves out, nothing of the inputs at all, and an error that lasts
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -47,12 +49,13 @@ STRAIGHT, STEEP = 0.4, 0.5
 OWN_PAST = 5
 
 
-def causes(model: AbstractModel, run: FreeRun) -> list[str]:
+def causes(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> list[str]:
     """The causes of an error that is more than it need be.
 
     Args:
         model: The fitted model.
         run: Its free run over a record that was fitted.
+        fed: Places of outputs that act on the inputs: that their errors move together says nothing.
 
     Returns:
         Sentences; none where the error is small, or what is left of it looks like noise.
@@ -65,11 +68,13 @@ def causes(model: AbstractModel, run: FreeRun) -> list[str]:
         spread = float(np.std(y[run.usable]))
         if not float(np.std((y - s)[run.usable])) > WORTH * spread:
             continue
-        told += _of_output(model, run, name, (y / spread, s / spread))
+        told += _of_output(model, run, name, (y / spread, s / spread), () if i in fed else None)
     return told
 
 
-def _of_output(model: AbstractModel, run: FreeRun, name: str, signals: tuple[Array, Array]) -> list[str]:
+def _of_output(
+    model: AbstractModel, run: FreeRun, name: str, signals: tuple[Array, Array], kept: tuple[int, ...] | None
+) -> list[str]:
     y, s = signals
     lone = _lone(y, s, run.usable)
     sound = run.usable & ~lone
@@ -79,7 +84,7 @@ def _of_output(model: AbstractModel, run: FreeRun, name: str, signals: tuple[Arr
     standing = _standing(y, s, sound)
     if standing:
         return [*told, standing.format(name=name)]
-    kept = informative(run.inputs[sound])
+    kept = informative(run.inputs[sound]) if kept is None else kept
     inputs = " and ".join(model.mapping.inputs[j] for j in kept)
     if kept:
         groups = features(run.inputs[:, list(kept)], s)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -24,7 +26,7 @@ NEARLY_ALL = 0.9
 """Part of what is new in an output that an input of the same sample explains, from which one may be the other."""
 
 
-def left_out(model: AbstractModel, run: FreeRun) -> list[str]:
+def left_out(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> list[str]:
     """Inputs that act at lags where the model lets them not.
 
     The error of the free run is explained by its own past and past inputs, and then by the inputs of the same sample as
@@ -34,6 +36,7 @@ def left_out(model: AbstractModel, run: FreeRun) -> list[str]:
     Args:
         model: The fitted model.
         run: Its free run over a record that was fitted.
+        fed: Places of outputs that act on the inputs: what moves together within a sample is the controller's.
 
     Returns:
         One sentence for each input and output of which this is so.
@@ -46,9 +49,9 @@ def left_out(model: AbstractModel, run: FreeRun) -> list[str]:
     for j in informative(run.inputs[usable]):
         for i in range(len(model.mapping.outputs)):
             worth = np.std(error[usable, i]) > LEAST_ERROR * np.std(run.output[usable, i])
-            if _has_path(model, run, j, i):
-                told += _read_backwards(model, run, j, i)
-            elif worth and (found := _at_once(model, run, error[:, i], j, i)):
+            if has_path(model, run, j, i):
+                told += [] if i in fed else _read_backwards(model, run, j, i)
+            elif worth and i not in fed and (found := _at_once(model, run, error[:, i], j, i)):
                 told += found
                 continue
             told += _elsewhere(model, run, error[:, i], j, i) if worth else []
@@ -60,10 +63,9 @@ def _at_once(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: 
     share, name, target = _share(error, run.inputs, j, run.usable), model.mapping.inputs[j], model.mapping.outputs[i]
     if share <= 0.0:
         return []
-    return [
-        f"{100 * share:.0f} % of what is new in the error of {target} moves with {name} of the same sample."
-        f" Either {name} acts at once, which this model leaves out ({_at(model, 0)}), or it is fed back from {target}."
-    ]
+    moves = f"{100 * share:.0f} % of what is new in the error of {target} moves with {name} of the same sample."
+    leaves = f"which this model leaves out ({at_lag(model, 0)})"
+    return [f"{moves} Either {name} acts at once, {leaves}, or it is fed back from {target}."]
 
 
 def _elsewhere(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: int, i: int) -> list[str]:
@@ -89,7 +91,7 @@ def _elsewhere(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j
 
 def _begin(model: AbstractModel, lag: int, late: int) -> str:
     """What to write for inputs that act from a lag on, in the words of the structure."""
-    words = _at(model, lag)
+    words = at_lag(model, lag)
     if words:
         return f"Begin there ({words}), or let it be searched (auto)."
     return (
@@ -98,8 +100,16 @@ def _begin(model: AbstractModel, lag: int, late: int) -> str:
     )
 
 
-def _at(model: AbstractModel, lag: int) -> str:
-    """How a structure says from which lag on its inputs act; empty where it cannot."""
+def at_lag(model: AbstractModel, lag: int) -> str:
+    """How a structure says from which lag on its inputs act.
+
+    Args:
+        model: A model of that structure.
+        lag: In samples.
+
+    Returns:
+        The words; empty where it cannot.
+    """
     structure = model.structure
     if hasattr(structure, "input_delays"):
         return f"input_delays from {lag}"
@@ -132,8 +142,18 @@ def _read_backwards(model: AbstractModel, run: FreeRun, j: int, i: int) -> list[
     ]
 
 
-def _has_path(model: AbstractModel, run: FreeRun, j: int, i: int) -> bool:
-    """Whether an output of the model moves with an input of the same sample."""
+def has_path(model: AbstractModel, run: FreeRun, j: int, i: int) -> bool:
+    """Whether an output of the model moves with an input of the same sample.
+
+    Args:
+        model: The fitted model.
+        run: Its free run.
+        j: Place of the input.
+        i: Place of the output.
+
+    Returns:
+        Whether it does.
+    """
     few = run.inputs[: LAGS + 1]
     moved = few.copy()
     moved[-1, j] += np.std(run.inputs[:, j]) or 1.0

@@ -199,7 +199,7 @@ class Estimator:
             found = self.with_posterior(found, traces, named["start"], given.get("selection", ()))
             told = () if found.posterior is not None else (f"No interval of the output: {self.no_posterior}.",)
             off = equilibrium_notes(found.model, traces, named["start"])
-            against = contradicted(found.model, traces, named["start"])
+            against = contradicted(found.model, traces, named["start"], options)
             few = (*outnumbered(found.model, traces), *underexcited(found.model, traces))
             warned = (*undetermined(traces, mapping), *few, *against, *off)
             told = (*told, *between_levels(found.model, traces))

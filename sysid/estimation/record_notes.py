@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.closed_loop import feedback_told
 from sysid.estimation.error_causes import causes
 from sysid.estimation.error_lags import left_out
 from sysid.estimation.fitted_run import FreeRun
@@ -158,23 +159,27 @@ def between_levels(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, 
     return tuple(told)
 
 
-def contradicted(model: AbstractModel, traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
+def contradicted(
+    model: AbstractModel, traces: Sequence[Trace], start: Start, training: object = None
+) -> tuple[str, ...]:
     """What the free run says against a model, over the very records that it was fitted to.
 
     Args:
         model: The fitted model.
         traces: The records; the first so many are looked at.
         start: What stands before each.
+        training: How it was fitted.
 
     Returns:
-        One sentence for each output whose free run a constant beats or equals, and for each input that acts at a lag
-        which the model leaves out, or at once without being asked.
+        One sentence for each output whose free run a constant beats or equals, for each that acts on the inputs, and
+        for each input that acts at a lag which the model leaves out, or at once without being asked.
     """
     runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
     longest = max(runs, key=lambda run: len(run.output))
-    lags = left_out(model, longest)
+    fed = feedback_told(model, traces, longest, training)
+    lags = left_out(model, longest, fed)
     # A lag that is left out is a cause, and the nearer one.
-    return (*_beside_a_constant(model, runs), *(lags or causes(model, longest)))
+    return (*_beside_a_constant(model, runs), *fed.values(), *(lags or causes(model, longest, fed)))
 
 
 def _beside_a_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[str]:

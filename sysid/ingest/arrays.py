@@ -109,7 +109,11 @@ def data(
 
 
 def _names(given: Names) -> tuple[str, ...] | None:
-    return None if given is None else (given,) if isinstance(given, str) else tuple(given)
+    """As columns are called: the number of a column without a name is its name, levels stand with dots between."""
+    if given is None:
+        return None
+    several: Iterable[Any] = given if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
+    return tuple(".".join(map(str, one)) if isinstance(one, tuple) else str(one) for one in several)
 
 
 def _experiments(values: Any) -> dict[str, Any]:

@@ -80,7 +80,7 @@ class Correlation:
         }
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ResidualAnalysis:
     """What the residuals of a model on some traces look like.
 
@@ -123,6 +123,11 @@ class ResidualAnalysis:
         if owed:
             return whiteness, f"Not independent of past {owed}: the model leaves out some of what they do."
         return whiteness, "Independent of every past input."
+
+    def __str__(self) -> str:
+        return "\n".join([f"{self.n_samples} residuals, variance {self.variance:.4g}", *self.sentences])
+
+    __repr__ = __str__
 
     def to_dict(self) -> dict[str, Any]:
         """The analysis as JSON values."""

@@ -7,6 +7,7 @@ import pytest
 
 import sysid
 from sysid.api.comparison import Comparison
+from sysid.errors import ConfigError
 
 U = np.repeat([0.0, 1.0, -1.0, 0.5, 0.0], 20)
 Y = np.convolve(U, 0.2 * 0.8 ** np.arange(40))[:100]
@@ -45,3 +46,12 @@ def test_nothing_compared_is_an_empty_table() -> None:
     assert str(empty) == "free run, fit in percent"
     assert empty.to_frame().empty
     assert empty.plot().axes
+
+
+def test_fits_are_compared_one_by_one_or_in_a_list_and_nothing_else_is(comparison: Comparison) -> None:
+    traces = sysid.data((U, Y), sample_time=0.1, split=0.6)
+    fit = sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=1, nk=0))
+    assert list(sysid.compare(traces, [fit]).evaluations) == list(sysid.compare(traces, fit).evaluations)
+    for strange, named in (((fit.model,), "ARXModel"), ((), "none"), (([],), "none")):
+        with pytest.raises(ConfigError, match=f"got: +{named}"):
+            sysid.compare(traces, *strange)

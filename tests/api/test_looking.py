@@ -68,3 +68,12 @@ def test_an_excitation_is_saved_and_read_again(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.traces[0].values, found.values)
     assert [channel.label for channel in again.channels] == ["a [V]", "b [mm]"]
     assert len(found.plot().axes) == 4
+
+
+def test_what_is_printed_says_what_was_estimated() -> None:
+    response = sysid.impulse_response(traces(), "u -> y", lags=30)
+    assert "u: dead time 2 (2 to 2) samples" in str(response) and "gain 0.999" in str(response)
+    assert repr(response) == str(response) and len(str(response).splitlines()) == 2
+    assert str(sysid.frequency_response(traces(), "u -> y")).startswith("frequency response, u -> y: SPA, ")
+    analysis = sysid.fit(traces(), "u -> y", sysid.ARX(na=1, nb=1, nk=1)).residuals(traces())
+    assert str(analysis).splitlines()[1:] == list(analysis.sentences)

@@ -65,7 +65,7 @@ def test_the_picture_and_the_table_are_there(found: OrderSearch) -> None:
 @pytest.mark.parametrize("inputs", [1, 2, 3, 5])
 @pytest.mark.parametrize("samples", [20, 100, 10_000])
 def test_what_is_not_asked_for_is_bounded_by_record_and_patience(samples: int, inputs: int) -> None:
-    grid = _grid(samples, inputs, (None, None, None))
+    grid = _grid(samples, inputs, (None, None, None), 0)
     assert grid.size(inputs) <= max(LARGEST, 2**inputs)
     assert grid.max_na <= 10
     assert grid.max_na == 1 or 4 * (grid.max_na + inputs * (grid.max_nb + grid.max_nk)) < samples

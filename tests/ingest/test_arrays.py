@@ -208,3 +208,14 @@ def test_two_series_whose_labels_differ_are_not_put_side_by_side() -> None:
         data((u, y), sample_time=0.1)
     (trace,) = data(pd.DataFrame({"u": u, "y": y}), sample_time=0.1)
     assert trace["y"].tolist() == list(range(29, -1, -1))
+
+
+def test_columns_are_named_by_their_numbers_and_by_their_levels() -> None:
+    frame = pd.DataFrame(np.column_stack([U, Y]))
+    for chosen in ({"inputs": [0], "outputs": [1]}, {"inputs": 0, "outputs": np.int64(1)}):
+        assert data(frame, sample_time=0.1, **chosen).traces[0].channel_names == ("0", "1")
+    frame.columns = pd.MultiIndex.from_tuples([("rig", "u"), ("rig", "y")])
+    assert data(frame, inputs=[("rig", "u")], outputs=["rig.y"], sample_time=0.1).traces[0].channel_names == (
+        "rig.u",
+        "rig.y",
+    )

@@ -3,6 +3,10 @@ r"""The impulse response of every input, regularised: no structure, no order, an
 Least squares on past inputs under a prior that decays and is smooth (:mod:`.kernels`), whose hyperparameters are those
 of largest evidence (:mod:`.evidence`). Coloured noise is whitened by an autoregression of the residuals, after which
 the response is estimated again: without that its bands would be too narrow.
+
+Where an input is set from the output of its own sample, the response of the same sample is the controller's and not the
+plant's. It is left out then: with its noise whitened, what is left is a direct estimate in closed loop (Ljung 1999,
+section 13.4).
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from sysid.errors import ConfigError, TraceError
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.nonparametric.dead_time import shares
 from sysid.estimation.nonparametric.evidence import Posterior, posterior
+from sysid.estimation.nonparametric.feedback import find_feedback
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse, settled
 from sysid.estimation.nonparametric.kernels import Kernel
 from sysid.estimation.nonparametric.lagged_rows import Regression
@@ -58,7 +63,8 @@ def estimate_impulse_response(
         mapping: Which channels go in, which comes out.
         lags: Length of the responses; by default as long as they take to settle, :data:`LONGEST` at most.
         dead_times: Of each input, in samples: its response is zero before. By default they are found, by the evidence,
-            and the response begins at the earliest that the data allow.
+            and the response begins at the earliest that the data allow; at lag 1 where an input is set from the
+            output of its own sample.
         kernel: The prior; by default the one with the larger evidence.
         noise_order: Order of the autoregression of the noise; chosen by BIC by default, 0 for white noise.
         longest: Lags at most, where they are not given.
@@ -75,6 +81,11 @@ def estimate_impulse_response(
     _check(mapping, lags, dead_times, noise_order)
     segments = segments_of(traces, mapping, shortest=2)
     scale = _scale(segments, mapping)
+    late = int(dead_times is None and _set_at_once(segments))
+    if late:
+        segments = tuple(
+            replace(s, inputs=s.inputs[:-1], output=s.output[1:], first=s.first + 1) for s in segments if len(s) > 2
+        )
     room = _room(segments, m, lags)
     length = room if lags is not None else min(FIRST_LENGTH, room)
     most = length if lags is not None else min(room, longest, MOST_COLUMNS // m)
@@ -86,8 +97,25 @@ def estimate_impulse_response(
         kernels = tuple(Kernel) if kernel is None else (kernel,)
         found = _stage(problem, np.ones(1), given, kernels, None)
         if length >= most or all(settled(row) for row in found.response):
-            return _result(_doubted(_whitened(found, given, kernels, noise_order)), traces, mapping)
+            result = _result(_doubted(_whitened(found, given, kernels, noise_order)), traces, mapping)
+            return _later(result) if late else result
         length = min(2 * length, most)
+
+
+def _set_at_once(segments: Sequence[Segment]) -> bool:
+    """Whether an input is set from the output of its own sample."""
+    found = find_feedback(segments)
+    return not isinstance(found, str) and found.at_once
+
+
+def _later(found: ImpulseResponse) -> ImpulseResponse:
+    """A response to the inputs of one sample before, as one to the inputs."""
+    dead = tuple(replace(one, best=one.best + 1, low=one.low + 1, high=one.high + 1) for one in found.dead_times)
+    told = (
+        f"{found.mapping.output} acts on {', '.join(found.mapping.inputs)} within the sample (closed loop): what moves "
+        "together there is the controller's, and is left out. What is left is right as far as the noise is modelled."
+    )
+    return replace(found, lags=found.lags + 1, dead_times=dead, notes=(*found.notes, told))
 
 
 def _check(mapping: Mapping, lags: int | None, dead_times: Sequence[int] | None, noise_order: int | None) -> None:
