@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid.reporting.charts import Chart, chart_figure
 from sysid.reporting.figures.svg import svg
 
 DATASET = """\
@@ -74,10 +75,11 @@ def fill(folder: Path) -> None:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def undrawn_pages(blank_picture: Callable[..., str]) -> Iterator[None]:
+def undrawn_pages(blank_picture: Callable[..., str], blank_chart: Callable[[Chart], None]) -> Iterator[None]:
     """Pages of runs have empty pictures, but for the tests that ask for ``drawn`` and for processes of their own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sysid.reporting.parts.svg", blank_picture)
+        patch.setattr("sysid.reporting.charts.chart_figure", blank_chart)
         yield
 
 
@@ -85,6 +87,7 @@ def undrawn_pages(blank_picture: Callable[..., str]) -> Iterator[None]:
 def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of the pictures."""
     monkeypatch.setattr("sysid.reporting.parts.svg", svg)
+    monkeypatch.setattr("sysid.reporting.charts.chart_figure", chart_figure)
 
 
 @pytest.fixture(scope="session")

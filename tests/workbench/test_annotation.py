@@ -22,12 +22,35 @@ from sysid.workbench.fits.record import read_scores
 from sysid.workbench.fits.run import run_pipeline
 
 U = Channel(name="u", unit="V")
+TRAIN = """\
+name: train
+sample_time: 0.1
+channels:
+  - {name: STP, unit: psi, reference: gauge}
+  - {name: BP, unit: psi, reference: gauge}
+  - {name: ER, unit: psi, reference: gauge}
+  - {name: AR, unit: psi, reference: gauge}
+  - {name: BC, unit: psi, reference: gauge}
+source:
+  generator: abdx
+  options:
+    variant: physical
+    pairs: 4
+    quantities: {STP: command, BP: {pipe: 3}, ER: {emergency: 3}, AR: {auxiliary: 3}, BC: {cylinder: 3}}
+cases:
+  EST01:
+    role: estimation
+    recipe: {time_unit: s, command: [[0, 90], [10, 74], [30, 90], [60, 0], [105, 90], [200, 90]]}
+  VAL05:
+    role: validation
+    recipe: {time_unit: s, command: [[0, 90], [15, 0], [60, 90], [180, 90]]}
+"""
 BRAKE = """\
 name: brake
-data: abdx-combined
-mapping: BP+AR+ER -> BC
+data: train
+mapping: BP -> BC
 rest: {BC: 0}
-fits: [{name: ARX, structure: {kind: ARX, na: 1, nb: [2, 2, 2], nk: [0, 0, 0]}}]
+fits: [{name: ARX, structure: {kind: ARX, na: 1, nb: [2], nk: [0]}}]
 export: null
 annotate: {by: brake-states, weights: {emergency: 4}}
 """
@@ -98,10 +121,19 @@ def test_a_misspelt_annotator_is_named() -> None:
         find_annotator("brake-state", where="here")
 
 
-def test_a_pipeline_reports_by_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def train(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A workspace with an emergency on a short train."""
+    folder = tmp_path / "datasets" / "train"
+    folder.mkdir(parents=True)
+    (folder / "dataset.yaml").write_text(TRAIN, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("train")
+def test_a_pipeline_reports_by_state(tmp_path: Path) -> None:
     file = tmp_path / "brake.yaml"
     file.write_text(BRAKE, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
     run_pipeline(read_pipeline(file), tmp_path / "run", command="sysid run brake")
     case = read_results(tmp_path / "run").fits[0].cases["VAL05"]
     assert case.by_state is not None
@@ -114,10 +146,8 @@ def test_a_pipeline_reports_by_state(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "Error by state" in (tmp_path / "run" / "report" / "index.html").read_text(encoding="utf-8")
 
 
-def test_weights_move_the_error_to_where_they_are_small(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quick_report: None
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("train", "quick_report")
+def test_weights_move_the_error_to_where_they_are_small(tmp_path: Path) -> None:
     found = []
     for weight in (1, 50):
         file = tmp_path / "brake.yaml"
@@ -130,14 +160,15 @@ def test_weights_move_the_error_to_where_they_are_small(
     assert found[1]["release"].mse > found[0]["release"].mse
 
 
+@pytest.mark.usefixtures("train")
 def test_a_data_set_is_annotated_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "states"
-    assert run_cli(["ingest", "abdx-combined", "--annotate", "brake-states", "--out", str(out)]) == 0
+    assert run_cli(["ingest", "train", "--annotate", "brake-states", "--out", str(out)]) == 0
     assert "emergency" in capsys.readouterr().out
     traces = load_dataset(out / "dataset.yaml")
     assert set(np.unique(traces["VAL05"]["STATE"])) <= set(range(7))
-    np.testing.assert_array_equal(traces["VAL05"]["BC"], load_dataset("abdx-combined", cases=["VAL05"])["VAL05"]["BC"])
-    assert run_cli(["ingest", "abdx-combined", "--annotate", "brake-states", "--out", str(out)]) == 2
+    np.testing.assert_array_equal(traces["VAL05"]["BC"], load_dataset("train")["VAL05"]["BC"])
+    assert run_cli(["ingest", "train", "--annotate", "brake-states", "--out", str(out)]) == 2
 
 
 def test_a_file_alone_cannot_be_annotated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

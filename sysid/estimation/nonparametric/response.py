@@ -222,7 +222,9 @@ def _response(spectra: Spectra, method: SpectralMethod, trace: Trace, mapping: M
     Y = np.real(spectra.matrices[:, m, m])
     own = np.real(np.einsum("fjj->fj", U))
     seen = np.all(own > UNSEEN * np.maximum(own.max(axis=0), np.finfo(np.float64).tiny), axis=1)
-    seen &= np.array([m == 1 or np.linalg.cond(_scaled(u)) < 1e8 for u in U])
+    if m > 1 and seen.any():
+        size = np.sqrt(own[seen])  # a lag window's side lobes make powers below zero, and those are not seen
+        seen[seen] = np.linalg.cond(U[seen] / (size[:, :, None] * size[:, None, :])) < 1e8
     n = len(Y)
     G, spread = np.full((n, m), np.nan + 0j), np.full((n, m), np.nan)
     rest, coherence, radius = np.full(n, np.nan), np.full(n, np.nan), np.full((n, m), np.nan)
@@ -258,8 +260,3 @@ def _response(spectra: Spectra, method: SpectralMethod, trace: Trace, mapping: M
         resolution=spectra.resolution,
         notes=tuple(notes),
     )
-
-
-def _scaled(U: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    size = np.sqrt(np.maximum(np.real(np.diag(U)), np.finfo(np.float64).tiny))
-    return np.asarray(U / np.outer(size, size), dtype=np.complex128)

@@ -77,6 +77,21 @@ def kind_of(cell: str, missing: Sequence[str] = ()) -> Kind:
     return _usual_kind(cell) if len(cell) <= SHORT else _kind(cell)
 
 
+def kinds_of(cells: Sequence[str], missing: Sequence[str] = ()) -> tuple[Kind, ...]:
+    """What the cells of a row look like, as :func:`kind_of` tells of each.
+
+    Args:
+        cells: Their texts.
+        missing: Texts that stand for a missing value in this file.
+
+    Returns:
+        The kinds.
+    """
+    if missing or max(map(len, cells), default=0) > SHORT:
+        return tuple([kind_of(cell, missing) for cell in cells])
+    return tuple(map(_usual_kind, cells))
+
+
 def _kind(cell: str) -> Kind:
     """What it looks like in any file; nearly every cell is a number."""
     text = cell.strip()
@@ -147,7 +162,7 @@ def split_rows(
     parser = csv.reader(kept, delimiter=separator, strict=True, skipinitialspace=separator == BLANKS)
     try:
         for cells in parser:
-            if any(cell and not cell.isspace() for cell in cells):
+            if any(map(str.strip, cells)):
                 yield Row(line=parser.line_num + line - 1, cells=cells)
     except csv.Error as error:
         if not whole and "unexpected end" in str(error):

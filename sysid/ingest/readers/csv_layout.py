@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from functools import cached_property
+from itertools import compress, pairwise
 from pathlib import Path
 
 from sysid.errors import ReaderError, shortened
@@ -23,6 +24,7 @@ from sysid.ingest.readers.csv_cells import (
     Row,
     is_units,
     kind_of,
+    kinds_of,
     split_rows,
     suffix_of,
     trimmed,
@@ -79,6 +81,7 @@ class _Split:
     lines: Sequence[str] = ()
     kinds: tuple[Kind, ...] = ()
     score: float = 0.0
+    _told: dict[tuple[Kind, ...], bool] = field(default_factory=dict, init=False)
 
     @property
     def width(self) -> int:
@@ -86,11 +89,23 @@ class _Split:
 
     def fits(self, row: Row) -> bool:
         """Whether a row goes on as the run does."""
-        return self.goes_on(tuple(map(kind_of, trimmed(row.cells, self.width))))
+        return self.goes_on(kinds_of(trimmed(row.cells, self.width)))
+
+    @cached_property
+    def fitting(self) -> list[bool]:
+        """Which rows do."""
+        return [self.fits(row) for row in self.rows]
+
+    def run(self, first: int = 0) -> list[Row]:
+        """Those of them from one on."""
+        return list(compress(self.rows[first:], self.fitting[first:]))
 
     def goes_on(self, kinds: tuple[Kind, ...]) -> bool:
         """Whether cells of these kinds go on as the run does."""
-        return len(kinds) == self.width and _merged(self.kinds, kinds) is not None and any(k in DATA for k in kinds)
+        if kinds not in self._told:  # rows are many, and their kinds few
+            goes = len(kinds) == self.width and _merged(self.kinds, kinds) is not None
+            self._told[kinds] = goes and any(kind in DATA for kind in kinds)
+        return self._told[kinds]
 
 
 @dataclass(kw_only=True)
@@ -125,7 +140,7 @@ def recognise(lines: Sequence[str], options: FileOptions, path: Path, *, whole: 
     _check_width(split, path)
     first = _first(split, options)
     numbers = NumberFormat(
-        decimal=options.decimal or _decimal([row for row in split.rows[first:] if split.fits(row)], path, options),
+        decimal=options.decimal or _decimal(split.run(first), path, options),
         thousands=options.thousands,
         missing=options.missing,
     )
@@ -206,7 +221,7 @@ def _best(lines: list[str], given: str | None, options: FileOptions, path: Path,
 
 def _has_decimal_commas(split: _Split) -> bool:
     """Whether what looks like two columns of whole numbers is one with a decimal comma, as its header has one cell."""
-    first = next((i for i, row in enumerate(split.rows) if split.fits(row)), 0)
+    first = next((i for i, fits in enumerate(split.fitting) if fits), 0)
     if split.separator != "," or split.width != 2 or first == 0 or len(split.rows[first - 1].cells) != 1:
         return False
     plain = all("." not in cell and '"' not in cell for row in split.rows[first:] for cell in row.cells)
@@ -219,11 +234,14 @@ def _runs(separator: str, rows: list[Row], options: FileOptions) -> _Split:
     run: tuple[Kind, ...] = ()
     best_score = 0.0
     length = 0
-    found = [tuple(kind_of(cell, options.missing) for cell in row.cells) for row in rows]
+    found = [kinds_of(row.cells, options.missing) for row in rows]
+    numeric = 0.0
     for kinds in found:
-        merged = _merged(run, kinds)
-        length, run = (1, kinds) if merged is None else (length + 1, merged)
-        score = length * _numeric(run) ** 2
+        merged = run if kinds == run else _merged(run, kinds)
+        length, going = (1, kinds) if merged is None else (length + 1, merged)
+        if going is not run:
+            run, numeric = going, _numeric(going) ** 2
+        score = length * numeric
         if score > best_score:
             best, best_score = run, score
     split = _Split(separator=separator, rows=rows, kinds=best)
@@ -278,8 +296,7 @@ def _first(split: _Split, options: FileOptions) -> int:
     """Index of the first row of numbers."""
     if options.header is False:
         return next(i for i, row in enumerate(split.rows) if len(trimmed(row.cells, split.width)) == split.width)
-    fitting = [i for i, row in enumerate(split.rows) if split.fits(row)]
-    first = fitting[0]
+    first = split.fitting.index(True)
     if options.header and first == 0 and len(split.rows) > 1:
         return 1
     top = first
@@ -301,19 +318,22 @@ def _numbers_in(split: _Split, index: int) -> int:
 
 
 def _suffixes(split: _Split, first: int) -> tuple[str, ...]:
-    found: list[set[str]] = [set() for _ in split.kinds]
-    for row in filter(split.fits, split.rows[first:]):
-        for index, cell in enumerate(trimmed(row.cells, split.width)):
-            if cell.strip() and kind_of(cell) is Kind.NUMBER:
-                found[index].add(suffix_of(cell.strip()))
-    return tuple(suffixes.pop() if len(suffixes) == 1 else "" for suffixes in found)
+    rows = [trimmed(row.cells, split.width) for row in split.run(first)]
+
+    def suffix(index: int) -> str:
+        cells = (row[index].strip() for row in rows)
+        suffixes = (suffix_of(cell) for cell in cells if cell and kind_of(cell) is Kind.NUMBER)
+        one = next(suffixes, "")
+        return one if one and all(other == one for other in suffixes) else ""  # most numbers have none: one tells
+
+    return tuple(suffix(index) for index in range(split.width))
 
 
 def _decimal(rows: Sequence[Row], path: Path, options: FileOptions) -> str:
     if options.thousands == ",":
         return "."
-    commas = next((row for row in rows for cell in row.cells if _COMMA.fullmatch(cell.strip())), None)
-    points = next((row for row in rows for cell in row.cells if _POINT.fullmatch(cell.strip())), None)
+    commas = next((row for row in rows for cell in row.cells if "," in cell and _COMMA.fullmatch(cell.strip())), None)
+    points = next((row for row in rows for cell in row.cells if "." in cell and _POINT.fullmatch(cell.strip())), None)
     if commas and points and options.thousands is None:
         raise ReaderError(
             "the file holds numbers with a decimal comma and numbers with a decimal point",
@@ -403,7 +423,7 @@ def _is_units(above: list[Row], split: _Split) -> bool:
 def _rises(split: _Split) -> bool:
     """Whether the first column goes up from row to row, as time does."""
     try:
-        values = [float(row.cells[0].replace(",", ".")) for row in filter(split.fits, split.rows[:100])]
+        values = [float(row.cells[0].replace(",", ".")) for row in compress(split.rows[:100], split.fitting)]
     except ValueError:
         return False
     return len(values) > 2 and all(after > before for before, after in pairwise(values))

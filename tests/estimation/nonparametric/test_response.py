@@ -98,3 +98,12 @@ def test_too_short_a_record_and_one_without_inputs_are_refused() -> None:
         estimate_frequency_response([record(9, 7)], TWO)
     with pytest.raises(ConfigError):
         estimate_frequency_response([record(100, 7)], Mapping.parse("-> y"))
+
+
+def test_a_tone_beside_a_broad_input_is_not_seen_where_it_has_no_power() -> None:
+    rng = np.random.default_rng(5)
+    u = np.stack([rng.standard_normal(2000), 1e4 * np.sin(0.8 * np.arange(2000))], axis=1)
+    found = estimate_frequency_response([trace(u, lfilter([0, 0.4], [1, -0.7], u[:, 0]))], TWO)
+    lost = found.inputs[:, 1] <= 0.0
+    assert lost.any()
+    assert np.isnan(found.values[lost]).all()
