@@ -47,12 +47,14 @@ def write_trace(trace: Trace, path: str | Path) -> Path:
     return writers[path.suffix.lower()](trace, path)
 
 
-def write_csv(trace: Trace, path: str | Path) -> Path:
+def write_csv(trace: Trace, path: str | Path, *, plain: bool = False) -> Path:
     """Write a trace as CSV: UTF-8, commas, units in the header, every digit of float64.
 
     Args:
         trace: The trace.
         path: The file.
+        plain: Whether its first line is that of the columns, for readers that know no comments; else a comment has what
+            columns cannot say.
 
     Returns:
         The path.
@@ -64,7 +66,8 @@ def write_csv(trace: Trace, path: str | Path) -> Path:
     for channel in trace.channels:
         _check_name(channel, path)
     text = io.StringIO(newline="")
-    text.write(f"# sysid: {_head(trace)}\n")
+    if not plain:
+        text.write(f"# sysid: {_head(trace)}\n")
     writer = csv.writer(text, lineterminator="\n")
     columns = _columns(trace)
     writer.writerow([csv_cell(label) for label, _ in columns])

@@ -40,6 +40,12 @@ class CallableReference:
                 where=f"python: {config.python}", expected=f"{name} in {module}, in {config.folder} or installed",
                 got=f"{type(error).__name__}: {error}", remedy="correct the name, or give its folder under folder",
             ) from None  # fmt: skip
+        if not callable(self.function):
+            raise ConfigError(
+                "what the reference names is no function", where=f"python: {config.python}",
+                expected="a function of times, inputs and parameters", got=type(self.function).__name__,
+                remedy="name a function, or an object that can be called like one",
+            )  # fmt: skip
 
     @property
     def digest(self) -> str:
@@ -60,5 +66,6 @@ class CallableReference:
         try:
             values = self.function(time, inputs, dict(parameters))
         except Exception as error:
-            raise RunError(f"it raised {type(error).__name__}: {error}") from error
+            words = " ".join(str(error).split())
+            raise RunError(f"it raised {type(error).__name__}{': ' + words if words else ''}") from error
         return None, checked(values, self.config, len(inputs))

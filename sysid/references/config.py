@@ -66,26 +66,21 @@ class Port(_Strict):
         return self
 
 
-class InputPort(Port):
-    """An input that experiments move.
+class VariedPort(Port):
+    """What experiments choose values of.
 
     Args:
-        range: Levels, never left.
-        rate: Largest change in a second, in its unit; ``None`` for steps.
-        levels: The only levels that it may have, where it cannot have all in its range.
-        start: Where every experiment begins; the middle of the range by default.
+        range: The values, never left.
+        levels: The only ones that it may have, where it cannot have all in its range.
     """
 
     range: Span
-    rate: Annotated[float, Field(gt=0.0)] | None = None
     levels: tuple[float, ...] | None = None
-    start: float | None = None
 
     @model_validator(mode="after")
-    def _within(self) -> InputPort:
+    def _within(self) -> VariedPort:
         low, high = self.range
-        inside = [*(self.levels or ()), *([] if self.start is None else [self.start])]
-        outside = [value for value in inside if not low <= value <= high]
+        outside = [value for value in self._named if not low <= value <= high]
         if outside or self.levels == ():
             raise FieldError(
                 "a level or the start is outside the range" if outside else "no level is allowed",
@@ -95,22 +90,59 @@ class InputPort(Port):
         return self
 
     @property
+    def _named(self) -> tuple[float, ...]:
+        """Values that are asked for by number."""
+        return self.levels or ()
+
+    def at_levels(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values as they may be.
+
+        Args:
+            x: Values, shape ``(n,)``.
+
+        Returns:
+            The nearest levels, where there are some.
+        """
+        if self.levels is None:
+            return x
+        levels = np.sort(np.array(self.levels))
+        return np.asarray(levels[np.argmin(np.abs(x[:, np.newaxis] - levels), axis=1)], dtype=np.float64)
+
+
+class InputPort(VariedPort):
+    """An input that experiments move.
+
+    Args:
+        range: Levels, never left.
+        rate: Largest change in a second, in its unit; ``None`` for steps.
+        levels: The only levels that it may have, where it cannot have all in its range.
+        start: Where every experiment begins; the middle of the range by default.
+    """
+
+    rate: Annotated[float, Field(gt=0.0)] | None = None
+    start: float | None = None
+
+    @property
+    def _named(self) -> tuple[float, ...]:
+        return (*(self.levels or ()), *(() if self.start is None else (self.start,)))
+
+    @property
     def begin(self) -> float:
         """Where experiments begin: one of the levels where there are some."""
         wish = 0.5 * sum(self.range) if self.start is None else self.start
         return wish if self.levels is None else min(self.levels, key=lambda level: abs(level - wish))
 
 
-class ParameterPort(Port):
+class ParameterPort(VariedPort):
     """A parameter that differs from experiment to experiment; a constant input of the surrogate.
 
     Args:
         range: Its values.
+        levels: The only ones that it may have.
         variable: Of an FMU, the variable that is set where it has another name: ``variable: x`` of a parameter
             ``x_start`` gives the start value of an output ``x``.
     """
 
-    range: Span
     variable: str | None = None
 
 
@@ -130,6 +162,7 @@ class ReferenceConfig(_Strict):
         program: A command line as a list; ``{inputs}`` and ``{outputs}`` in it stand for the files that are passed, and
             ``{name}`` for a parameter. No shell is in between.
         format: Of the files of a program.
+        exit_codes: With which a program ends when all is well.
         files: Further files that a result depends on, such as the program's own input: a change of them runs anew.
         folder: Where modules are found and programs run, relative to the YAML; the YAML's folder by default.
         sample_time: Seconds between samples.
@@ -147,6 +180,7 @@ class ReferenceConfig(_Strict):
     python: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")] | None = None
     program: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     format: Literal["csv", "parquet"] = "csv"
+    exit_codes: Annotated[tuple[int, ...], Field(min_length=1)] = (0,)
     files: tuple[str, ...] = ()
     folder: str = "."
     sample_time: Annotated[float, Field(gt=0.0)]

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import ConfigError, UnitError
-from sysid.references.fmu import INTEGERS, read_fmu
-from sysid.units import check_unit
+from sysid.errors import ConfigError
+from sysid.references.fmu import read_fmu
+from sysid.references.fmu_variables import INTEGERS, declared_unit
 
 SAMPLES = 500
 """Of an experiment, where the description says how long one is and not how finely it is sampled."""
@@ -87,7 +87,7 @@ def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
 
 def _parameter(variable: Any, span: tuple[float, float], ports: set[str]) -> tuple[str, dict[str, Any]]:
     """The name of a parameter, and its fields; of a variable that is an output, it is the start value."""
-    fields: dict[str, Any] = {"unit": _unit(variable), "range": list(span)}
+    fields: dict[str, Any] = {"unit": _unit(variable), "range": list(span), **_levels(variable, *span)}
     if variable.name not in ports:
         return variable.name, fields
     return f"{variable.name}_start", {**fields, "variable": variable.name}
@@ -102,15 +102,21 @@ def _input(variable: Any, wish: Wish, notes: list[str]) -> dict[str, Any]:
         found["range"] = [low, high]
         notes.append(f"{variable.name}: {low:g} to {high:g}, as the model description has min and max")
     elif str(variable.type) == "Boolean":
-        found |= {"range": [0.0, 1.0], "levels": [0.0, 1.0]}
+        found["range"] = [0.0, 1.0]
         notes.append(f"{variable.name}: 0 and 1, as it is a truth value")
     if "range" in found:
         low, high = found["range"]
         if start is not None and low <= start <= high:
             found["start"] = start
-        if str(variable.type) in INTEGERS:
-            found["levels"] = [float(k) for k in range(int(np.ceil(low)), min(int(high), int(low) + 200) + 1)]
+        found |= _levels(variable, low, high)
     return found
+
+
+def _levels(variable: Any, low: float, high: float) -> dict[str, list[float]]:
+    """The values of what is a whole number or a truth value; nothing of any other."""
+    if str(variable.type) not in {*INTEGERS, "Boolean"}:
+        return {}
+    return {"levels": [float(k) for k in range(int(np.ceil(low)), min(int(high), int(low) + 200) + 1)]}
 
 
 def _times(described: Any, wish: Wish, notes: list[str]) -> tuple[float | None, float | None]:
@@ -138,8 +144,4 @@ def _number(text: object) -> float | None:
 
 
 def _unit(variable: Any) -> str:
-    unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None) or "1"
-    try:
-        return check_unit(str(unit))
-    except UnitError:
-        return "1"
+    return declared_unit(variable) or "1"

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from scipy.stats import qmc
 
+from sysid.errors import ConfigError
 from sysid.excitation import excite
 from sysid.excitation.kinds import KINDS, kind_of
-from sysid.references.config import InputPort, ReferenceConfig
+from sysid.references.config import MOST_SAMPLES, InputPort, ReferenceConfig
 from sysid.references.coverage import cells, most_seen
 from sysid.references.events import Events
 from sysid.references.runs import Case
@@ -21,6 +22,10 @@ from sysid.yaml_files import FieldError
 OWN = ("events",)
 """Signals that are drawn here, beside those of :mod:`sysid.excitation`."""
 USUAL = ("aprbs", "ramps", "multisine", "events", "aprbs", "staircase")
+FEWEST = 20
+"""Samples of an experiment: of fewer nothing can be chosen by."""
+STILL = 1e-3
+"""Share of its range by which an input has to move in what is fitted, or nothing can be said of what it does."""
 PREFIX = {"estimation": "EST", "selection": "SEL", "test": "TST"}
 
 
@@ -136,13 +141,53 @@ def designed(config: ReferenceConfig, design: Design) -> dict[str, list[Case]]:
 
     Returns:
         By role; no two have the same random numbers.
+
+    Raises:
+        ConfigError: If nothing could happen in them, or an input never moves in those that are fitted.
     """
     counts = {role: getattr(design.runs, role) for role in PREFIX}
-    return {
+    found = {
         role: drawn(config, design, count, seed=(design.seed, place), prefix=PREFIX[role], fitted=role == "estimation")
         for place, (role, count) in enumerate(counts.items())
         if count
     }
+    _check_moving(config, found["estimation"])
+    return found
+
+
+def _check_moving(config: ReferenceConfig, cases: Sequence[Case]) -> None:
+    """Refuse inputs of which the experiments that are fitted say nothing."""
+    for k, (name, port) in enumerate(config.inputs.items()):
+        values = np.concatenate([case.inputs[:, k] for case in cases])
+        span = port.range[1] - port.range[0]
+        if np.ptp(values) < STILL * span:
+            raise ConfigError(
+                f"{name} does not move in the experiments that are fitted", where=f"input {name}",
+                expected=f"changes of {STILL * span:.3g} of its range of {span:.3g}, or more",
+                got=f"{np.ptp(values):.3g}, with levels {port.levels}, rate {port.rate} and what experiment asks for",
+                remedy="allow two levels, a faster rate, shorter rests or a longer duration; what is not to move is no "
+                "input of an experiment",
+            )  # fmt: skip
+
+
+def _check_times(config: ReferenceConfig, design: Design) -> None:
+    """Refuse experiments in which nothing can happen, or that no memory holds."""
+    h, shortest = config.sample_time, design.holds(config.sample_time)[0]
+    samples = design.duration / h
+    if not FEWEST <= samples <= MOST_SAMPLES:
+        raise ConfigError(
+            "an experiment has too few samples" if samples < FEWEST else "an experiment has too many samples",
+            where="experiment.duration", expected=f"{FEWEST * h:g} to {MOST_SAMPLES * h:g} s: {FEWEST} to "
+            f"{MOST_SAMPLES:,} samples of sample_time {h:g} s", got=f"{design.duration:g} s",
+            remedy="change duration or sample_time",
+        )  # fmt: skip
+    lead = 0.0 if design.lead is None else design.lead
+    if config.inputs and lead + shortest * h > design.duration:
+        raise ConfigError(
+            "nothing would move in an experiment", where="experiment", expected="a lead, and the shortest time at a "
+            f"level after it, within the {design.duration:g} s of duration", got=f"lead {lead:g} s, hold from "
+            f"{shortest * h:g} s", remedy="shorten hold or lead, or lengthen duration",
+        )  # fmt: skip
 
 
 def drawn(
@@ -168,7 +213,11 @@ def drawn(
 
     Returns:
         The experiments.
+
+    Raises:
+        ConfigError: If nothing could happen in them.
     """
+    _check_times(config, design)
     parameters = _spread(config, design, count, np.random.default_rng([*seed, 1]), to_the_ends=fitted)
     seeds = np.random.default_rng([*seed, 2]).integers(2**31, size=count)
     if fitted and design.among > 1 and config.inputs:
@@ -217,7 +266,8 @@ def _spread(
         unit = qmc.LatinHypercube(len(ranges), rng=rng).random(count)
     if to_the_ends and count > 1:
         unit = (unit - unit.min(axis=0)) / np.ptp(unit, axis=0)
-    return np.asarray(ranges[:, 0] + unit * (ranges[:, 1] - ranges[:, 0]))
+    values = ranges[:, 0] + unit * (ranges[:, 1] - ranges[:, 0])
+    return np.column_stack([port.at_levels(x) for port, x in zip(config.parameters.values(), values.T, strict=True)])
 
 
 def moved(config: ReferenceConfig, design: Design, excited: Excited, seed: int) -> NDArray[np.float64]:
@@ -277,9 +327,7 @@ def _usual(kind: str, length: int, shortest: int, longest: int, h: float) -> Map
 
 def _kept_to(x: NDArray[np.float64], port: InputPort, h: float) -> NDArray[np.float64]:
     """A signal within what its port allows: levels first, then the rate, which a level must then be reached at."""
-    if port.levels is not None:
-        levels = np.sort(np.array(port.levels))
-        x = levels[np.argmin(np.abs(x[:, np.newaxis] - levels), axis=1)]
+    x = port.at_levels(x)
     if port.rate is not None:
         most, y = port.rate * h, x.copy()
         for k in range(1, len(y)):

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError
+from sysid.errors import ChannelError, ConfigError, UnitError
 from sysid.extras import need
-from sysid.references.config import ReferenceConfig
+from sysid.references.config import Port, ReferenceConfig
+from sysid.references.fmu_variables import check_variables, declared_unit, type_of
 from sysid.references.kinds import RunError, checked
+from sysid.units import convert
 
-TYPES: Mapping[str, Any] = {"Real": np.float64, "Float64": np.float64, "Float32": np.float32, "Boolean": np.bool_}
-INTEGERS = ("Integer", "Enumeration", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64")
 VERSION, HEAD = re.compile(rb"""fmiVersion\s*=\s*["']([\w.-]{1,20})["']"""), 65_536
 PURPOSE = "running an FMU"
 
@@ -84,9 +84,42 @@ class FmuReference:
         if missing:
             raise ChannelError(missing, list(self.variables), where=self.path)
         self.interface = self._interface()
+        check_variables(config, self.variables, self.path)
+        self.units = {name: self._unit(name, port) for name, port in self._ports.items()}
         self.place = tempfile.TemporaryDirectory(prefix="sysid-fmu-")
         with zipfile.ZipFile(self.path) as archive:
             archive.extractall(self.place.name)
+
+    @property
+    def _ports(self) -> dict[str, Port]:
+        config = self.config
+        return {**config.inputs, **config.parameters, **config.outputs}
+
+    def _unit(self, name: str, port: Port) -> str:
+        """The unit that a port's numbers have in the FMU; where one side does not say, that of the other."""
+        declared = declared_unit(self.variables[self.config.variables.get(name, name)])
+        if declared is None or "1" in {declared, port.unit}:
+            return port.unit
+        try:
+            convert(np.zeros(1), port.unit, declared)
+        except UnitError:
+            raise ConfigError(
+                f"{name} has another unit in the FMU", where=self.path, expected=declared, got=port.unit,
+                remedy=f"give it in {declared}, or in a unit that can be converted to it",
+            ) from None  # fmt: skip
+        return declared
+
+    def _given(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of an input or a parameter as the FMU takes them."""
+        return self._converted(values, self._ports[name].unit, self.units[name])
+
+    def _taken(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of an output as they are asked for."""
+        return self._converted(values, self.units[name], self._ports[name].unit)
+
+    @staticmethod
+    def _converted(values: NDArray[np.float64], unit: str, other: str) -> NDArray[np.float64]:
+        return values if unit == other else convert(values, unit, other)
 
     def _interface(self) -> str:
         has = {
@@ -128,7 +161,7 @@ class FmuReference:
         rows = np.searchsorted(found["time"], ends - 1e-6 * h)
         if rows[-1] >= len(found):
             raise RunError(f"the FMU ended by itself at {float(found['time'][-1]):g} s")
-        outputs = np.column_stack([found[name][rows].astype(np.float64) for name in names])
+        outputs = np.column_stack([self._taken(name, found[name][rows].astype(np.float64)) for name in names])
         # Before the first sample something may not be a number yet; nobody needs it then.
         first = outputs[0] if np.isfinite(outputs[0]).all() else None
         return first, checked(outputs[1:], self.config, n)
@@ -141,18 +174,21 @@ class FmuReference:
         signals = np.zeros(2 * len(inputs), dtype=[("time", np.float64), *((name, self._type(name)) for name in names)])
         signals["time"] = np.repeat(ends, 2)[1:-1]
         for name, column in zip(names, inputs.T, strict=True):
-            held = np.repeat(column, 2)
+            held = np.repeat(self._given(name, column), 2)
             signals[name] = held if self._type(name) in {np.float64, np.float32} else np.round(held)
         return signals
 
     def _type(self, name: str) -> Any:
-        kind = str(self.variables[name].type)
-        return np.int32 if kind in INTEGERS else TYPES.get(kind, np.float64)
+        return type_of(self.variables[name])
 
     def _starts(self, parameters: Mapping[str, float]) -> dict[str, float | int | bool]:
         """Parameters as the variables that they set."""
         variables = self.config.variables
-        return {variables.get(name, name): self._start(variables.get(name, name), x) for name, x in parameters.items()}
+        own = {
+            name: float(self._given(name, np.array([x]))[0]) if name in variables else x
+            for name, x in parameters.items()
+        }
+        return {variables.get(name, name): self._start(variables.get(name, name), x) for name, x in own.items()}
 
     def _start(self, name: str, value: float) -> float | int | bool:
         kind = self._type(name)

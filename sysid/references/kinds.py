@@ -6,14 +6,14 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.references.config import ReferenceConfig
 
-FORMAT = 1
+FORMAT = 2
 """Of what runs mean; a change makes all that are kept void."""
 
 
@@ -86,10 +86,7 @@ def checked(values: object, config: ReferenceConfig, samples: int) -> NDArray[np
         RunError: Saying what is wrong, and where.
     """
     names = list(config.outputs)
-    try:
-        found = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise RunError(f"it gave no numbers but {type(values).__name__}") from None
+    found = _numbers(_by_name(values, names))
     if found.ndim == 1 and len(names) == 1:
         found = found[:, np.newaxis]
     if found.shape != (samples, len(names)):
@@ -102,6 +99,49 @@ def checked(values: object, config: ReferenceConfig, samples: int) -> NDArray[np
         row, column = (int(one) for one in bad[0])
         raise RunError(f"{names[column]} is {found[row, column]} at {row * config.sample_time:g} s")
     return found
+
+
+def _by_name(values: object, names: Sequence[str]) -> object:
+    """Columns that have names by these, whatever their order; what has none as it is."""
+    if isinstance(values, Mapping):
+        columns: Mapping[Any, Any] = values
+    elif hasattr(values, "columns") and hasattr(values, "__getitem__"):
+        columns = {name: values[name] for name in values.columns}
+        if list(columns) == list(range(len(columns))):  # a frame whose columns have numbers for names
+            return values
+    else:
+        return values
+    missing = [name for name in names if name not in columns]
+    if missing:
+        raise RunError(f"it gave no column {missing[0]}, only {', '.join(map(str, columns)) or 'none'}")
+    parts = [_numbers(columns[name]) for name in names]
+    if len({one.shape for one in parts}) > 1 or parts[0].ndim != 1:
+        shapes = ", ".join(str(one.shape) for one in parts)
+        raise RunError(f"it gave columns of shapes {shapes}, where a number a sample was expected in each")
+    return np.column_stack(parts)
+
+
+def _numbers(values: object) -> NDArray[np.float64]:
+    """Real numbers; a masked one is none. Text is not taken for numbers, nor part of a complex number for it."""
+    if isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "biuf":
+        return np.ma.filled(values.astype(np.float64), np.nan)
+    try:
+        found = np.asarray(values)
+        if found.dtype.kind == "c":
+            if found.imag.any():
+                raise RunError("it gave complex numbers, where real ones were expected")
+            found = found.real
+        elif found.dtype.kind == "O":  # numbers of several kinds, and None for a missing one
+            found = np.array([np.nan if one is None else one for one in found.ravel()], dtype=object).reshape(
+                found.shape
+            )
+            if any(isinstance(one, str | bytes) for one in found.ravel()):
+                raise TypeError
+        elif found.dtype.kind not in "biuf":
+            raise TypeError
+        return found.astype(np.float64)
+    except (TypeError, ValueError):
+        raise RunError(f"it gave no numbers but {type(values).__name__}") from None
 
 
 def with_files(own: str, config: ReferenceConfig, files: Sequence[str]) -> str:

@@ -210,6 +210,7 @@ class ReferenceRuns:
                 "reference": [FORMAT, config.kind, self.digest],
                 "inputs": [[k, p.unit] for k, p in config.inputs.items()],
                 "outputs": [[k, p.unit] for k, p in config.outputs.items()],
+                "units": [[k, p.unit] for k, p in config.parameters.items()],
                 "values": hashlib.sha256(np.ascontiguousarray(case.inputs).tobytes()).hexdigest(),
                 "samples": len(case.inputs),
                 "parameters": sorted({**config.constants, **case.parameters}.items()),
@@ -218,6 +219,7 @@ class ReferenceRuns:
                 "format": config.format if config.kind == "program" else "",
                 # Said only where it matters, so that what was kept before it could be said is found.
                 **({"variables": sorted(renamed.items())} if renamed else {}),
+                **({"exit_codes": sorted(config.exit_codes)} if config.exit_codes != (0,) else {}),
             }
         )
 

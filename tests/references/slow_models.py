@@ -7,6 +7,7 @@ import time as clock
 from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -214,3 +215,27 @@ def counted(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
         file.write(f"{inputs.sum():.12g}\n")
     clock.sleep(0.05)
     return inputs[:, :1]
+
+
+def gives(time: Array, inputs: Array, parameters: Mapping[str, float]) -> object:
+    """What somebody's function may give for a record of two outputs; the number of ``how`` says what."""
+    y, z = 0.5 * inputs[:, 0], 100.0 * inputs[:, 0]
+    both = np.column_stack([y, z])
+    return [
+        lambda: pd.DataFrame({"z": z, "y": y}),
+        lambda: {"z": z.tolist(), "y": y.astype(np.float32)},
+        both.tolist,
+        lambda: both.astype(np.float32),
+        lambda: pd.DataFrame(both),
+        lambda: both + 0j,
+        lambda: both + 1j,
+        lambda: pd.DataFrame({"a": z, "y": y}),
+        lambda: np.ma.masked_array(both, mask=both > 60.0),
+        lambda: [[str(one) for one in row] for row in both],
+        lambda: both[:-1],
+        lambda: {"y": y, "z": z[:-1]},
+        lambda: None,
+    ][int(parameters["how"])]()
+
+
+NO_FUNCTION = 3

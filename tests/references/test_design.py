@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
+from sysid.errors import ConfigError
 from sysid.excitation import KINDS
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import OWN, Counts, Design, designed, drawn
@@ -36,6 +38,43 @@ def test_every_signal_stays_within_range_rate_and_levels_and_begins_at_the_start
         assert np.abs(np.diff(valve)).max() <= 0.4 + 1e-12
         assert set(gear) <= {1.0, 2.0, 4.0}
         assert np.ptp(valve) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("inputs", "experiment", "words"),
+    [
+        ({"levels": [2.0]}, {}, "u does not move"),
+        ({"rate": 1e-9}, {}, "u does not move"),
+        ({}, {"excitations": [{"kind": "events", "options": {"rest": [1e3, 2e3]}}]}, "u does not move"),
+        ({}, {"duration": 0.1}, "too few samples"),
+        ({}, {"duration": 1e9}, "too many samples"),
+        ({}, {"hold": [100, 200]}, "nothing would move"),
+        ({}, {"lead": 60}, "nothing would move"),
+    ],
+)
+def test_experiments_in_which_nothing_happens_are_refused(
+    inputs: dict[str, Any], experiment: dict[str, Any], words: str
+) -> None:
+    ports = {"inputs": {"u": {"range": [-10, 10], **inputs}}, "parameters": {}}
+    config = ReferenceConfig.model_validate({**CONFIG.model_dump(exclude={"inputs", "parameters"}), **ports})
+    with pytest.raises(ConfigError, match=words) as caught:
+        designed(config, Design.model_validate({"duration": 60.0, **experiment}))
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize("kind", [*KINDS, *OWN])
+def test_the_shortest_experiment_that_is_not_refused_can_be_drawn(kind: str) -> None:
+    for case in designed(CONFIG, Design.model_validate({"duration": 2.0, "excitations": [kind]}))["test"]:
+        assert case.inputs.shape == (20, 2)
+
+
+def test_a_parameter_may_have_levels() -> None:
+    port = {"teeth": {"range": [10, 20], "levels": [10, 14, 20]}}
+    config = ReferenceConfig.model_validate({**CONFIG.model_dump(exclude={"parameters"}), "parameters": port})
+    cases = drawn(config, Design(duration=5.0), 16, seed=(0, 0), prefix="N")
+    assert {case.parameters["teeth"] for case in cases} == {10.0, 14.0, 20.0}
+    with pytest.raises(ValidationError, match="outside the range"):
+        ReferenceConfig.model_validate({**CONFIG.model_dump(), "parameters": {"n": {"range": [0, 1], "levels": [2]}}})
 
 
 @pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube"])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from sysid.errors import ChannelError, ConfigError
 from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish, proposed
 from sysid.references.fmu import FmuReference, read_fmu
+from sysid.references.fmu_variables import check_variables
 from sysid.references.runs import Case, ReferenceRuns
 
 pytest.importorskip("fmpy")
@@ -97,3 +100,97 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.fmu").write_bytes(b"not a zip")
     with pytest.raises(ConfigError, match="no FMU that can be read"):
         read_fmu(tmp_path / "a.fmu")
+
+
+def rewritten(file: Path, place: Path, *changes: tuple[str, str]) -> Path:
+    """An FMU whose model description is another one: patterns, and what stands in their place."""
+    made = place / "other.fmu"
+    with zipfile.ZipFile(file) as old, zipfile.ZipFile(made, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "modelDescription.xml":
+                text = content.decode()
+                for before, after in changes:
+                    text, count = re.subn(before, after, text, flags=re.DOTALL)
+                    assert count == 1
+                content = text.encode()
+            new.writestr(name, content)
+    return made
+
+
+@pytest.fixture(scope="module")
+def second(bundle: Path) -> Path:
+    """The file of version 2.0."""
+    (file,) = [one for one in bundle.rglob("*.fmu") if "fmi2" in str(one) or "fmu2" in str(one)]
+    return file
+
+
+def last(config: ReferenceConfig, folder: Path, u: float, **parameters: float) -> float:
+    """The output at the end of ten samples."""
+    with ReferenceRuns(config=config, folder=folder, workers=1) as runs:
+        (one,) = runs.run([Case(name="a", inputs=np.full((10, 1), u), parameters=parameters)])
+    assert one.trace is not None, one.reason
+    return float(one.trace[next(iter(config.outputs))][-1])
+
+
+NAMED = ('name="u"', 'name="tank.u[1,2]"')
+UNITS = (
+    ("</CoSimulation>", '</CoSimulation><UnitDefinitions><Unit name="V"/><Unit name="m"/></UnitDefinitions>'),
+    (r'(name="tank.*?<Real )', r'\1unit="V" '),
+    (r'(name="y".*?<Real)/>', r'\1 unit="m"/>'),
+)
+
+
+@pytest.mark.parametrize(
+    ("given", "taken", "scale"),
+    [({}, {}, 1.0), ({"unit": "V"}, {"unit": "m"}, 1.0), ({"unit": "mV"}, {"unit": "cm"}, 0.1)],
+)
+def test_numbers_go_in_and_come_out_in_the_units_that_are_asked_for(
+    second: Path, tmp_path: Path, given: dict[str, str], taken: dict[str, str], scale: float
+) -> None:
+    """The FMU says which units its own are: volts and metres; where nobody asks for others, these are taken."""
+    expected = scale * last(reference(second), tmp_path, 2.0)
+    file = rewritten(second, tmp_path, NAMED, *UNITS)
+    config = reference(file, inputs={"tank.u[1,2]": {"range": [-5, 5], **given}}, outputs={"y": taken})
+    assert last(config, tmp_path, 2.0) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_unit_of_something_else_is_refused(second: Path, tmp_path: Path) -> None:
+    file = rewritten(second, tmp_path, NAMED, *UNITS)
+    with pytest.raises(ConfigError, match="y has another unit in the FMU") as caught:
+        FmuReference(reference(file, inputs={"tank.u[1,2]": {"range": [-5, 5]}}, outputs={"y": {"unit": "kg"}}))
+    assert "give it in m" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("port", "words"),
+    [
+        ({}, "no levels"),
+        ({"levels": [0, 1.5]}, "levels \\[0.0, 1.5\\]"),
+        ({"levels": [0, 2], "rate": 1.0}, "leave rate out"),
+        ({"levels": [0, 2]}, None),
+    ],
+)
+def test_a_whole_number_is_not_set_to_another_than_the_record_says(port: dict[str, object], words: str | None) -> None:
+    variable = SimpleNamespace(type="Integer", causality="input", variability="discrete", unit=None)
+    output = SimpleNamespace(type="Boolean", causality="output", variability="discrete", unit=None)
+    config = reference(Path("a.fmu"), inputs={"u": {"range": [0, 3], **port}}, constants={})
+    known = {"u": variable, "y": output}
+    if words is None:
+        check_variables(config, known, Path("a.fmu"))
+        return
+    with pytest.raises(ConfigError, match=words) as caught:
+        check_variables(config, known, Path("a.fmu"))
+    assert "levels: [0, 1, 2, 3]" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"inputs": {"y": {"range": [0, 1]}}, "outputs": {"u": {}}}, "y cannot be moved in a run"),
+        ({"parameters": {"y": {"range": [0, 1]}}, "outputs": {"u": {}}, "inputs": {}}, "y cannot be set before a run"),
+    ],
+)
+def test_what_an_importer_would_pass_over_is_refused(second: Path, fields: dict[str, object], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        FmuReference(reference(second, **fields))

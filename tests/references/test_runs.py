@@ -56,6 +56,34 @@ def test_a_run_that_fails_is_a_case_with_a_reason_and_the_study_goes_on(function
         np.testing.assert_array_equal(one.trace["y"], one.case.inputs[:, 0])
 
 
+GIVEN = [None] * 6 + [
+    "it gave complex numbers, where real ones were expected",
+    "it gave no column z, only a, y",
+    "z is nan at 4.5 s",
+    "it gave no numbers but list",
+    "it gave an array of shape (29, 2), where (30, 2) was expected: a row a sample, a column for each of y, z",
+    "it gave columns of shapes (30,), (29,), where a number a sample was expected in each",
+    "it gave an array of shape (), where (30, 2) was expected: a row a sample, a column for each of y, z",
+]
+"""Why what :func:`tests.references.slow_models.gives` gives is no record; the first six are."""
+
+
+def test_what_a_function_gives_is_taken_by_name_where_it_has_names_and_never_for_other_numbers(tmp_path: Path) -> None:
+    ports = {"outputs": {"y": {}, "z": {}}, "parameters": {"how": {"range": [0, 20]}}}
+    inputs = np.r_[np.full(9, 0.5), np.full(21, 1.0)][:, np.newaxis]
+    cases = [Case(name=f"c{k}", inputs=inputs, parameters={"how": float(k)}) for k in range(len(GIVEN))]
+    outcomes = run(reference("gives", **ports), tmp_path, cases)
+    assert [one.reason for one in outcomes] == GIVEN
+    for one in outcomes[:6]:
+        assert one.trace is not None
+        np.testing.assert_array_equal(one.trace.columns(["y", "z"]), inputs * [0.5, 100.0])
+
+
+def test_what_is_no_function_is_refused_in_words(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="names is no function"):
+        run(reference("NO_FUNCTION"), tmp_path, CASES)
+
+
 def test_what_has_been_run_is_found_whether_it_gave_a_record_or_not(tmp_path: Path) -> None:
     config = reference("raises")
     made = run(config, tmp_path, CASES)
@@ -133,33 +161,62 @@ def test_a_study_that_was_killed_goes_on_and_runs_nothing_twice(tmp_path: Path) 
 
 
 PROGRAM = """
-import csv, sys
-rows = list(csv.reader(line for line in open(sys.argv[1]) if not line.startswith("#")))
-level = float(rows[1][1])
-if sys.argv[3] == "fails" and level > 1:
+import csv, os, random, signal, subprocess, sys
+rows = list(csv.reader(open(sys.argv[1])))
+how = sys.argv[3].split(",")[int(float(rows[1][rows[0].index("u [V]")]))]
+sys.stderr.write("warning\\n" * 20_000)
+sys.stdin.read()
+subprocess.Popen(["sleep", "60"])
+if how == "fails":
     sys.exit("no licence")
+if how == "killed":
+    os.kill(os.getpid(), signal.SIGSEGV)
+if how == "elsewhere":
+    sys.exit(0)
+os.chdir("/")
+step = {"steps": 2.0, "minutes": 1 / 60}.get(how, 1.0)
+body = [(f"{float(row[1]) * 1e-3}", "7", f"{float(row[0]) * step}") for row in rows[1:]]
+if how == "mixed":
+    random.Random(0).shuffle(body)
 with open(sys.argv[2], "w") as file:
-    file.write("time [s],y [" + ("kg" if sys.argv[3] == "units" and level > 1 else "m") + "]\\n")
-    for row in rows[1:]:
-        file.write(f"{row[0]},{float(row[1]) * 1e-3}\\n")
+    time = "time [min]" if how == "minutes" else "time [s]"
+    print("y [kg]" if how == "units" else "y [m]", "other", time, sep=",", file=file)
+    for row in body:
+        print(*row, sep=",", file=file)
+sys.exit(3 if how == "three" else 0)
 """
+"""Says much, reads what nobody gives, leaves something running, goes elsewhere, has columns of its own; its input says
+what it does beside that."""
 
 
-@pytest.mark.parametrize(
-    ("how", "reason"),
-    [
-        ("fails", "the program ended with exit code 1: no licence"),
-        ("units", "the program wrote y in kg, where mm was expected"),
-    ],
-)
-def test_a_program_is_run_on_files_and_its_units_are_heeded(how: str, reason: str, tmp_path: Path) -> None:
+ENDS = {
+    "well": None,
+    "minutes": None,
+    "fails": "the program ended with exit code 1: no licence",
+    "killed": "the program was ended by signal SIGSEGV: warning",
+    "elsewhere": "the program wrote no file of outputs",
+    "units": "the program wrote y in kg, where mm was expected",
+    "steps": "the program wrote rows 1 s apart",
+    "mixed": "the program wrote rows ",
+    "three": "the program ended with exit code 3: warning (if that is how it ends well, name it under exit_codes)",
+}
+"""By what a program does, why that is no record."""
+
+
+def test_a_program_is_run_on_files_and_its_units_are_heeded(tmp_path: Path) -> None:
     (tmp_path / "solver.py").write_text(PROGRAM, encoding="utf-8")
-    command = [sys.executable, "solver.py", "{inputs}", "{outputs}", how]
+    command = [sys.executable, "solver.py", "{inputs}", "{outputs}", ",".join(ENDS)]
     config = reference("raises", python=None, program=command, folder=str(tmp_path))
-    first, bad, _ = run(config, tmp_path, CASES)
-    assert bad.reason == reason
-    assert first.trace is not None
-    np.testing.assert_allclose(first.trace["y"], 0.5, rtol=1e-12)
+    cases = [Case(name=how, inputs=np.full((30, 1), float(k))) for k, how in enumerate(ENDS)]
+    outcomes = run(config, tmp_path, cases)
+    for one, (how, reason) in zip(outcomes, ENDS.items(), strict=True):
+        assert (one.reason is None) is (reason is None), how
+        assert str(one.reason).startswith(str(reason))
+    # What a run ended with before other codes were said to be good is another run.
+    outcomes += run(config.model_copy(update={"exit_codes": (0, 3)}), tmp_path, cases[-1:])
+    for one in (*outcomes[:2], outcomes[-1]):
+        assert one.trace is not None
+        np.testing.assert_allclose(one.trace["y"], one.case.inputs[:, 0], rtol=1e-12)
 
 
 def test_a_command_that_passes_no_file_is_refused(tmp_path: Path) -> None:
