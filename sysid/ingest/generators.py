@@ -6,16 +6,15 @@ in its package makes cached traces void; where its module has a ``GENERATOR_VERS
 
 from __future__ import annotations
 
-import difflib
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from typing import Any, Protocol
 
 import sysid
 from sysid.code_digest import code_digest
-from sysid.errors import ConfigError, SysidError
+from sysid.errors import SysidError
+from sysid.plugins import find_entry
 from sysid.traces import Channel, Trace
 
 GROUP = "sysid.generators"
@@ -101,20 +100,7 @@ def find_generator(name: str, *, where: object) -> Generator:
     Raises:
         ConfigError: If none of that name is installed; those that are known are listed.
     """
-    found = {entry.name: entry for entry in entry_points(group=GROUP)}
-    if name not in found:
-        near = difflib.get_close_matches(name, found, n=1)
-        raise ConfigError(
-            f"no generator named {name} is installed",
-            where=where,
-            expected=f"one of {', '.join(sorted(found))}" if found else "an installed generator; there is none at all",
-            got=name,
-            remedy=f"did you mean {near[0]}?"
-            if near
-            else "install the package that brings it; for the built-in ones, install the workbench itself "
-            "(pip install -e .)",
-        )
-    entry = found[name]
+    entry = find_entry(GROUP, name, what="generator", where=where)
     generate: Callable[..., Trace] = entry.load()
     package = entry.dist.version if entry.dist is not None else ""
     return Generator(name=name, version=f"{sysid.__version__}/{package}/{_own_version(generate)}", generate=generate)

@@ -13,12 +13,12 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from sysid.errors import ConfigError
+from sysid.plugins import find_plugin
 from sysid.traces import Trace, TraceSet
 from sysid.validation import CaseResult, Evaluation
 from sysid.validation.annotator import Annotator
 from sysid.validation.metrics import figures
 from sysid.workbench.old_words import STRICT
-from sysid.workbench.plugins import find_plugin
 
 GROUP = "sysid.annotators"
 

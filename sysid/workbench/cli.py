@@ -80,12 +80,14 @@ def _with_commands_of_fields(words: list[str]) -> None:
     first = next((word for word in words if not word.startswith("-")), None)
     if first in known:
         return
-    from importlib.metadata import PackageNotFoundError, distribution, entry_points
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    from sysid.plugins import entry_points
 
     there = {group.name for group in app.registered_groups}
     found: Iterable[EntryPoint] = ()
     if first:
-        found = entry_points(group="sysid.commands")
+        found = entry_points("sysid.commands")
     else:
         # A list of all is wanted at once: to look through every installed package takes a tenth of its time.
         with suppress(PackageNotFoundError):

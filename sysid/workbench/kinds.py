@@ -10,12 +10,12 @@ import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from sysid.content import what_to_do_with_data
 from sysid.errors import ConfigError
+from sysid.plugins import entry_points
 from sysid.yaml_files import Origins, read_yaml
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ KINDS: dict[str, Kind] = {
 
 def kinds() -> dict[str, Kind]:
     """All kinds by name: those of :data:`KINDS`, and those that installed packages bring."""
-    found = {entry.name: kind for group, kind in FOUND.items() for entry in entry_points(group=group)}
+    found = {entry.name: kind for group, kind in FOUND.items() for entry in entry_points(group)}
     return {**found, **KINDS}
 
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Protocol
 
 from sysid.extras import has
+from sysid.plugins import entry_points
 from sysid.workbench.runner.events import Event, Watcher
 
 GROUP = "sysid.trackers"
@@ -90,7 +90,7 @@ def find_trackers(workspace: Path, warn: Warn) -> Found:
         found.append(_mlflow(workspace, warn))
     else:
         missing.append(UNTRACKED)
-    for entry in entry_points(group=GROUP):
+    for entry in entry_points(GROUP):
         try:
             listener: Listener = entry.load()(workspace, warn)
         except Exception as error:  # noqa: BLE001 - somebody else's code

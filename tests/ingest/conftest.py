@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid.ingest import generators
 from sysid.traces import Channel, Trace
 
 
@@ -59,7 +58,7 @@ def ramp(monkeypatch: pytest.MonkeyPatch) -> RampGenerator:
         def load(self) -> RampGenerator:
             return generator
 
-    monkeypatch.setattr(generators, "entry_points", lambda **_: [Entry()])
+    monkeypatch.setattr("sysid.plugins.entry_points", lambda _: [Entry()])
     return generator
 
 

@@ -126,7 +126,7 @@ def test_the_command_line_finds_what_a_field_brings(
         importlib.metadata.EntryPoint(name=name, value=value, group="sysid.commands")
         for name, value in declared["sysid.commands"].items()
     ]
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda **_: entries)
+    monkeypatch.setattr("sysid.plugins.entry_points", lambda _: entries)
     monkeypatch.setattr(cli.app, "registered_groups", list(cli.app.registered_groups))
     assert cli.run_cli(["rail", "terrain", CREST, TRAIN, "--dry-run"]) == 0
     assert "nothing is done" in capsys.readouterr().out

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from sysid.ingest.options import FileOptions
+from sysid.ingest.readers.csv_layout import Layout, recognise
 from sysid.reporting.charts import Chart, chart_figure
 from sysid.reporting.figures.svg import svg
 
@@ -80,6 +82,22 @@ def undrawn_pages(blank_picture: Callable[..., str], blank_chart: Callable[[Char
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sysid.reporting.parts.svg", blank_picture)
         patch.setattr("sysid.reporting.charts.chart_figure", blank_chart)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def layouts_told_once() -> Iterator[None]:
+    """These tests read the same small files again and again: how each is laid out is told once; its rows are read."""
+    found: dict[tuple[object, ...], Layout] = {}
+
+    def told(lines: Sequence[str], options: FileOptions, path: Path, *, whole: bool) -> Layout:
+        key = (tuple(lines), repr(options), whole)
+        if key not in found:
+            found[key] = recognise(lines, options, path, whole=whole)
+        return found[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sysid.ingest.readers.csv_text.recognise", told)
         yield
 
 

@@ -49,7 +49,7 @@ class Entry:
 def installed(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Any], None]:
     def install(name: str, made: Any) -> None:
         monkeypatch.setattr(trackers, "has", lambda _: False)
-        monkeypatch.setattr(trackers, "entry_points", lambda **_: [Entry(name, made)])
+        monkeypatch.setattr(trackers, "entry_points", lambda _: [Entry(name, made)])
 
     return install
 

@@ -12,11 +12,11 @@ import time
 import urllib.error
 import urllib.request
 import webbrowser
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import IO
 
 from sysid.errors import SysidError
+from sysid.plugins import entry_points
 from sysid.workbench.runner.console import console
 from sysid.workbench.tracking.landing import VARIABLE
 from sysid.workbench.tracking.mlflow_store import QUIET, latest_experiment, store_uri
@@ -102,7 +102,7 @@ def server_command(uri: str, address: str) -> list[str]:
         *(sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri),
         *("--host", host, "--port", port, "--workers", "1"),
         # A checkout that was installed before it had this entry point goes without.
-        *(("--app-name", APP) if entry_points(group="mlflow.app", name=APP) else ()),
+        *(("--app-name", APP) if APP in entry_points("mlflow.app").names else ()),
     ]
 
 

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from pydantic import BaseModel
 
 from sysid.models import AbstractModel, Cascade, Interpolation
-from sysid.workbench.plugins import find_plugin
+from sysid.plugins import find_plugin
 from sysid.workbench.runner.kept_steps import KeptStep
 
 GROUP = "sysid.judges"

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from pydantic import BaseModel
 
-from sysid.workbench.plugins import find_plugin
+from sysid.plugins import find_plugin
 from sysid.workbench.runner.kept_steps import KeptStep
 
 GROUP = "sysid.makers"
