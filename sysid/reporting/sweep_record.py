@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from sysid.estimation.linear.order_search import Criterion, weighed
+from sysid.estimation.tolerance import outside
 from sysid.reporting.records import Number, Record, parse_record, read_document, write_record
 from sysid.units import squared
 
@@ -73,8 +74,8 @@ class Trial(Record):
         Returns:
             The share; 0 without such traces.
         """
-        stays = [share <= tolerance for share in self.selection_rms_shares]
-        return sum(stays) / len(stays) if stays else 0.0
+        count = len(self.selection_rms_shares)
+        return 1.0 - outside(self.selection_rms_shares, tolerance) / count if count else 0.0
 
     @property
     def in_full(self) -> bool:

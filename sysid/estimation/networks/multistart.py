@@ -33,6 +33,7 @@ from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import Loop, Status
+from sysid.estimation.tolerance import outside, spans_of
 from sysid.models import EquationModel, NARXModel, NeuralStateSpaceModel, Start, VectorNeuralStateSpaceModel, beginning
 from sysid.traces import Trace
 
@@ -501,9 +502,9 @@ def judged(multistart: Multistart, model: Network) -> tuple[float, int]:
         selection traces. And on how many of these it leaves the tolerance of the training.
     """
     errors, unit = [], model.scaling.error_unit / np.square(model.scaling.output_scale)
-    within, spans = multistart.training.within, _spans(multistart.selection, model)
-    outside = 0
-    for trace in multistart.selection:
+    shares, traces = list[NDArray[np.float64]](), multistart.selection
+    spans = spans_of(traces, model.mapping.outputs) if traces else np.ones(1)
+    for trace in traces:
         inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
         begun = beginning(model, inputs, target, multistart.start, trace.usable_samples, case=trace.name)
         n, history = begun.first, begun.history
@@ -513,12 +514,7 @@ def judged(multistart: Multistart, model: Network) -> tuple[float, int]:
             output = model.predict(inputs[n:], target[n:], history)
         squared = np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2, axis=0)
         errors.append(squared * unit)
-        outside += within is not None and not (np.sqrt(squared) <= within * spans).all()
+        shares.append(np.sqrt(squared) / spans)
     with np.errstate(divide="ignore"):  # a trace that is met exactly, such as a constant: the mean is 0
-        return (float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")), outside
-
-
-def _spans(traces: Sequence[Trace], model: Network) -> NDArray[np.float64]:
-    """Range of each output, shape ``(n_outputs,)`` or ``()``; of one that never moves 1, in its unit."""
-    spans = np.ptp(np.concatenate([model.measured(trace) for trace in traces]), axis=0) if traces else np.ones(())
-    return np.asarray(np.where(spans > 0.0, spans, 1.0))
+        mean = float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")
+    return mean, outside(shares, multistart.training.within)

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from sysid.estimation import FitResult
+from sysid.estimation.tolerance import outside, spans_of
 from sysid.traces import Role, Trace
 from sysid.validation import case_results
-from sysid.workbench.auto.look import span_of
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
@@ -63,10 +63,11 @@ def _error(
     fit: FitResult, traces: Sequence[Trace], config: PipelineConfig, tolerance: float | None
 ) -> tuple[int, float]:
     """Traces over which the free run leaves the tolerance, and its mean square, each output's over its own variance."""
-    found, outside = [], set[str]()
+    errors, shares = list[float](), list[list[float]]()
+    outputs = config.mapping.outputs
+    spans = dict(zip(outputs, spans_of(traces, outputs), strict=True))
     for trace in traces:
-        for output, case in case_results(fit.model, trace, Role.ESTIMATION, config.start, 1).items():
-            found.append(case.free_run.mse / (float(np.var(trace[output])) or 1.0))
-            if tolerance is not None and not case.free_run.mse <= (tolerance * span_of(traces, output)) ** 2:
-                outside.add(trace.name)
-    return len(outside), float(np.mean(found))
+        cases = case_results(fit.model, trace, Role.ESTIMATION, config.start, 1)
+        errors += [case.free_run.mse / (float(np.var(trace[output])) or 1.0) for output, case in cases.items()]
+        shares.append([float(np.sqrt(case.free_run.mse) / spans[output]) for output, case in cases.items()])
+    return outside(shares, tolerance), float(np.mean(errors))

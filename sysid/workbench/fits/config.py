@@ -135,6 +135,8 @@ class PipelineConfig(BaseModel):
         rest: Value at rest of the output, by channel name, in its unit.
         seed: Seed of everything random.
         fits: What is fitted, in order.
+        tolerance: Share of each output's range: the best fit is first that whose free run stays within it (root mean
+            square) over most selection traces, then that of the least error; the error alone where none is given.
         export: What leaves the workbench; ``null`` for nothing.
         report: What the report shows.
         stability: Over which sequences a network's free run has to stay bounded and to settle.
@@ -154,6 +156,7 @@ class PipelineConfig(BaseModel):
     rest: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
     fits: Annotated[tuple[FitConfig, ...], BeforeValidator(_as_list)] = Field(min_length=1)
+    tolerance: float | None = Field(default=None, gt=0.0, lt=1.0)
     export: ExportConfig | None = ExportConfig()
     report: ReportConfig = ReportConfig()
     stability: StabilityConfig = StabilityConfig()

@@ -135,7 +135,7 @@ class FitSteps:
         sizes = steps.output_sizes(loaded.value, self.config.mapping.outputs)
         pairs = {name: one.pairs for name, one in fitted.items()}
         unstable = self.config.export is None or self.config.export.unstable
-        choice = self.chosen or steps.choose(pairs, asked, sizes, unstable=unstable)
+        choice = self.chosen or steps.choose(pairs, asked, sizes, unstable=unstable, tolerance=self.config.tolerance)
         best = fitted[choice.name]
         leaves = self.config.export is not None and not choice.withheld
         bundle = run.do(self._export(run, best, loaded)) if leaves else None

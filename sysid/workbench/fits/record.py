@@ -78,7 +78,8 @@ def write_scores(folder: Path, scores: Scores) -> list[Path]:
     }
     write_arrays(folder / "signals.npz", arrays)
     figures = {name: case.to_dict() for name, case in cases.items()}
-    write_json(folder / "evaluation.json", {"cases": figures, "selection_mse": scores.selection_mse})
+    chose = {"selection_mse": scores.selection_mse, "selection_rms_shares": list(scores.selection_rms_shares)}
+    write_json(folder / "evaluation.json", {"cases": figures, **chose})
     return [folder / "signals.npz", folder / "evaluation.json"]
 
 
@@ -137,7 +138,10 @@ def read_scores(folder: Path) -> Scores:
         )
         for name, fields in stored["cases"].items()
     }
-    return Scores(evaluation=Evaluation(cases=cases), selection_mse=float(stored["selection_mse"]))
+    shares = tuple(map(float, stored["selection_rms_shares"]))
+    return Scores(
+        evaluation=Evaluation(cases=cases), selection_mse=float(stored["selection_mse"]), selection_rms_shares=shares
+    )
 
 
 def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: TraceSet) -> dict[str, Any]:

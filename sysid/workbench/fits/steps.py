@@ -22,6 +22,7 @@ from sysid.estimation import FitProgress, FitResult, estimators
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.grey_box.by_case import for_case
 from sysid.estimation.result import Status
+from sysid.estimation.tolerance import outside, spans_of
 from sysid.export.exporters import wanted_formats
 from sysid.models import AbstractStructure, Cascade
 from sysid.traces import Role
@@ -165,10 +166,12 @@ class Scores:
     Args:
         evaluation: On every case.
         selection_mse: Mean free-run mse on the selection traces; NaN without any.
+        selection_rms_shares: Root mean square of each of them, as a share of the output's range over all records.
     """
 
     evaluation: Evaluation
     selection_mse: float
+    selection_rms_shares: tuple[float, ...] = ()
 
 
 def scores_key(fit: str, structure: AbstractStructure, data: Data, config: PipelineConfig) -> str:
@@ -192,7 +195,7 @@ def scores_key(fit: str, structure: AbstractStructure, data: Data, config: Pipel
         "traces": data.traces.digest,
         "selection": [trace.digest for trace in data.selection],
         # Scores of a release that kept less are made again.
-        "kept": ["figures", "signals", "residuals", "intervals", "curves"],
+        "kept": ["figures", "signals", "residuals", "intervals", "curves", "shares"],
         "code": code,
     }
     return digest(terms | _common(config))
@@ -212,6 +215,7 @@ def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
     output = config.mapping.output
     chosen = [case_results(fit.model, trace, Role.SELECTION, config.start, 1)[output] for trace in data.selection]
     errors = [case.free_run.mse for case in chosen]
+    (span,) = spans_of([*data.traces, *data.selection], [output])
     evaluation = evaluate_outputs(fit.model, data.traces, config.start, posterior=fit.posterior)[output]
     if config.annotate is not None:
         annotator = find_annotator(config.annotate.by, where="annotate, by")
@@ -219,6 +223,7 @@ def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
     return Scores(
         evaluation=evaluation,
         selection_mse=float(np.mean(errors)) if errors else math.nan,
+        selection_rms_shares=tuple(float(np.sqrt(error) / span) for error in errors),
     )
 
 
@@ -245,6 +250,7 @@ def choose(
     sizes: Sequence[float] = (1.0,),
     *,
     unstable: bool = True,
+    tolerance: float | None = None,
 ) -> Choice:
     """Choose the fit that is exported and put first in the report.
 
@@ -253,6 +259,8 @@ def choose(
         asked: ``best``, or the name of a fit.
         sizes: For each output the squared error that counts as one.
         unstable: Whether an unstable fit may be exported; else the best of the others is.
+        tolerance: Share of each output's range: who stays within it over more of the selection traces comes first;
+            ``None`` for the error alone.
 
     Returns:
         The choice. Cases for validation have no say in it.
@@ -261,7 +269,7 @@ def choose(
         stable = {
             name: pairs for name, pairs in fits.items() if all(fit.status is not Status.UNSTABLE for fit, _ in pairs)
         }
-        found = choose(stable or fits, asked, sizes)
+        found = choose(stable or fits, asked, sizes, tolerance=tolerance)
         if found.name in stable:
             left = ", ".join(name for name in fits if name not in stable)
             only = f" Only stable fits may be exported; {left} is not." if left and asked == "best" else ""
@@ -281,7 +289,11 @@ def choose(
     by_selection = {name: mean(lambda scores: scores.selection_mse, pairs) for name, pairs in usable.items()}
     if not any(math.isnan(mse) for mse in by_selection.values()):
         sentence = f"Least {what} of the free run on the selection traces."
-        return Choice(name=min(by_selection, key=by_selection.__getitem__), chosen_by=sentence)
+        lost = {name: _outside(pairs, tolerance) for name, pairs in usable.items()}
+        best = min(by_selection, key=lambda name: (lost[name], by_selection[name]))
+        if by_selection[best] > min(by_selection.values()):
+            sentence = f"Over more selection traces within {tolerance:.3g} of the range than those of less {what}."
+        return Choice(name=best, chosen_by=sentence)
     # Evidence cannot be compared between open and closed loop: their residuals are not the same.
     by_estimation = {
         name: mean(lambda scores: scores.evaluation.mean_mse(Role.ESTIMATION), pairs) for name, pairs in usable.items()
@@ -291,6 +303,11 @@ def choose(
         chosen_by=f"Least {what} of the free run on the estimation traces, for want of selection traces; "
         "it favours the model with the most parameters.",
     )
+
+
+def _outside(pairs: Sequence[tuple[FitResult, Scores]], tolerance: float | None) -> int:
+    """Selection traces on which some output leaves the tolerance."""
+    return outside(np.array([scores.selection_rms_shares for _, scores in pairs]).T, tolerance)
 
 
 def output_sizes(data: Data, outputs: Sequence[str]) -> tuple[float, ...]:

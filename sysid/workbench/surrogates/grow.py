@@ -21,6 +21,7 @@ from sysid.composite.growth import in_rounds, worst_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, Training, estimators
 from sysid.estimation.estimators import estimator_of
+from sysid.estimation.tolerance import outside, spans_of
 from sysid.models import Start
 from sysid.references.candidates import Candidates
 from sysid.references.config import ReferenceConfig
@@ -50,11 +51,13 @@ class Stand:
         fits: Its fits, one a model.
         added: Experiments that were added to what was fitted first.
         error: The error quantile on the selection runs, as a share of the range.
+        outside: Selection runs on which it leaves what it is to stay under.
     """
 
     fits: Sequence[FitResult]
     added: Sequence[Outcome]
     error: float
+    outside: int = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,9 +115,7 @@ class Grower:
     @property
     def spans(self) -> NDArray[np.float64]:
         """Range of each output in what was fitted first, shape ``(n_outputs,)``."""
-        values = np.concatenate([one.columns(self.outputs) for one in self.taught.with_role(Role.ESTIMATION)])
-        spans = np.ptp(values, axis=0)
-        return np.where(spans > 0.0, spans, 1.0)
+        return spans_of(self.taught.with_role(Role.ESTIMATION), self.outputs)
 
     def grow(self, first: Sequence[FitResult]) -> Grown:
         """Add experiments until the error quantile holds, nothing gains, or rounds or time are spent.
@@ -151,7 +152,7 @@ class Grower:
                 nothing=f"none of {self.config.candidates} new experiments is beyond {self.config.until:.2g}",
             )  # fmt: skip
         every = [*stands, *control[1:]]
-        chosen = min(range(len(every)), key=lambda k: (every[k].error, k))
+        chosen = min(range(len(every)), key=lambda k: (every[k].outside, every[k].error, k))
         record = GrowthRecord(
             pick=self.config.pick, candidates=self.config.candidates, until=self.config.until,
             quantile=self.config.quantile, selection=len(self.taught.with_role(Role.SELECTION)), rounds=self._rows,
@@ -239,7 +240,8 @@ class Grower:
         errors = self._errors(fits, self.taught.with_role(Role.SELECTION))
         usable = all(fit.status.usable for fit in fits)
         error = float(np.quantile(np.minimum(errors, 1e9), self.config.quantile)) if usable else float("inf")
-        return Stand(fits=fits, added=added, error=error)
+        left = outside(errors, self.config.until) if usable else len(errors)
+        return Stand(fits=fits, added=added, error=error, outside=left)
 
     def _row(self, number: int, how: str, stand: Stand, seconds: float) -> None:
         fitted = len(self.taught.with_role(Role.ESTIMATION)) + len(stand.added)
@@ -272,7 +274,8 @@ class Grower:
         model = former.model
         row = estimator_of(model.structure)
         initial = former if warm and row.initial is not None else None
-        given = {**self.training, **TRAINING, "seed": seed} if row.training is Training else dict(self.training)
+        own = {**TRAINING, "within": self.config.until, "seed": seed}
+        given = {**self.training, **own} if row.training is Training else dict(self.training)
         terms = {
             "structure": model.structure.to_dict(), "training": given, "mapping": str(model.mapping),
             "initial": None if initial is None else model.to_dict(), "rest": dict(self.rest),

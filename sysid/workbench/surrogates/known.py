@@ -21,7 +21,7 @@ NAME = "model"
 
 def pipeline_of(
     config: ExperimentConfig, mapping: Mapping, *, where: Path, data: Path, rest: Dict[str, float],
-    seconds: float | None, seed: int, export: Dict[str, Any],
+    seconds: float | None, seed: int, export: Dict[str, Any], tolerance: float,
 ) -> PipelineConfig:  # fmt: skip
     """The fits of a pipeline of experiments as a pipeline of their own.
 
@@ -34,6 +34,7 @@ def pipeline_of(
         seconds: Wall time of all fits together, where they say no time themselves; ``None`` for no limit.
         seed: Of everything random.
         export: Fields of the export.
+        tolerance: Share of each output's range that the proof counts by; so does what chooses.
 
     Returns:
         The pipeline.
@@ -41,10 +42,12 @@ def pipeline_of(
     Raises:
         ConfigError: If a structure is not for these inputs and outputs.
     """
-    fits = [_in_time(one, None if seconds is None else seconds / len(config.fits)) for one in config.fits]
+    own = {} if seconds is None else {"max_time_s": round(seconds / len(config.fits), 3)}
+    fits = [_told(one, {**own, "within": tolerance}) for one in config.fits]
     fields: dict[str, Any] = {
         "name": NAME, "data": str(data), "mapping": str(mapping), "start": Start(), "rest": dict(rest), "seed": seed,
         "fits": [one.model_dump(mode="json", exclude_none=True) for one in fits], "export": dict(export),
+        "tolerance": tolerance,
     }  # fmt: skip
     return check(PipelineConfig, fields, where=where)
 
@@ -63,12 +66,13 @@ def program_of(pipeline: PipelineConfig, folder: Path) -> Program[Results]:
     return fits_program(Pipeline(config=pipeline, text=text, path=folder / "pipeline.yaml"))
 
 
-def _in_time(fit: FitConfig, seconds: float | None) -> FitConfig:
-    """A fit that ends in a time, where its training can be told one and was not."""
+def _told(fit: FitConfig, more: Dict[str, float]) -> FitConfig:
+    """A fit with further options, where its training has such and was not told otherwise."""
     row = estimator_of(fit.structure)
-    options = {} if row.training is None else {one.name for one in dataclasses.fields(row.training)}
+    options = set() if row.training is None else {one.name for one in dataclasses.fields(row.training)}
     given = {} if fit.training is None else fit.training.model_dump(exclude_unset=True)
-    if seconds is None or "max_time_s" not in options or "max_time_s" in given:
+    told = {name: value for name, value in more.items() if name in options and name not in given}
+    if not told:
         return fit
     own = {"name": fit.name, "structure": fit.structure.to_dict(), "initial": fit.initial}
-    return FitConfig.model_validate({**own, "training": {**given, "max_time_s": round(seconds, 3)}})
+    return FitConfig.model_validate({**own, "training": {**given, **told}})

@@ -216,8 +216,7 @@ class _Work:
         seconds = None if minutes is None or self.iterations else 60.0 * minutes
         return pipeline_of(
             self.config, self.mapping, where=self.pipeline, data=data, rest={} if found is None else found.before,
-            seconds=seconds, seed=self.seed,
-            export=EXPORT,
+            seconds=seconds, seed=self.seed, export=EXPORT, tolerance=TOLERANCE,
         )  # fmt: skip
 
     def fitted(self, found: Experimented, minutes: float) -> None:

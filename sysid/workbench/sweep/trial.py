@@ -20,6 +20,7 @@ from sysid.estimation.estimator import Estimator, Options
 from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, part_of
+from sysid.estimation.tolerance import spans_of
 from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
@@ -304,9 +305,7 @@ def _scores(bench: Bench, models: Sequence[AbstractModel]) -> dict[str, Any]:
     start: Start = PipelineConfig.model_validate(dict(bench.pipeline)).start
     outputs = [output for model in models for output in model.mapping.outputs]
     sizes = dict(zip(outputs, output_sizes(Data(traces=bench.traces, selection=bench.selection), outputs), strict=True))
-    known = [trace.columns(outputs) for trace in (*bench.traces, *bench.selection)]
-    spans = np.ptp(np.concatenate(known), axis=0)
-    spans = np.where(spans > 0.0, spans, 1.0)
+    spans = spans_of([*bench.traces, *bench.selection], outputs)
     cases = {
         trace.name: {
             "role": bench.traces.roles[trace.name].value,

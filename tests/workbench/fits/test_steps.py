@@ -205,6 +205,22 @@ def test_selection_traces_choose_and_validation_has_no_say() -> None:
     assert (named.name, named.chosen_by) == ("best on validation", "Named in the pipeline.")
 
 
+def test_who_stays_within_a_tolerance_over_more_traces_is_best_whatever_the_mean() -> None:
+    shares = {"even": (2.0, [0.009, 0.009]), "uneven": (1.0, [0.001, 0.02]), "worse": (3.0, [0.009, 0.009])}
+    fits = {}
+    for name, (mse, some) in shares.items():
+        fit, scores = fitted({Role.ESTIMATION: 1.0}, mse)
+        fits[name] = (fit, dataclasses.replace(scores, selection_rms_shares=tuple(some)))
+    assert steps.choose(one_output(fits), "best").name == "uneven"
+    found = steps.choose(one_output(fits), "best", tolerance=0.01)
+    assert found.name == "even"
+    assert "within 0.01 of the range" in found.chosen_by
+    assert "within" not in steps.choose(one_output(fits), "best", tolerance=0.05).chosen_by
+    # Of several outputs each has to stay within it over the same trace.
+    both = {"even": [fits["even"], fits["uneven"]], "uneven": [fits["uneven"], fits["uneven"]]}
+    assert steps.choose(both, "best", (1.0, 1.0), tolerance=0.01).name == "uneven"
+
+
 def test_a_fit_that_failed_is_not_chosen_unless_all_did() -> None:
     good = fitted({Role.ESTIMATION: 1.0}, 5.0)
     failed = fitted({Role.ESTIMATION: 1.0}, 1.0, Status.NOT_IMPROVED)

@@ -9,6 +9,7 @@ import yaml
 
 import sysid
 from sysid.errors import ConfigError
+from sysid.yaml_files import read_yaml
 
 pytest.importorskip("fmpy")
 MODELS = Path(__file__).parents[2] / "references"
@@ -42,6 +43,9 @@ def test_equations_that_are_known_are_fitted_exported_and_proven(
     assert made.proof.errors.max() < 1e-6
     assert made.proof.dropped is not None
     assert made.proof.dropped < 1e-9
+    # What chooses counts as the proof does.
+    chosen = read_yaml(tmp_path / "out" / "model" / "pipeline.yaml")
+    assert chosen["tolerance"] == made.proof.tolerance
 
 
 def test_what_does_not_go_together_is_refused_before_anything_is_run(tmp_path: Path) -> None:
