@@ -110,6 +110,11 @@ def make_surrogate(
     Raises:
         UserError: If the pipeline or its reference cannot be used.
     """
+    if not 0.0 < minutes < float("inf"):
+        raise ConfigError(
+            "there is no such time", where="minutes", expected="minutes above 0, and an end of them", got=minutes,
+            remedy="give some minutes: 5 for a fast model, 60 for a slow one",
+        )  # fmt: skip
     config = check(ExperimentConfig, read_yaml(pipeline), where=pipeline)
     growth = config.grow if rounds is None else (config.grow or GrowConfig()).model_copy(update={"rounds": rounds})
     reference = config.reference.at(pipeline.resolve().parent)

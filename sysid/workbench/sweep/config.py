@@ -29,12 +29,15 @@ class ChooseConfig(BaseModel):
         on: ``selection``: the traces that choose between fits; ``estimation``: those that are fitted; ``cases``: all
             cases of the data set, validation included, which a pipeline may do only if it reproduces a published
             sweep that did.
+        tolerance: Share of each output's range: who stays within it (root mean square of the free run) over more
+            selection traces comes first, then the figure decides; the figure alone where none is given.
     """
 
     model_config = STRICT
 
     by: str = "free_run_mse"
     on: Literal["selection", "estimation", "cases"] = "selection"
+    tolerance: float | None = Field(default=None, gt=0.0, lt=1.0)
 
     @field_validator("by")
     @classmethod
@@ -185,6 +188,11 @@ class SweepConfig(BaseModel):
                 got="choose: {on: cases} without reproduces",
                 remedy="choose on selection, or say with reproduces: ... whose sweep this repeats",
             )
+        if self.choose.tolerance is not None and self.choose.on != "selection":
+            raise FieldError(
+                "a tolerance counts selection traces", expected="choose: {on: selection}, or no tolerance",
+                got=f"on: {self.choose.on}, tolerance: {self.choose.tolerance:g}", remedy="leave one of them out",
+            )  # fmt: skip
         measured = [name for name in self._sought() if FIGURES[name].measured]
         if self.method.name in {"tpe", "nsga-ii"} and measured:
             raise FieldError(

@@ -17,6 +17,7 @@ from typing import Any
 from sysid.code_digest import code_digest
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
+from sysid.estimation.tolerance import outside
 from sysid.models import structure_from_dict
 from sysid.reporting.sweep_record import FIGURES, Trial
 from sysid.workbench.runner.events import StepProgress, Watcher
@@ -198,10 +199,12 @@ class Driver:
         chosen = {point.number for point in ranked[:n]}
         return [p for p in points if p.number in chosen], [p for p in points if p.number not in chosen]
 
-    def rank(self, trial: Trial) -> tuple[bool, float]:
-        """Sorting key of a trial by what chooses, best first, unusable ones last."""
-        value = FIGURES[self.config.choose.by].of(trial, self.config.choose.on)
-        return not trial.usable, value if math.isfinite(value) else math.inf
+    def rank(self, trial: Trial) -> tuple[bool, int, float]:
+        """Sorting key of a trial by what chooses, best first, unusable ones last; its end is the figure."""
+        choose = self.config.choose
+        value = FIGURES[choose.by].of(trial, choose.on)
+        left = outside(trial.selection_rms_shares, choose.tolerance)
+        return not trial.usable, left, value if math.isfinite(value) else math.inf
 
     def _job(self, point: Point, rung: Rung, before: Job | None, begun: Mapping[int, Job]) -> Job:
         """A point's training up to a rung; smaller networks of the same rung are in ``begun`` already."""
@@ -423,7 +426,7 @@ class _Progress:
         """Tell the screen: how many, how long still, the best so far."""
         best = ""
         if self.best is not None:
-            value = self.driver.rank(self.best)[1]
+            value = self.driver.rank(self.best)[-1]
             best = f", best so far {self.best.label}: {self.driver.config.choose.by} {value:.3g}"
         left = self.left()
         ahead = "" if left is None else f", {_duration(left)} left"

@@ -286,7 +286,7 @@ class SweepSteps:
             beside=others,
             given={trial.number: checks.given(trial) for trial in shown},
             options={trial.number: driver.last[trial.number].training for trial in shown},
-            rank=driver.rank(winner)[1],
+            rank=driver.rank(winner)[-1],
             done_now=driver.done_now,
         )
 
@@ -303,6 +303,11 @@ class SweepSteps:
     ) -> SweepRecord:
         config, choose = self.config, self.config.choose
         sentence = f"Least {FIGURES[choose.by].words} on {TRACES[choose.on]} among {len(tried)} trials."
+        if choose.tolerance is not None:
+            sentence = (
+                f"Over {winner.within(choose.tolerance):.0%} of the selection traces within {choose.tolerance:.3g} of "
+                f"the range, the most of {len(tried)} trials, then the least {FIGURES[choose.by].words}."
+            )
         if refused:
             sentence += f" {refused} that ranked higher were passed over: their free run is not stable."
         if config.reproduces:

@@ -56,4 +56,7 @@ def test_what_does_not_go_together_is_refused_before_anything_is_run(tmp_path: P
         sysid.surrogate(pipeline(tmp_path, known), tmp_path / "out", rounds=2)
     with pytest.raises(ConfigError, match="grow around what a search"):
         sysid.surrogate(pipeline(tmp_path, known, grow={"rounds": 2}), tmp_path / "out")
+    for minutes in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ConfigError, match="there is no such time"):
+            sysid.surrogate(pipeline(tmp_path, known), tmp_path / "out", minutes=minutes)
     assert not (tmp_path / "out").exists()

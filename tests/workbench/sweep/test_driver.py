@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sysid.errors import ConfigError
+from sysid.models import ARX
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.runner.store import digest
 from sysid.workbench.sweep.config import SweepConfig
-from sysid.workbench.sweep.driver import Driver
+from sysid.workbench.sweep.driver import Driver, as_trial
 from sysid.workbench.sweep.store import TrialStore
 from sysid.workbench.sweep.trial import Bench, Job
 from sysid.workbench.sweep.workers import AbstractWorkers
@@ -143,6 +145,24 @@ def test_looks_drop_the_worse_part_and_train_the_rest_to_the_end(tmp_path: Path)
     ranked = sorted(first, key=lambda one: (not one["usable"], one["selection_free_run_mse"]))
     assert {one["number"] for one in ranked[12:]} == dropped[1]
     assert driver.done_now == 24 + 12 + 4
+
+
+def test_where_a_tolerance_is_given_more_traces_within_it_come_first(tmp_path: Path) -> None:
+    """The least mean hides a trace that fails; what cannot be used is last all the same."""
+    _, driver = sweep(tmp_path, Crew(1, 0))
+    shown = driver.config.choose.model_copy(update={"tolerance": 0.01})
+    strict = dataclasses.replace(driver, config=driver.config.model_copy(update={"choose": shown}))
+    known = [(2.0, [0.009, 0.009], True), (1.0, [0.001, 0.02], True), (0.5, [0.001, 0.001], False)]
+    job = Job(key="k", number=1, structure=ARX(na=1, nb=(1,), nk=(1,)).to_dict(), training={})
+    even, uneven, unusable = (
+        as_trial(answer(job, None) | {"selection_free_run_mse": mse, "selection_rms_shares": shares, "usable": usable})
+        for mse, shares, usable in known
+    )
+    assert driver.rank(uneven) < driver.rank(even) < driver.rank(unusable)
+    assert strict.rank(even) < strict.rank(uneven) < strict.rank(unusable)
+    assert strict.rank(even)[-1] == 2.0
+    with pytest.raises(ConfigError, match="a tolerance counts selection traces"):
+        check(SweepConfig, SWEEP | {"choose": {"on": "estimation", "tolerance": 0.01}}, where="s.yaml")
 
 
 def test_a_job_goes_on_from_the_look_before_unless_the_record_grew(tmp_path: Path) -> None:
