@@ -13,6 +13,9 @@ from scipy.io import savemat
 from tests import test_readme
 from tests.test_readme import BLOCK, ROOT, Command, check, commands, execute
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+"""Of what a page shows, these tests look at the words."""
+
 PAGE = ROOT / "docs" / "get-started.md"
 MOST_LINES, MOST_COMMANDS = 10, 3
 

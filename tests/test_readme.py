@@ -134,6 +134,7 @@ def check(command: Command, got: str) -> None:
     assert len(lines) == len(expected), f"{command.words}: it no longer prints\n{expected[len(lines) :]}"
 
 
+@pytest.mark.usefixtures("undrawn")  # the words are compared
 def test_the_first_hour_is_as_the_page_tells_it(
     home: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
