@@ -12,7 +12,7 @@ from typing import TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sysid.composite.composite import Composite, FixedMember, Standing
+from sysid.composite.composite import Composite, FixedMember, Member, Standing
 from sysid.estimation.estimators import JOINING
 from sysid.models import Cascade, Limit, Mapping, NARXModel
 from sysid.traces import Trace
@@ -114,14 +114,27 @@ def limits_of(composite: Composite) -> dict[str, Limit]:
     found = {}
     for member in composite.members:
         for instance, name in zip(member.instances, member.outputs, strict=True):
-            if (asked := composite.limits.get(name)) is not None:
-                found[name] = asked
-            elif (first := composite.limits.get(member.output)) is not None:
-                low, high = (
-                    member.channel(one, instance) if isinstance(one, str) else one for one in (first.low, first.high)
-                )
-                found[name] = Limit(low=low, high=high)
+            if (limit := composite.limits.get(name) or limit_of_the_first(composite, member, instance)) is not None:
+                found[name] = limit
     return found
+
+
+def limit_of_the_first(composite: Composite, member: Member, instance: str) -> Limit | None:
+    """The limit of a member's first instance, as it is for another one.
+
+    Args:
+        composite: What is declared.
+        member: The member.
+        instance: Suffix of the instance.
+
+    Returns:
+        The limit; a channel is the one of that instance. ``None`` where the first has none.
+    """
+    first = composite.limits.get(member.output)
+    if first is None:
+        return None
+    low, high = (member.channel(one, instance) if isinstance(one, str) else one for one in (first.low, first.high))
+    return Limit(low=low, high=high)
 
 
 def dealt(sets: Sequence[Sequence[_T]]) -> list[_T]:

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sysid.composite.composite import Composite, Member
-from sysid.composite.members import network_of, placed, seen_from, simulated_inputs
+from sysid.composite.members import limit_of_the_first, network_of, placed, seen_from, simulated_inputs
 from sysid.composite.plan import RoundPlan
 from sysid.errors import ConfigError
-from sysid.models import Cascade
+from sysid.models import Cascade, Limit
 from sysid.traces import Trace
 
 
@@ -53,7 +53,8 @@ class SharedWeights:
             Its part of the whole.
 
         Raises:
-            ConfigError: If its members do not stand in the same several instances, or a target does not stand there.
+            ConfigError: If its members do not stand in the same several instances, a target does not stand there, or
+                the limits of an instance are others than those of the first.
         """
         members = tuple(one for one in composite.members if one.output in (asked.members or ()))
         instances = members[0].instances
@@ -68,6 +69,7 @@ class SharedWeights:
                 got=f"{members[0].output} at {len(instances)}, {', '.join(strangers) or 'nothing'} elsewhere",
                 remedy="give them the same instances, or train each for itself",
             )
+        _check_limits(composite, instances)
         return cls(
             whole=whole,
             part=whole.upstream_of(asked.targets, given={*asked.measured, *(set(whole.outputs) - there)}),
@@ -118,3 +120,24 @@ class SharedWeights:
 
     def _at(self, name: str, instance: str) -> str:
         return name if name in self.shared else f"{name}{instance}"
+
+
+def _check_limits(composite: Composite, instances: tuple[str, ...]) -> None:
+    """Refuse limits of an instance that are not those of the first: all are trained in the first one's place."""
+    for member in (one for one in composite.members if one.instances == instances):
+        for instance, name in zip(instances[1:], member.outputs[1:], strict=True):
+            own, first = composite.limits.get(name), limit_of_the_first(composite, member, instance)
+            if own is not None and own != first:
+                raise ConfigError(
+                    "instances that share their weights have different limits",
+                    where="share_weights",
+                    expected=f"for {name} the limits of {member.output}: {_said(first)}",
+                    got=_said(own),
+                    remedy=f"declare them for {member.output} alone, which every instance then has, or train each "
+                    "instance for itself (share_weights: false)",
+                )
+
+
+def _said(limit: Limit | None) -> str:
+    sides = {} if limit is None else {"low": limit.low, "high": limit.high}
+    return ", ".join(f"{side} {value}" for side, value in sides.items() if value is not None) or "none"

@@ -17,7 +17,7 @@ from sysid.composite.shared_weights import SharedWeights
 from sysid.composite.stages import reading_more
 from sysid.errors import ConfigError
 from sysid.estimation import JointTraining
-from sysid.models import Cascade, Mapping
+from sysid.models import Cascade, Limit, Mapping
 from sysid.traces import Channel, Trace
 from tests.composite.composites import fixed, member
 from tests.models.cascades import network
@@ -64,6 +64,22 @@ def whole() -> Cascade:
 
 def shared(**changes) -> SharedWeights:
     return SharedWeights.of(LINE, replace(ROUND, **changes), whole())
+
+
+@pytest.mark.parametrize(
+    ("limits", "got"),
+    [
+        ({"AR": Limit(low=0.0), "AR9": Limit(low=5.0)}, "low 5"),
+        ({"AR": Limit(high="BP"), "AR9": Limit(high="BP")}, "high BP"),
+        ({"AR9": Limit(low=5.0)}, "low 5"),
+    ],
+)
+def test_instances_that_share_weights_have_the_same_limits(limits: dict[str, Limit], got: str):
+    with pytest.raises(ConfigError, match="different limits") as told:
+        SharedWeights.of(replace(LINE, limits=limits), ROUND, whole())
+    assert told.value.got.startswith(got)
+    same = {"AR": Limit(high="BP"), "AR9": Limit(high="BP9")}
+    assert SharedWeights.of(replace(LINE, limits=same), ROUND, whole()).instances == BOTH
 
 
 def test_a_declared_member_stands_in_all_its_places_too():
