@@ -89,7 +89,7 @@ def _transfer_functions(looked: Looked) -> list[Try]:
 
 
 def _neural(looked: Looked) -> list[Try]:
-    sizes = ((2, 8, None), (2, 8, 0.03), (2, 4, 1e-3), (3, 8, 0.03))
+    sizes = ((2, 8, None), (2, 8, 0.03), (2, 8, 0.1), (2, 4, 1e-3), (3, 8, 0.03))
     found = [
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
         for n, k, r in sizes

@@ -26,7 +26,7 @@ GAIN = 0.02
 """Part of the least error, as a root of a mean square, by which a round has to better it to count as a gain."""
 PATIENCE = 2
 """Rounds without a gain after which the search ends."""
-FINALISTS, AGAIN = 3, 2
+FINALISTS, AGAIN = 5, 2
 """The best nonlinear models, and how often each is trained again before the choice: the least of many errors
 owes something to luck, and the chosen one is trained from other starts too."""
 ALIKE = 0.03

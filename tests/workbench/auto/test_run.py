@@ -30,7 +30,7 @@ from tests.workbench.auto.conftest import data, record, traces
 
 pytestmark = pytest.mark.usefixtures("small")
 
-FEW = 560
+FEW = 670
 """Iterations of two linear structures and two networks, four times each, and of one network again."""
 FIELDS: dict[str, Any] = {"kind": "auto", "name": "tries", "data": "rig", "mapping": "u -> y", "workers": 1}
 FIELDS |= {"export": None, "stability": {"count": 15}}
