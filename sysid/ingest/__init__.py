@@ -10,8 +10,9 @@ from sysid.ingest.assemble import Wanted, assemble
 from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
 from sysid.ingest.dataset import Progress, find_dataset, load_dataset, load_described
 from sysid.ingest.description import DatasetDescription, read_description
+from sysid.ingest.findings import ColumnFinding, FileFinding
 from sysid.ingest.generators import Generator, find_generator
-from sysid.ingest.inspection import ColumnFinding, FileFinding, inspect_file
+from sysid.ingest.inspection import inspect_file
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.proposal import propose_dataset
 from sysid.ingest.readers import READERS, Reader

@@ -1,10 +1,10 @@
-"""What is in an unknown file: columns, units, time, gaps, missing values."""
+"""A look at an unknown file: its columns, units, time, gaps and missing values."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from sysid.ingest.attempts import Attempt, read_somehow
 from sysid.ingest.blanks import blanks_mean
 from sysid.ingest.clocks import clock_of
 from sysid.ingest.events import are_events
+from sysid.ingest.findings import CaseFinding, ColumnFinding, FileFinding, counted
 from sysid.ingest.headers import is_unit, split_reference
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.readers.records import role_of
@@ -34,154 +35,6 @@ _UNITS_IN_NAMES = frozenset(
     | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
     | {"g", "rad", "deg"}
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class ColumnFinding:
-    """What was found in a column.
-
-    Args:
-        name: Its name.
-        unit: Its unit; ``"1"`` if neither the file nor the name says one.
-        unit_guessed: Whether the unit is not from the file.
-        reference: For pressures, what they are measured from.
-        reference_guessed: Whether the reference is not from the file.
-        description: As found in the file.
-        said: The unit that the file says, where it is none that is known.
-        minimum: Smallest finite value, in its unit; NaN if there is none.
-        maximum: Largest finite value, in its unit; NaN if there is none.
-        missing: How many values are empty, NaN or infinite.
-        problem: Why it cannot be a channel, or the empty text.
-        aside: Why it is not proposed as one, or the empty text.
-    """
-
-    name: str
-    unit: str
-    unit_guessed: bool
-    reference: Reference
-    reference_guessed: bool
-    description: str
-    minimum: float
-    maximum: float
-    missing: int
-    problem: str = ""
-    aside: str = ""
-    said: str = ""
-
-    @property
-    def constant(self) -> bool:
-        """Whether it never changes."""
-        return self.minimum == self.maximum
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FileFinding:
-    """What was found in a file.
-
-    Args:
-        path: The file.
-        reader: Name of the reader.
-        columns: What is in each column but time.
-        time: The time column and its unit; its ``step`` if the file has no time stamps.
-        time_told: What is guessed of time, for people; empty if the file says it.
-        timing: The survey of the time stamps as they stand; ``None`` without time stamps.
-        sample_time: Seconds between samples as proposed.
-        samples: How many rows the file has.
-        unstamped: How many of them have no time stamp.
-        distinct: How many different time stamps there are; rows without stamps are all different.
-        needed: The repairs that the file needs, with the gentlest choice of each.
-        files: The reader options that the file was read with, where they are not recognised by itself.
-        guessed: The reader options among them that are guesses.
-        table: The file as it was read.
-        notes: What the reader recognised.
-        cases: The records that the file holds, where they are several; their channels are then those of all.
-    """
-
-    path: Path
-    reader: str
-    columns: tuple[ColumnFinding, ...]
-    time: TimeOptions
-    time_told: str
-    timing: Timing | None
-    sample_time: float
-    samples: int
-    unstamped: int
-    distinct: int
-    needed: RepairOptions
-    files: FileOptions
-    table: RawTable = field(repr=False)
-    guessed: frozenset[str] = frozenset()
-    notes: tuple[str, ...] = field(default=())
-    cases: tuple[CaseFinding, ...] = field(default=())
-
-    @property
-    def time_guessed(self) -> bool:
-        """Whether column or unit of time is not from the file."""
-        return bool(self.time_told)
-
-    @property
-    def channels(self) -> tuple[ColumnFinding, ...]:
-        """The columns that are proposed as channels."""
-        return tuple(column for column in self.columns if not column.problem and not column.aside)
-
-    @property
-    def problems(self) -> tuple[str, ...]:
-        """What a data set of this file has to deal with, one phrase each."""
-        found = list(self.notes)
-        given = self.files.model_dump(exclude_none=True)
-        found += [_guess(name, given[name]) for name in sorted(self.guessed - {"zone", "format"}) if name in given]
-        found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
-        timing = self.timing
-        if timing is None:
-            found += [self.time_told if self.table.time else "no time stamps"] if self.time_guessed else []
-        else:
-            found += [_count(len(timing.backward), "backward time stamp")] if len(timing.backward) else []
-            after = ", as of events: the value after each counts" if self.needed.duplicates == "last" else ""
-            found += [_count(len(timing.duplicates), "duplicate time stamp") + after] if len(timing.duplicates) else []
-            gaps = _count(len(timing.gaps), "gap")
-            found += [f"{_count(timing.missing, 'sample')} missing in {gaps}"] if timing.missing else []
-            found += [f"uneven time stamps, up to {timing.jitter:.3g} s off"] if self.needed.jitter else []
-        for column in self.columns:
-            if column.problem:
-                found.append(f"{column.name}: {column.problem}")
-                continue
-            found += [f"{column.name}: {_count(column.missing, 'missing value')}"] if column.missing else []
-            found += [f"{column.name}: never changes"] if column.constant and not column.aside else []
-            unknown = f"{column.name}: the file says {column.said}, which is no unit that is known"
-            found += [unknown] if column.said else []
-        return tuple(found)
-
-
-def _guess(name: str, value: object) -> str:
-    """What was guessed of how a file is written, and where to say otherwise."""
-    shown = ", ".join(map(repr, value)) if isinstance(value, list | tuple) else repr(value)
-    said = {
-        "decimal": f"{shown} is taken for the decimal mark",
-        "thousands": f"{shown} is taken for the mark between thousands",
-        "missing": f"{shown} is taken for a missing value",
-        "states": "words are taken for states",
-        "transpose": "rows are taken for columns",
-    }.get(name, f"{name} is taken to be {shown}")
-    return f"{said}, which is a guess: source.files.{name} in dataset.yaml says it"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CaseFinding:
-    """What was found in one of several records of a file.
-
-    Args:
-        name: What its case may be called.
-        role: What it may be used for.
-        role_guessed: Whether nothing in the file says so.
-        options: What the case says to read it: ``columns``, ``group``, ``sheet``, ``time``.
-        finding: What is in it.
-    """
-
-    name: str
-    role: str
-    role_guessed: bool
-    options: Mapping[str, object]
-    finding: FileFinding
 
 
 def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileFinding:
@@ -307,7 +160,7 @@ def _of_records(whole: FileFinding, attempt: Attempt) -> FileFinding:
     chosen = max(kinds.values(), key=len)
     apart = [case for case in cases if case not in chosen]
     sizes = ", ".join(f"{case.name} ({case.finding.samples} samples)" for case in chosen)
-    told = [f"{_count(len(chosen), 'record')}: {sizes}"]
+    told = [f"{counted(len(chosen), 'record')}: {sizes}"]
     told += [
         f"{case.name}: a record with other channels or another sample time: a data set of its own, with "
         + ", ".join(f"{key}: {value}" for key, value in case.options.items())
@@ -476,10 +329,6 @@ def _nearly_empty(values: NDArray[np.float64]) -> str:
     if missing <= _EMPTY_SHARE * len(values) or blanks_mean(values) == "hold":
         return ""
     return f"{missing} of {len(values)} values are missing"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _unit_in_name(name: str) -> str | None:

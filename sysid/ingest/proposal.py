@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sysid.errors import ReaderError
-from sysid.ingest.inspection import ColumnFinding, FileFinding
+from sysid.ingest.findings import ColumnFinding, FileFinding
 from sysid.ingest.options import GridOptions
 from sysid.units import Reference
 

@@ -1,0 +1,177 @@
+"""What was found in an unknown file, and what a data set of it has to deal with, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sysid.ingest.options import FileOptions, RepairOptions, TimeOptions
+from sysid.ingest.table import RawTable
+from sysid.ingest.timing import Timing
+from sysid.units import Reference
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnFinding:
+    """What was found in a column.
+
+    Args:
+        name: Its name.
+        unit: Its unit; ``"1"`` if neither the file nor the name says one.
+        unit_guessed: Whether the unit is not from the file.
+        reference: For pressures, what they are measured from.
+        reference_guessed: Whether the reference is not from the file.
+        description: As found in the file.
+        said: The unit that the file says, where it is none that is known.
+        minimum: Smallest finite value, in its unit; NaN if there is none.
+        maximum: Largest finite value, in its unit; NaN if there is none.
+        missing: How many values are empty, NaN or infinite.
+        problem: Why it cannot be a channel, or the empty text.
+        aside: Why it is not proposed as one, or the empty text.
+    """
+
+    name: str
+    unit: str
+    unit_guessed: bool
+    reference: Reference
+    reference_guessed: bool
+    description: str
+    minimum: float
+    maximum: float
+    missing: int
+    problem: str = ""
+    aside: str = ""
+    said: str = ""
+
+    @property
+    def constant(self) -> bool:
+        """Whether it never changes."""
+        return self.minimum == self.maximum
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FileFinding:
+    """What was found in a file.
+
+    Args:
+        path: The file.
+        reader: Name of the reader.
+        columns: What is in each column but time.
+        time: The time column and its unit; its ``step`` if the file has no time stamps.
+        time_told: What is guessed of time, for people; empty if the file says it.
+        timing: The survey of the time stamps as they stand; ``None`` without time stamps.
+        sample_time: Seconds between samples as proposed.
+        samples: How many rows the file has.
+        unstamped: How many of them have no time stamp.
+        distinct: How many different time stamps there are; rows without stamps are all different.
+        needed: The repairs that the file needs, with the gentlest choice of each.
+        files: The reader options that the file was read with, where they are not recognised by itself.
+        guessed: The reader options among them that are guesses.
+        table: The file as it was read.
+        notes: What the reader recognised.
+        cases: The records that the file holds, where they are several; their channels are then those of all.
+    """
+
+    path: Path
+    reader: str
+    columns: tuple[ColumnFinding, ...]
+    time: TimeOptions
+    time_told: str
+    timing: Timing | None
+    sample_time: float
+    samples: int
+    unstamped: int
+    distinct: int
+    needed: RepairOptions
+    files: FileOptions
+    table: RawTable = field(repr=False)
+    guessed: frozenset[str] = frozenset()
+    notes: tuple[str, ...] = field(default=())
+    cases: tuple[CaseFinding, ...] = field(default=())
+
+    @property
+    def time_guessed(self) -> bool:
+        """Whether column or unit of time is not from the file."""
+        return bool(self.time_told)
+
+    @property
+    def channels(self) -> tuple[ColumnFinding, ...]:
+        """The columns that are proposed as channels."""
+        return tuple(column for column in self.columns if not column.problem and not column.aside)
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What a data set of this file has to deal with, one phrase each."""
+        found = list(self.notes)
+        given = self.files.model_dump(exclude_none=True)
+        found += [_guess(name, given[name]) for name in sorted(self.guessed - {"zone", "format"}) if name in given]
+        found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
+        timing = self.timing
+        if timing is None:
+            found += [self.time_told if self.table.time else "no time stamps"] if self.time_guessed else []
+        else:
+            found += [counted(len(timing.backward), "backward time stamp")] if len(timing.backward) else []
+            after = ", as of events: the value after each counts" if self.needed.duplicates == "last" else ""
+            found += [counted(len(timing.duplicates), "duplicate time stamp") + after] if len(timing.duplicates) else []
+            gaps = counted(len(timing.gaps), "gap")
+            found += [f"{counted(timing.missing, 'sample')} missing in {gaps}"] if timing.missing else []
+            found += [f"uneven time stamps, up to {timing.jitter:.3g} s off"] if self.needed.jitter else []
+        for column in self.columns:
+            if column.problem:
+                found.append(f"{column.name}: {column.problem}")
+                continue
+            found += [f"{column.name}: {counted(column.missing, 'missing value')}"] if column.missing else []
+            found += [f"{column.name}: never changes"] if column.constant and not column.aside else []
+            unknown = f"{column.name}: the file says {column.said}, which is no unit that is known"
+            found += [unknown] if column.said else []
+        return tuple(found)
+
+
+def _guess(name: str, value: object) -> str:
+    """What was guessed of how a file is written, and where to say otherwise."""
+    shown = ", ".join(map(repr, value)) if isinstance(value, list | tuple) else repr(value)
+    said = {
+        "decimal": f"{shown} is taken for the decimal mark",
+        "thousands": f"{shown} is taken for the mark between thousands",
+        "missing": f"{shown} is taken for a missing value",
+        "states": "words are taken for states",
+        "transpose": "rows are taken for columns",
+    }.get(name, f"{name} is taken to be {shown}")
+    return f"{said}, which is a guess: source.files.{name} in dataset.yaml says it"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseFinding:
+    """What was found in one of several records of a file.
+
+    Args:
+        name: What its case may be called.
+        role: What it may be used for.
+        role_guessed: Whether nothing in the file says so.
+        options: What the case says to read it: ``columns``, ``group``, ``sheet``, ``time``.
+        finding: What is in it.
+    """
+
+    name: str
+    role: str
+    role_guessed: bool
+    options: Mapping[str, object]
+    finding: FileFinding
+
+
+def counted(number: int, what: str) -> str:
+    """So many of something, in words.
+
+    Args:
+        number: How many.
+        what: One of them; its plural ends in s.
+
+    Returns:
+        The words.
+
+    Example:
+        >>> counted(1, "gap"), counted(2, "gap")
+        ('1 gap', '2 gaps')
+    """
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
