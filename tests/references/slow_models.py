@@ -217,6 +217,11 @@ def counted(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
     return inputs[:, :1]
 
 
+def stands_still(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Answers nothing."""
+    return np.full(len(inputs), 5.0)
+
+
 def gives(time: Array, inputs: Array, parameters: Mapping[str, float]) -> object:
     """What somebody's function may give for a record of two outputs; the number of ``how`` says what."""
     y, z = 0.5 * inputs[:, 0], 100.0 * inputs[:, 0]

@@ -117,7 +117,8 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit
     finals += f", the {raced} best networks trained on side by side before that" if raced else ""
     parts = [f"{why}, of {tried} tried{finals}"]
     if choice.linear is not None and choice.linear.number != choice.chosen.number:
-        share = 1.0 - root / math.sqrt(error(choice.linear))
+        linear = math.sqrt(error(choice.linear))
+        share = 1.0 - root / linear if linear else 0.0  # what is met exactly has no error to better
         parts.append(f"{share:.0%} less than the best linear model, {choice.linear.label}")
     elif choice.linear is not None:
         parts.append("and no nonlinear model does better" if choice.nonlinear else "no nonlinear model was tried")

@@ -54,6 +54,8 @@ GROWING = 0.25
 """Share of the time in which data grow, where they do; it is taken from the search's."""
 TIMES = "search-seconds.txt"
 """The search's time: decided once, so that a run that was killed finds its trials again."""
+LEAST_MINUTES = 0.1
+"""Of a surrogate."""
 TOLERANCE = 0.01
 """Share of an output's range: what a proof counts, and what models are chosen by."""
 EXPORT: dict[str, Any] = {"formats": ("c", "fmi2", "fmi3")}
@@ -110,9 +112,10 @@ def make_surrogate(
     Raises:
         UserError: If the pipeline or its reference cannot be used.
     """
-    if not 0.0 < minutes < float("inf"):
+    if not LEAST_MINUTES <= minutes < float("inf"):
         raise ConfigError(
-            "there is no such time", where="minutes", expected="minutes above 0, and an end of them", got=minutes,
+            "there is no such time, or nothing can be done in it", where="minutes",
+            expected=f"{LEAST_MINUTES:g} or more, and an end of them", got=minutes,
             remedy="give some minutes: 5 for a fast model, 60 for a slow one",
         )  # fmt: skip
     config = check(ExperimentConfig, read_yaml(pipeline), where=pipeline)
@@ -132,6 +135,7 @@ def make_surrogate(
             )  # fmt: skip
     began = time.monotonic()
     found = work.experimented()
+    _check_moving(found.traces.with_role(Role.ESTIMATION), reference)
     # What a search has to learn; of fits that are asked for somebody knows it.
     begins = [] if config.fits else restless(found, mapping)
     jumps = [] if config.fits else jumps_told(found.traces.with_role(Role.ESTIMATION), mapping)
@@ -276,6 +280,17 @@ def _grown(
     else:
         write_record(place / FILE, grown.record)
     return place, grown.record.sentence
+
+
+def _check_moving(traces: Sequence[Trace], reference: ReferenceConfig) -> None:
+    """Refuse outputs that no experiment moves: nothing is to be learnt of them, and there is no range for an error."""
+    still = [name for name in reference.outputs if span_of(traces, name) == 0.0]
+    if still:
+        raise ConfigError(
+            f"{still[0]} has one value in all experiments", where=f"output {still[0]}", expected="an output that moves",
+            got=f"{float(traces[0][still[0]][0]):.6g} throughout {len(traces)} experiments",
+            remedy="leave the output out, or move what it depends on: wider ranges, a longer duration",
+        )  # fmt: skip
 
 
 def _kept(file: Path, seconds: float) -> float:

@@ -42,6 +42,13 @@ def test_a_linear_model_that_is_as_good_is_chosen() -> None:
     assert "and no nonlinear model does better" in sentence(found, 2, unit="V", ended="", error=error)
 
 
+def test_two_models_that_are_exact_are_no_better_than_each_other() -> None:
+    smaller = arx(1, 0.0).model_copy(update={"operations": 5})
+    found = choose([smaller, arx(2, 0.0), network(3, 1.0, 60)], error, stable)
+    assert (found.chosen.number, found.linear.number if found.linear else 0) == (2, 1)
+    assert "0% less than the best linear model" in sentence(found, 3, unit="V", ended="", error=error)
+
+
 def test_that_no_network_was_tried_is_said() -> None:
     found = choose([arx(1, 1.01)], error, stable)
     said = sentence(found, 1, unit="V", ended="the budget is spent", error=error)

@@ -56,7 +56,19 @@ def test_what_does_not_go_together_is_refused_before_anything_is_run(tmp_path: P
         sysid.surrogate(pipeline(tmp_path, known), tmp_path / "out", rounds=2)
     with pytest.raises(ConfigError, match="grow around what a search"):
         sysid.surrogate(pipeline(tmp_path, known, grow={"rounds": 2}), tmp_path / "out")
-    for minutes in (0.0, -1.0, float("nan"), float("inf")):
+    for minutes in (0.0, 0.01, -1.0, float("nan"), float("inf")):
         with pytest.raises(ConfigError, match="there is no such time"):
             sysid.surrogate(pipeline(tmp_path, known), tmp_path / "out", minutes=minutes)
     assert not (tmp_path / "out").exists()
+
+
+def test_an_output_that_never_moves_is_refused_before_a_model_is_looked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
+    file = pipeline(tmp_path, "y = a*x + (1 - a)*u\nx[k+1] = y")
+    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    content["reference"]["python"] = "slow_models:stands_still"
+    file.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    with pytest.raises(ConfigError, match="y has one value in all experiments"):
+        sysid.surrogate(file, tmp_path / "out", minutes=1.0)
