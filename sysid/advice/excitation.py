@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record
 from sysid.estimation.nonparametric.evidence import triangle
-from sysid.estimation.nonparametric.excitation_order import MOST, NEEDED, excitation_order
+from sysid.estimation.nonparametric.excitation_order import NEEDED, excitation_order, largest_order
 from sysid.estimation.nonparametric.segments import columns_of_lags
 
 ENOUGH = 20
@@ -47,9 +47,9 @@ def _input(record: Record, name: str) -> Iterator[Finding]:
         "levels": levels,
         "band": _band(parts) / record.sample_time,
         "nyquist": 0.5 / record.sample_time,
-        "looked_for": min(MOST, max(sum(map(len, parts)) // 4, 1)),
+        "looked_for": largest_order(parts),
     }
-    if order < NEEDED:
+    if order < min(NEEDED, figures["looked_for"]):
         code, verdict = "excitation.low", Verdict.LOOK
     elif moves < 5:
         code, verdict = "excitation.few_moves", Verdict.LOOK

@@ -260,7 +260,8 @@ def search_orders(
         )
     feedback = feedback_of(estimation, chosen) if chosen.inputs and max_nk != 0 else ""
     first = int(not isinstance(feedback, str) and feedback.at_once)
-    grid = _grid(sum(len(trace) for trace in estimation), len(chosen.inputs), (max_na, max_nb, max_nk), first)
+    samples = sum(len(trace) for trace in estimation), max(len(trace) for trace in estimation)
+    grid = _grid(samples, len(chosen.inputs), (max_na, max_nb, max_nk), first)
     losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
     selection = traces.with_role(Role.SELECTION) if selection is None else tuple(selection)
     found = run_finalists(
@@ -284,14 +285,20 @@ def search_orders(
     )  # fmt: skip
 
 
-def _grid(samples: int, inputs: int, asked: tuple[int | None, int | None, int | None], first: int) -> OrderGrid:
-    """The orders that were asked for; those that were not, up to ten, as far as record and patience allow."""
+def _grid(
+    samples: tuple[int, int], inputs: int, asked: tuple[int | None, int | None, int | None], first: int
+) -> OrderGrid:
+    """The orders that were asked for; those that were not, up to ten, as far as records and patience allow.
+
+    Samples count all together, and those of the longest record: half of it is fitted with its past beside it.
+    """
     grid = OrderGrid(max_na=1, max_nb=1, max_nk=first, min_nk=first)
     for largest in range(1, 11):
         na, nb, nk = (largest if one is None else one for one in asked)
         tried = OrderGrid(max_na=na, max_nb=nb, max_nk=nk, min_na=min(1, na), min_nb=min(1, nb), min_nk=first)
         parameters = na + inputs * (nb + nk) + 1
-        if largest > 1 and (tried.size(inputs) > LARGEST or 4 * parameters > samples):
+        short = 4 * parameters > samples[0] or max(na, nb + nk) > samples[1] // 2
+        if largest > 1 and (short or tried.size(inputs) > LARGEST):
             break
         grid = tried
     if grid.size(inputs) > 100 * LARGEST:

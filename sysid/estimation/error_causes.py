@@ -55,7 +55,7 @@ def causes(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> lis
     Args:
         model: The fitted model.
         run: Its free run over a record that was fitted.
-        fed: Places of outputs that act on the inputs: that their errors move together says nothing.
+        fed: Places of outputs whose error the inputs say nothing of: they are fed back, or its levels are its own.
 
     Returns:
         Sentences; none where the error is small, or what is left of it looks like noise.

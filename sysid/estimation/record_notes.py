@@ -14,6 +14,7 @@ from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.informative import informative, own_part, still
 from sysid.estimation.nonparametric.excitation_order import MOST, excitation_order
 from sysid.estimation.nonparametric.segments import segments_of
+from sysid.estimation.record_levels import levels_told
 from sysid.models import AbstractModel, Mapping, Start
 from sysid.traces import Trace
 
@@ -177,9 +178,11 @@ def contradicted(
     runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
     longest = max(runs, key=lambda run: len(run.output))
     fed = feedback_told(model, traces, longest, training)
+    levels = levels_told(model, traces[:MOST_TRACES], runs)
     lags = left_out(model, longest, fed)
     # A lag that is left out is a cause, and the nearer one.
-    return (*_beside_a_constant(model, runs), *fed.values(), *(lags or causes(model, longest, fed)))
+    rest = lags or causes(model, longest, (*fed, *levels))
+    return (*_beside_a_constant(model, runs), *fed.values(), *levels.values(), *rest)
 
 
 def _beside_a_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[str]:

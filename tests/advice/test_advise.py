@@ -312,3 +312,9 @@ def test_ten_thousand_samples_take_less_than_three_seconds_of_processor_time() -
     began = time.thread_time()
     look(a, mapping="u1+u2 -> y")
     assert time.thread_time() - began < 3.0
+
+
+def test_many_short_records_are_as_exciting_as_one() -> None:
+    """Steps that begin with their records: with as many lags as samples the last two were always the same."""
+    found = look(*(trace(u := steps(12, k, 4), plant(u), name=f"r{k}") for k in range(100)))
+    assert finding(found, "excitation.rich").figures["looked_for"] == 6

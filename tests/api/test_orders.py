@@ -65,7 +65,7 @@ def test_the_picture_and_the_table_are_there(found: OrderSearch) -> None:
 @pytest.mark.parametrize("inputs", [1, 2, 3, 5])
 @pytest.mark.parametrize("samples", [20, 100, 10_000])
 def test_what_is_not_asked_for_is_bounded_by_record_and_patience(samples: int, inputs: int) -> None:
-    grid = _grid(samples, inputs, (None, None, None), 0)
+    grid = _grid((samples, samples), inputs, (None, None, None), 0)
     assert grid.size(inputs) <= max(LARGEST, 2**inputs)
     assert grid.max_na <= 10
     assert grid.max_na == 1 or 4 * (grid.max_na + inputs * (grid.max_nb + grid.max_nk)) < samples
@@ -127,3 +127,9 @@ def test_a_structure_that_the_record_is_too_short_for_is_told() -> None:
 def test_an_unknown_structure_is_refused_by_name() -> None:
     with pytest.raises(ConfigError, match="no structure of this kind"):
         sysid.search_orders(sysid.data(record(60), sample_time=1.0), "u -> y", structures=["NARMAX"])
+
+
+def test_many_short_records_are_searched_as_far_as_each_is_long() -> None:
+    records = [record(14, seed=k) for k in range(30)]
+    found = sysid.search_orders(sysid.data(records, sample_time=1.0), "u -> y")
+    assert 1 < found.grid.max_na and found.grid.max_nb + found.grid.max_nk <= 7

@@ -328,3 +328,16 @@ def test_a_model_that_a_move_at_the_beginning_does_not_reach_is_not_accused(zone
         history=History.at_rest(inputs=[0.0], output=0.0),
     )
     assert ["dead time is too short" in note for note in left_out(model, run)] == [True] * told
+
+
+@pytest.mark.parametrize("structure", STRUCTURES[:4], ids=lambda s: s.kind)
+def test_records_at_other_levels_are_told_as_that(structure: object) -> None:
+    """An error that the level makes moves with a slow response to any input: it was taken for too little memory."""
+    levels = (0.0, 5.0, -3.0)
+    records = [(u, _y(u, dead=1) + 0.01 * _u(9) + level) for level, u in zip(levels, map(_u, range(3)), strict=True)]
+    told = sysid.fit(sysid.data(records, sample_time=1.0), "u -> y", structure).warnings
+    assert any("stands at other levels" in note for note in told)
+    assert not [note for note in told if "too little memory" in note]
+    records = [(u, y - level) for (u, y), level in zip(records, levels, strict=True)]
+    told = sysid.fit(sysid.data(records, sample_time=1.0), "u -> y", structure).warnings
+    assert not [note for note in told if "levels" in note]

@@ -17,6 +17,18 @@ SEEN = 1e-4
 """Part of its largest direction that the smallest must have, in root mean square, to count as excited."""
 
 
+def largest_order(parts: Sequence[NDArray[np.float64]]) -> int:
+    """The largest order that can be looked for: a stretch has to show its lags more than once.
+
+    Args:
+        parts: Stretches of a signal.
+
+    Returns:
+        At least 1, at most :data:`MOST`.
+    """
+    return max(1, min(MOST, sum(map(len, parts)) // 4, max(map(len, parts)) // 2))
+
+
 def excitation_order(
     parts: Sequence[NDArray[np.float64]], most: int = MOST, *, seen: float = SEEN
 ) -> tuple[int, float]:
@@ -30,8 +42,7 @@ def excitation_order(
     Returns:
         The order, and the condition number of the lags at the order :data:`NEEDED` or the largest there is.
     """
-    total = sum(map(len, parts))
-    n = max(1, min(most, total // 4, max(map(len, parts)) - 1))
+    n = min(most, largest_order(parts))
     mean = np.concatenate(parts).mean()
     blocks = [columns_of_lags(part - mean, range(n), slice(n - 1, None)) for part in parts if len(part) >= n]
     R = triangle((np.column_stack([b, b[:, 0]]) for b in blocks), free=0).R[:n, :n]
