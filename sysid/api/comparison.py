@@ -19,6 +19,7 @@ from sysid.traces import Role, TraceSet
 from sysid.validation import Evaluation, evaluate_outputs
 from sysid.validation.beyond import beyond
 from sysid.validation.metrics import percent
+from sysid.validation.repeated import repeated
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -163,8 +164,11 @@ def _fits(given: Sequence[Any]) -> list[FitResult | Several]:
 
 
 def _beyond(fit: FitResult, traces: TraceSet) -> tuple[str, ...]:
-    """What is said of cases beyond the records that a fit was made of, where it knows them."""
+    """What is said of cases beyond the records that a fit was made of, where it knows them, and of those among them."""
     made_of: TraceSet = getattr(fit, "traces", traces)
     fitted = made_of.with_role(Role.ESTIMATION)
     scored = [trace for trace in traces if not any(np.array_equal(trace.values, one.values) for one in fitted)]
-    return beyond(fit.model, fitted, scored)
+    # A record that was fitted may stand beside the others, as long as it is called one.
+    strangers = [one for one in traces if traces.roles[one.name] is not Role.ESTIMATION or one in scored]
+    channels = (*fit.model.mapping.inputs, *fit.model.mapping.outputs)
+    return *beyond(fit.model, fitted, scored), *repeated(channels, fitted, strangers)

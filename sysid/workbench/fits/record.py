@@ -19,6 +19,7 @@ from sysid.traces import Role, TraceSet
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
 from sysid.validation.beyond import beyond
 from sysid.validation.metrics import mean_fit
+from sysid.validation.repeated import repeated
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.evidence import linearity
@@ -158,7 +159,8 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: Tr
     fit, model = ready.fit, ready.fit.model
     stored, fitted = fit.to_dict(), traces.with_role(Role.ESTIMATION)
     scored = [trace for trace in traces if traces.roles[trace.name] is not Role.ESTIMATION]
-    further = beyond(model, fitted, scored)
+    channels = (*model.mapping.inputs, *model.mapping.outputs)
+    further = *beyond(model, fitted, scored), *repeated(channels, fitted, scored)
     return {
         "name": ready.config.name,
         "slug": ready.config.slug,
