@@ -172,9 +172,12 @@ class ParityError(SysidError):
         difference: The largest absolute difference, in the output's unit.
         tolerance: What was allowed, in the same unit.
         unit: The output's unit.
+        coarse: Whether the file computes in float32, whose rounding a model may make too much of.
     """
 
-    def __init__(self, file: str, case: str, difference: float, tolerance: float, unit: str) -> None:
+    def __init__(
+        self, file: str, case: str, difference: float, tolerance: float, unit: str, *, coarse: bool = False
+    ) -> None:
         self.difference = difference
         self.tolerance = tolerance
         super().__init__(
@@ -182,5 +185,8 @@ class ParityError(SysidError):
             where=f"case {case}",
             expected=f"a largest difference of at most {tolerance:g} {unit}",
             got=f"{difference:g} {unit}",
-            remedy="the file was not published; please report this with the bundle's model.json",
+            remedy="nothing was published: a model may make more of rounding to float32 than is allowed. Leave this "
+            "format out (those in float64 are exact), allow more (tolerance), or fit a model that forgets faster"
+            if coarse
+            else "the file was not published; please report this with the bundle's model.json",
         )

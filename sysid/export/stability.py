@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from sysid.estimation.result import Status
 from sysid.estimation.stability.check import FreeRunCheck, StabilityOptions
 from sysid.estimation.stability.free_run import Stability
+from sysid.export.parity import ParityCase
 from sysid.export.verification import FOLDER
 from sysid.models import AbstractModel
 from sysid.traces import Role, TraceSet
@@ -27,6 +32,35 @@ def check_free_run(model: AbstractModel, traces: TraceSet) -> Stability | None:
     """
     estimation = traces.with_role(Role.ESTIMATION)
     return FreeRunCheck.of(StabilityOptions(), model.mapping, estimation).finding(model) if estimation else None
+
+
+class UnboundedRunWarning(UserWarning):
+    """A surrogate that grows without bound within the declared ranges of its inputs."""
+
+
+def state_unbounded(manifest: dict[str, Any], sequences: Sequence[ParityCase]) -> None:
+    """Say where the model itself grows without bound on inputs within their declared ranges, and warn of it.
+
+    Held inputs are among the random sequences, and may not be among the excursions of the records that the check of
+    the free run is made of.
+
+    Args:
+        manifest: Content of ``model.json``, with the fit; a cascade has none of its own.
+        sequences: The random sequences.
+    """
+    lost = sum(not np.isfinite(case.output).all() for case in sequences)
+    if not lost:
+        return
+    told = (
+        f"On {lost} of {len(sequences)} random sequences within the declared ranges of the inputs (steps, ramps, held "
+        "levels) the model itself grows without bound, and its files with it."
+    )
+    warnings.warn(
+        f"{told} Fit with more records, fewer terms or lags, or in closed loop.", UnboundedRunWarning, stacklevel=3
+    )
+    fit = manifest["fit"]
+    if fit is not None:
+        fit |= {"status": Status.UNSTABLE.name, "status_text": Status.UNSTABLE.value, "notes": [told, *fit["notes"]]}
 
 
 def state_stability(manifest: dict[str, Any], stability: Stability | None) -> None:

@@ -38,7 +38,7 @@ from sysid.export.manifest import (
     sha256,
 )
 from sysid.export.parity import Allowed, check_parity, parity_cases, random_cases
-from sysid.export.stability import WORST, check_free_run, state_stability
+from sysid.export.stability import WORST, check_free_run, state_stability, state_unbounded
 from sysid.export.surrogate import Surrogate
 from sysid.export.verification import write_verification
 from sysid.models import AbstractModel, Cascade, Start
@@ -121,7 +121,8 @@ def export_bundle(
             for file in written
         ]
         purposes = {name: f"needed by {file.name}" for file in written for name in file.companions}
-        purposes |= write_verification(surrogate, written, (cases[0], sequences[0]), draft, allowed)
+        drawn = next((case for case in sequences if np.isfinite(case.output).all()), sequences[0])
+        purposes |= write_verification(surrogate, written, (cases[0], drawn), draft, allowed)
         if stability is not None:
             (draft / WORST).write_text(stability.worst_csv(), encoding="utf-8", newline="\n")
             purposes[WORST] = "the random sequence on which the free run did worst"
@@ -134,6 +135,8 @@ def export_bundle(
         manifest["stability"] = None
         if stability is not None:
             state_stability(manifest, stability)
+        state_unbounded(manifest, sequences)
+        if manifest["fit"] is not None:
             manifest["stages"][0]["fit"] = manifest["fit"]
         manifest["files"] = [file_entry(file, parity, draft) for file, parity in zip(written, checked, strict=True)]
         manifest["attachments"] = attachments(purposes, draft)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from sysid.errors import ParityError
 from sysid.export import EXPORTERS, Surrogate, check_parity, parity_cases, random_cases
 from sysid.export.parity import SHARES, Allowed, ParityCase, largest_difference
+from sysid.export.stability import UnboundedRunWarning, state_unbounded
 from sysid.export.stage import Port
 from sysid.models import ARX, NARX, ARXModel, Mapping, Start, StartKind
 from tests.export.conftest import ROWS, usable
@@ -94,6 +96,29 @@ def test_a_difference_on_a_random_sequence_alone_is_refused(fit, declared, trace
         check_parity(
             file, tmp_path, cases, sequences, allowed=Allowed.of(cases, "float64", 1e-9), outputs=surrogate.outputs
         )
+
+
+def test_where_the_model_grows_without_bound_there_is_nothing_to_reproduce(declared, traces, tmp_path):
+    """In float32 it does so sooner: such a file was refused as if it were wrong."""
+    orders = ARX(na=1, nb=(1, 1), nk=(1, 1))
+    explosive = ARXModel(
+        orders=orders, coefficients=np.array([0.1, 0.1, 1e30]), intercept=0.0, mapping=Mapping.parse("BP+AR -> BC"),
+        sample_time=0.1, input_units=("psi", "psi"), output_unit="psi", rest_output=0.0,
+    )  # fmt: skip
+    surrogate = declared(explosive)
+    (file,) = written(ROWS["C, float"], surrogate, tmp_path)
+    sequences = random_cases(surrogate, sequences=2, samples=50)
+    first = sequences[0]
+    cases = (replace(first, name="short", inputs=first.inputs[:1], output=first.output[:1]),)
+    assert not any(np.isfinite(case.output).all() for case in sequences)
+    allowed = Allowed.of(cases, "float32")
+    assert (
+        check_parity(file, tmp_path, cases, sequences, allowed=allowed, outputs=surrogate.outputs).random_sequences == 0
+    )
+    manifest = {"fit": {"status": "CONVERGED", "status_text": "", "notes": []}}
+    with pytest.warns(UnboundedRunWarning, match="On 2 of 2 random sequences"):
+        state_unbounded(manifest, sequences)
+    assert manifest["fit"]["status"] == "UNSTABLE"
 
 
 def run_of(*outputs: list[float]) -> ParityCase:
