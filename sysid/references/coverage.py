@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 BINS = 8
 """Of each range: of an input as it is, as it was lately and for long; of two inputs together as they were lately."""
@@ -36,7 +36,7 @@ def cells(
 def _smoothed(level: NDArray[np.float64], lag: float) -> NDArray[np.float64]:
     """Behind a lag of first order that begins where the signal does."""
     a = float(np.exp(-1.0 / lag))
-    filtered, _ = lfilter([1.0 - a], [1.0, -a], level, axis=0, zi=a * level[:1])
+    filtered, _ = scipy.signal.lfilter([1.0 - a], [1.0, -a], level, axis=0, zi=a * level[:1])
     return np.asarray(filtered, dtype=np.float64)
 
 

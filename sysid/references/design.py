@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
-from scipy.stats import qmc
 
 from sysid.errors import ConfigError
 from sysid.excitation import excite
@@ -261,9 +261,9 @@ def _spread(
         return np.zeros((count, 0))
     if design.sampling == "sobol":
         power = int(np.ceil(np.log2(max(count, 1))))
-        unit = qmc.Sobol(len(ranges), rng=rng).random_base2(power)[:count]
+        unit = scipy.stats.qmc.Sobol(len(ranges), rng=rng).random_base2(power)[:count]
     else:
-        unit = qmc.LatinHypercube(len(ranges), rng=rng).random(count)
+        unit = scipy.stats.qmc.LatinHypercube(len(ranges), rng=rng).random(count)
     if to_the_ends and count > 1:
         unit = (unit - unit.min(axis=0)) / np.ptp(unit, axis=0)
     values = ranges[:, 0] + unit * (ranges[:, 1] - ranges[:, 0])
