@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Levenb
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
+from sysid.estimation.networks.halving import better_half, planned_iterations, rungs_of, turns
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.training import FitProgress, Training
@@ -36,11 +37,6 @@ from sysid.estimation.result import Loop, Status
 from sysid.estimation.tolerance import outside, spans_of
 from sysid.models import EquationModel, NARXModel, NeuralStateSpaceModel, Start, VectorNeuralStateSpaceModel, beginning
 from sysid.traces import Trace
-
-RUNGS = (0.04, 0.12, 0.36, 0.65, 1.0)
-"""Shares of the iterations after which the starts are looked at and, but for the last, half of them dropped
-(successive halving, Jamieson and Talwalkar 2016). Who stays is decided by the error on the estimation traces: early
-on, what the selection traces say of a start is noise; they choose at the end, among all states looked at."""
 
 FEWEST = 5
 """Iterations for which there has to be time in its first part for a start to be begun, or that part where it has fewer:
@@ -56,7 +52,6 @@ underdetermined network small."""
 PRETRAINED = 0.4
 """Share of a fit's time that its starts may take one step ahead."""
 
-T = TypeVar("T")
 Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel | EquationModel
 """What is trained here."""
 
@@ -197,11 +192,11 @@ def run(multistart: Multistart) -> list[Candidate]:
     """
     check_samples(multistart.provider)
     training = multistart.training
-    rungs = _rungs(training)
+    rungs = rungs_of(training)
     numbers = list(range(training.n_starts))
     latest: dict[int, Candidate] = {}
     seen: list[Candidate] = []
-    total = _turns(training.n_starts, rungs, training.workers)
+    total = turns(training.n_starts, rungs, training.workers)
     # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
     with one_blas_thread():
         for rung, share in enumerate(rungs):
@@ -209,7 +204,7 @@ def run(multistart: Multistart) -> list[Candidate]:
             seconds = training.max_time_s * (share - before) / total
             reached = _rung(multistart, numbers, latest, share, seconds)
             if rung == 0:  # the time of those that were left out is the others'
-                total = _turns(len(reached), rungs, training.workers)
+                total = turns(len(reached), rungs, training.workers)
             seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
             if multistart.stop.is_set():
                 break
@@ -217,22 +212,6 @@ def run(multistart: Multistart) -> list[Candidate]:
             order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
             numbers = [candidate.number for candidate in better_half(order)]
     return seen
-
-
-def better_half(ranked: Sequence[T]) -> Sequence[T]:
-    """Who goes on after a look.
-
-    Args:
-        ranked: The best first.
-
-    Returns:
-        Half of them, the larger one of an odd number.
-
-    Example:
-        >>> better_half("abc"), better_half("a")
-        ('ab', 'a')
-    """
-    return ranked[: (len(ranked) + 1) // 2]
 
 
 def _rung(
@@ -267,44 +246,6 @@ def _in_time(multistart: Multistart, reached: dict[int, Candidate], share: float
     each = [one.elapsed_s / one.iteration for one in curves if one.iteration]
     first = min(FEWEST, max(1, round(share * multistart.training.max_iterations)))
     return not each or min(each) * first <= seconds
-
-
-def _rungs(training: Training) -> tuple[float, ...]:
-    return RUNGS if training.n_starts > 1 else RUNGS[-1:]
-
-
-def planned_iterations(training: Training) -> float:
-    """Iterations of the whole multistart, all starts together, if none of them converges early.
-
-    Args:
-        training: How to train.
-
-    Returns:
-        Their number.
-
-    Example:
-        >>> planned_iterations(Training(max_iterations=100))
-        100.0
-        >>> round(planned_iterations(Training(max_iterations=100, starts=8)))
-        176
-    """
-    return training.max_iterations * _work(training.n_starts, _rungs(training))
-
-
-def _work(starts: int, rungs: Sequence[float]) -> float:
-    """Iterations of the whole multistart, in units of one start's."""
-    work, before, n = 0.0, 0.0, starts
-    for share in rungs:
-        work, before, n = work + n * (share - before), share, max(1, (n + 1) // 2)
-    return work
-
-
-def _turns(starts: int, rungs: Sequence[float], workers: int) -> float:
-    """How long the whole multistart takes where so many starts run at the same time, in units of one start's run."""
-    turns, before, n = 0.0, 0.0, starts
-    for share in rungs:
-        turns, before, n = turns + math.ceil(n / workers) * (share - before), share, max(1, (n + 1) // 2)
-    return turns
 
 
 def _advance(multistart: Multistart, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
@@ -383,7 +324,7 @@ def _pretraining(
     """A random start after its pretraining."""
     training, name = multistart.training, f"{multistart.name}start {number + 1}, one step ahead"
     scale = multistart.template.scaling.error_unit
-    turns = math.ceil(training.n_starts / training.workers)
+    rounds = math.ceil(training.n_starts / training.workers)
 
     def report(entry: Iteration) -> None:
         multistart.on_progress(
@@ -402,7 +343,7 @@ def _pretraining(
     engine = LevenbergMarquardt(
         termination=Termination(
             max_iterations=training.pretraining_iterations,
-            max_time_s=min(PRETRAINED * training.max_time_s / turns, multistart.left(name)),
+            max_time_s=min(PRETRAINED * training.max_time_s / rounds, multistart.left(name)),
             tolerance=training.tolerance,
             patience=training.patience,
         ),
@@ -461,7 +402,7 @@ def _in_basis(multistart: Multistart, theta: NDArray[np.float64]) -> NDArray[np.
 def _engine(multistart: Multistart, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
     training = multistart.training
     scale = multistart.template.scaling.error_unit
-    work = training.max_iterations * _work(training.n_starts, _rungs(training))
+    planned = planned_iterations(training)
 
     def report(entry: Iteration) -> None:
         multistart.iterations[number] = entry.iteration
@@ -474,7 +415,7 @@ def _engine(multistart: Multistart, number: int, iterations: int, seconds: float
                 max_iterations=training.max_iterations,
                 mse=entry.mse * scale,
                 elapsed_s=entry.elapsed_s,
-                fraction=min(1.0, sum(multistart.iterations.values()) / work),
+                fraction=min(1.0, sum(multistart.iterations.values()) / planned),
             )
         )
 

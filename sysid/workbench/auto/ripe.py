@@ -21,6 +21,8 @@ RIPE = 20
 """Iterations of a network, from all that it was trained, without which its error says little of what it may come to."""
 LONGEST = 2.0
 """Times the limit of a trial that a network may be trained on for them."""
+BEGINNING = 0.1
+"""Share of a training from a given start that its linear part may take."""
 NAMED = 3
 """Networks that are named where some have not come so far."""
 
@@ -105,10 +107,6 @@ def gone_on(
             best[trial.number] = was.model_copy(update={"iterations": trial.iterations})
             driver.last[trial.number] = before[trial.number]
     return better
-
-
-BEGINNING = 0.1
-"""Share of a training from a given start that its linear part may take."""
 
 
 def _options(seconds: Mapping[int, float], point: Point) -> dict[str, Any]:
