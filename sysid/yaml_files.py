@@ -1,4 +1,4 @@
-"""YAML files in, checked objects out, with errors that name the file and the field.
+"""YAML files in, plain data out, and back.
 
 The loader is safe (plain data only), follows YAML 1.2 in what is a number and what is a truth value
 (``no`` and ``on`` stay text, ``1e-3`` is a number), and refuses a key that stands twice.
@@ -6,25 +6,15 @@ The loader is safe (plain data only), follows YAML 1.2 in what is a number and w
 
 from __future__ import annotations
 
-import difflib
 import re
-import types
-import typing
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import yaml
-from pydantic import BaseModel, ValidationError
 
 from sysid.bounded_text import MOST_LEVELS, read_bounded
-from sysid.errors import ConfigError, shortened
-
-Model = TypeVar("Model", bound=BaseModel)
-Loc = tuple[str | int, ...]
-"""Where something stands in plain data: keys and indices."""
-
+from sysid.errors import ConfigError
 
 MOST_BYTES = 4 * 2**20
 """Of a file: some fifty thousand lines."""
@@ -242,143 +232,16 @@ def yaml_text(data: Mapping[str, Any]) -> str:
     return text
 
 
-@dataclass(frozen=True, kw_only=True)
-class Origins:
-    """Where data stand that were put together from several files, so that an error names the file at fault.
+def line_of(where: object, loc: Sequence[str | int]) -> str:
+    """The line of a file at which a part of its data stands.
 
     Args:
-        file: The file of everything that ``parts`` does not name.
-        parts: What stands elsewhere, by its location in the whole: the origins of it, and its location there.
-    """
-
-    file: object
-    parts: Mapping[Loc, tuple[Origins, Loc]] = field(default_factory=dict)
-
-    def of(self, loc: Sequence[str | int]) -> tuple[object, Loc]:
-        """The file in which a part of the whole stands.
-
-        Args:
-            loc: Keys and indices in the whole.
-
-        Returns:
-            The file, and keys and indices there.
-        """
-        for length in range(len(loc), 0, -1):
-            if (found := self.parts.get(tuple(loc[:length]))) is not None:
-                origins, there = found
-                return origins.of((*there, *loc[length:]))
-        return self.file, tuple(loc)
-
-    def place(self, loc: Sequence[str | int]) -> str:
-        """Where a part of the whole stands, as an error names it.
-
-        Args:
-            loc: Keys and indices in the whole.
-
-        Returns:
-            For example ``valve.yaml, line 7, field channels[0].unit``.
-        """
-        file, there = self.of(loc)
-        return f"{file}{_line_of(file, there)}, field {path_text(there)}"
-
-
-def check(model: type[Model], data: Mapping[str, Any], *, where: object) -> Model:
-    """Check plain data against a model.
-
-    Args:
-        model: The pydantic model.
-        data: Plain data, as from :func:`read_yaml`.
-        where: Named in errors: the file the data came from, or the :class:`Origins` of its parts.
+        where: The file; anything else has no lines.
+        loc: Keys and indices.
 
     Returns:
-        The checked object.
-
-    Raises:
-        ConfigError: Naming the first field at fault, what was expected, what came and, for a
-            misspelt field, what was probably meant; further fields at fault are named too.
+        ``", line 7"`` for the deepest part of the location that is written there; empty where there is none.
     """
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        origins = where if isinstance(where, Origins) else Origins(file=where)
-        raise _config_error(error, model, origins) from None
-
-
-def _config_error(error: ValidationError, model: type[BaseModel], origins: Origins) -> ConfigError:
-    # A misspelt field usually causes the "missing" beside it: name the cause first.
-    found = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
-    first = found[0]
-    loc = first["loc"]
-    # What holds the first one, such as a list that is one too short without it, is not at fault itself.
-    others = [item for item in found[1:] if item["loc"] != loc[: len(item["loc"])]]
-    what: str
-    expected: object
-    got: object
-    remedy = "correct the value"
-    if first["type"] == "extra_forbidden":
-        known = _fields_at(model, loc[:-1])
-        near = difflib.get_close_matches(str(loc[-1]), known, n=1)
-        what, expected, got = f"unknown field {loc[-1]!r}", f"one of {', '.join(known)}", str(loc[-1])
-        remedy = f"did you mean {near[0]}?" if near else "remove it, or use one of the fields that are known"
-    elif first["type"] == "missing":
-        what, expected, got = (
-            f"the field {loc[-1]!r} is missing",
-            _names_at(model, loc, f"a value for {loc[-1]}"),
-            "nothing",
-        )
-        remedy = f"add {loc[-1]}: ..."
-    elif first["type"] == "value_error":
-        cause = first.get("ctx", {}).get("error")
-        what, expected, got = str(cause), None, None
-        if isinstance(cause, FieldError):
-            what, expected, got, remedy = cause.what, cause.expected, cause.got, cause.remedy
-    else:
-        wanted = first["msg"].removeprefix("Input should be ").split(", unable to parse")[0]
-        what, expected, got = (
-            f"{path_text(origins.of(loc)[1])} cannot be used as it is",
-            wanted,
-            shortened(first["input"]),
-        )
-        expected, remedy = _CHANGES.get(first["type"], (expected, remedy))
-        if expected == _NAMES:
-            expected = _names_at(model, loc, _NAMES)
-        if first["type"] in {"enum", "literal_error"}:
-            remedy = _choice(str(first["input"]), str(first.get("ctx", {}).get("expected", "")))
-    if others:
-        remedy += f" (also at fault: {', '.join(sorted({_beside(loc, item['loc'], origins) for item in others}))})"
-    return ConfigError(what, where=origins.place(loc), expected=expected, got=got, remedy=remedy)
-
-
-_LIST = ("a list", "write a list: [..., ...], or one entry a line with - before it")
-_NAMES = "names with values"
-_UNIONS = (typing.Union, types.UnionType)
-_CHANGES: dict[str, tuple[str, str]] = {
-    **dict.fromkeys(("tuple_type", "list_type"), _LIST),
-    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), (_NAMES, "write {name: value}")),
-    "string_type": ("text", "write it in quotes"),
-    "bool_type": ("true or false", "write true or false"),
-    "bool_parsing": ("true or false", "write true or false"),
-}
-"""What was expected, and what to write, by pydantic's kind of error."""
-
-
-def _choice(given: str, expected: str) -> str:
-    """The one of some words that was probably meant, or the first of them."""
-    words = re.findall(r"'([^']*)'", expected)
-    near = difflib.get_close_matches(given, words, n=1)
-    if near:
-        return f"did you mean {near[0]}?"
-    return f"write one of them, such as {words[0]}" if words else "correct the value"
-
-
-def _beside(first: Sequence[str | int], loc: Sequence[str | int], origins: Origins) -> str:
-    """A further field at fault, with its file where that is not the first one's."""
-    file, there = origins.of(loc)
-    return path_text(there) if file == origins.of(first)[0] else f"{path_text(there)} in {file}"
-
-
-def _line_of(where: object, loc: Sequence[str | int]) -> str:
-    """``", line 7"`` for the deepest part of a location that is written in the file, if it was a file."""
     if not isinstance(where, Path):
         return ""
     try:
@@ -397,76 +260,3 @@ def _line_of(where: object, loc: Sequence[str | int]) -> str:
             node = node.value[part]
             line = node.start_mark.line
     return "" if line is None else f", line {line + 1}"
-
-
-class FieldError(ValueError):
-    """Raised inside a pydantic validator to say what, expected, got and remedy.
-
-    Args:
-        what: What is wrong.
-        expected: What would have been accepted.
-        got: What came.
-        remedy: What to do.
-    """
-
-    def __init__(self, what: str, *, expected: object = None, got: object = None, remedy: str) -> None:
-        super().__init__(what)
-        self.what = what
-        self.expected = expected
-        self.got = got
-        self.remedy = remedy
-
-
-def path_text(loc: Sequence[str | int]) -> str:
-    """A pydantic location as an engineer writes it.
-
-    Args:
-        loc: Keys and indices.
-
-    Returns:
-        For example ``channels[0].unit``.
-
-    Example:
-        >>> path_text(("channels", 0, "unit"))
-        'channels[0].unit'
-    """
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc)
-    return text.removeprefix(".") or "(top level)"
-
-
-def _names_at(model: type[BaseModel], loc: Sequence[str | int], otherwise: str) -> str:
-    """Which names a mapping at a location may have; some other words where that is not known."""
-    annotation = _annotation_at(model, loc)
-    alone = all(typing.get_origin(one) is None for one in (typing.get_args(annotation) or (annotation,)))
-    known = _fields_at(model, loc) if alone and typing.get_origin(annotation) in (None, *_UNIONS) else []
-    return f"{_NAMES}, of {', '.join(known)}" if known else otherwise
-
-
-def _fields_at(model: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
-    """Names of the fields of the model that stands at a location inside another."""
-    found = _model_in(_annotation_at(model, loc))
-    return [] if found is None else list(found.model_fields)
-
-
-def _annotation_at(model: type[BaseModel], loc: Sequence[str | int]) -> Any:
-    """The type of what stands at a location inside a model; ``None`` where that is not known."""
-    current: Any = model
-    for part in loc:
-        current = _model_in(current)
-        if current is None:
-            return None
-        # An index, or a key of a free mapping, stays at the model that the container holds.
-        if isinstance(part, str) and part in current.model_fields:
-            current = current.model_fields[part].annotation
-    return current
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """The first pydantic model inside an annotation such as ``tuple[Model, ...] | None``."""
-    if not typing.get_args(annotation):
-        return annotation if isinstance(annotation, type) and issubclass(annotation, BaseModel) else None
-    for argument in typing.get_args(annotation):
-        inner = _model_in(argument)
-        if inner is not None:
-            return inner
-    return None

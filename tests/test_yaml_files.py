@@ -7,10 +7,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import BaseModel, ConfigDict
 
 from sysid.errors import ConfigError
-from sysid.yaml_files import Origins, check, parse_yaml, read_yaml, yaml_text
+from sysid.yaml_files import parse_yaml, read_yaml, yaml_text
 
 
 @pytest.mark.parametrize(
@@ -88,75 +87,6 @@ def test_an_unreadable_file_is_refused(tmp_path: Path) -> None:
         read_yaml(tmp_path / "none.yaml")
 
 
-class Inner(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-    neurons: int = 1
-    delays: int = 2
-
-
-class Outer(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-    name: str
-    steps: tuple[Inner, ...] = ()
-    models: dict[str, Inner | None] = {}
-
-
-@pytest.mark.parametrize(
-    ("data", "where", "remedy"),
-    [
-        ({"name": "a", "stepps": []}, "field stepps", "did you mean steps?"),
-        ({"name": "a", "steps": [{}, {"neuronz": 3}]}, "field steps[1].neuronz", "did you mean neurons?"),
-        ({"name": "a", "models": {"m": {"delay": 3}}}, "field models.m.delay", "did you mean delays?"),
-        ({"name": "a", "models": {"m": {"xyz": 3}}}, "field models.m.xyz", "remove it"),
-        ({"nam": "a"}, "field nam", "did you mean name? (also at fault: name)"),
-        ({}, "field name", "add name: ..."),
-    ],
-)
-def test_a_field_at_fault_is_named_with_its_path(data: dict[str, object], where: str, remedy: str) -> None:
-    with pytest.raises(ConfigError) as caught:
-        check(Outer, data, where="x.yaml")
-    assert caught.value.where == f"x.yaml, {where}"
-    assert str(caught.value.remedy).startswith(remedy)
-
-
-def test_good_data_becomes_the_model() -> None:
-    assert check(Outer, {"name": "a", "steps": [{"neurons": 4}]}, where="x").steps[0].neurons == 4
-
-
-@pytest.fixture
-def origins(tmp_path: Path) -> Origins:
-    """Of a whole whose steps stand in two files, one of them the second of the first file's."""
-    base, own = tmp_path / "base.yaml", tmp_path / "own.yaml"
-    base.write_text("name: base\nsteps:\n  - {neurons: 1}\n  - neurons: 2\n    delays: two\n", encoding="utf-8")
-    own.write_text("name: own\n\nsteps:\n  - {neurons: three}\n", encoding="utf-8")
-    return Origins(
-        file=own,
-        parts={("steps", 0): (Origins(file=base), ("steps", 1))} | {("steps", 1): (Origins(file=own), ("steps", 0))},
-    )
-
-
-def test_a_part_stands_in_its_file(origins: Origins, tmp_path: Path) -> None:
-    assert origins.of(("name",)) == (tmp_path / "own.yaml", ("name",))
-    assert origins.place(("steps", 0, "delays")) == f"{tmp_path / 'base.yaml'}, line 5, field steps[1].delays"
-    assert origins.place(("steps", 1, "neurons")) == f"{tmp_path / 'own.yaml'}, line 4, field steps[0].neurons"
-
-
-def test_what_was_joined_twice_stands_where_it_was_written(origins: Origins, tmp_path: Path) -> None:
-    further = Origins(file=tmp_path / "further.yaml", parts={("steps",): (origins, ("steps",))})
-    assert further.of(("steps", 0, "delays")) == (tmp_path / "base.yaml", ("steps", 1, "delays"))
-    assert further.of(("steps", 7)) == (tmp_path / "own.yaml", ("steps", 7))
-    assert further.of(("name",)) == (tmp_path / "further.yaml", ("name",))
-
-
-def test_an_error_names_the_file_of_each_part_at_fault(origins: Origins, tmp_path: Path) -> None:
-    data = {"name": "own", "steps": [{"neurons": 2, "delays": "two"}, {"neurons": "three"}]}
-    with pytest.raises(ConfigError) as caught:
-        check(Outer, data, where=origins)
-    assert caught.value.what == "steps[1].delays cannot be used as it is"
-    assert caught.value.where == f"{tmp_path / 'base.yaml'}, line 5, field steps[1].delays"
-    assert str(caught.value.remedy).endswith(f"(also at fault: steps[0].neurons in {tmp_path / 'own.yaml'})")
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -185,32 +115,3 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
         file.truncate(2**30)
     with pytest.raises(ConfigError, match="larger than 4 MB"):
         read_yaml(path)
-
-
-class _Inner(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-    reader: str
-    grid: int = 1
-
-
-class _Outer(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-    source: _Inner | None
-    rows: tuple[_Inner, ...]
-
-
-@pytest.mark.parametrize(
-    ("data", "expected"),
-    [
-        ({"source": "csv", "rows": []}, "names with values, of reader, grid"),
-        ({"source": [1], "rows": []}, "names with values, of reader, grid"),
-        ({"rows": []}, "names with values, of reader, grid"),
-        ({"source": None}, "a value for rows"),
-        ({"source": None, "rows": 3}, "a list"),
-    ],
-    ids=["a word", "a list", "missing", "a missing list", "a number for a list"],
-)
-def test_what_stands_in_place_of_names_is_told_the_names(data: dict[str, object], expected: str) -> None:
-    with pytest.raises(ConfigError) as refused:
-        check(_Outer, data, where="x")
-    assert refused.value.expected == expected

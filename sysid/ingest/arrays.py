@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.field_checks import check
 from sysid.ingest.assemble import Wanted, assemble, stamps_in_seconds
 from sysid.ingest.frames import INDEX, as_array, check_distinct, check_labels, check_rows, columns_by_name, not_numbers
 from sysid.ingest.headers import parse_header
@@ -23,7 +24,6 @@ from sysid.ingest.table import RawTable, array_column, by_length, recognise_time
 from sysid.ingest.timing import survey
 from sysid.traces import Channel, Trace, TraceSet, check_units
 from sysid.units import Reference, check_unit
-from sysid.yaml_files import check
 
 Names = str | Sequence[str] | None
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from sysid.errors import ConfigError, UnitError
+from sysid.field_checks import FieldError, check
 from sysid.ingest.options import (
     ColumnOption,
     FileOptions,
@@ -19,7 +20,7 @@ from sysid.ingest.options import (
 )
 from sysid.traces import Channel, Role
 from sysid.units import Reference, check_unit, is_pressure
-from sysid.yaml_files import FieldError, check, read_yaml
+from sysid.yaml_files import read_yaml
 
 
 def _unit_text(value: Any) -> Any:

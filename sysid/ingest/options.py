@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from sysid.field_checks import FieldError
 from sysid.ingest.headers import parse_header
 from sysid.units import Reference
-from sysid.yaml_files import FieldError
 
 
 class Options(BaseModel):

@@ -1,7 +1,7 @@
 """What a model is: structure, parameters, scaling, initial state; free run and prediction."""
 
 from sysid.models.arx import ARX, ARXModel
-from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
+from sysid.models.base import AbstractModel, SeveralOutputs
 from sysid.models.beginning import Beginning, beginning
 from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
 from sysid.models.built_model import BuiltModel
@@ -40,6 +40,7 @@ from sysid.models.recursion import Recursion, parameter_count
 from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_space import StateSpace
 from sysid.models.store import cascade_from_dict, model_from_dict, structure_from_dict
+from sysid.models.structure import AbstractStructure
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
 from sysid.models.vector_narx import VectorNARX, VectorNARXModel
 from sysid.models.vector_recursion import VectorRecursion

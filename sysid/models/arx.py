@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractStructure
 from sysid.models.lags import MOST, Lagged, Lags, per_input, whole
 from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
@@ -19,6 +18,7 @@ from sysid.models.ratio import Ratio
 from sysid.models.realisation import observer_row
 from sysid.models.recursion import Recursion
 from sysid.models.scaling import Scaling
+from sysid.models.structure import AbstractStructure
 from sysid.models.to_control import Matrices
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractStructure
 from sysid.models.curves import NONE, Curve
 from sysid.models.lags import per_input, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
+from sysid.models.structure import AbstractStructure
 
 MOST_STATES = 20
 """Of a block: an order beyond this is a slip of the pen."""

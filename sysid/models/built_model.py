@@ -7,12 +7,12 @@ from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from typing import Any
 
-from sysid.models.base import AbstractStructure
 from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
 from sysid.models.grey_box import GreyBox
 from sysid.models.grey_box_model import GreyBoxModel
 from sysid.models.polynomial_narx import PolynomialNARX
 from sysid.models.scaling import Scaling
+from sysid.models.structure import AbstractStructure
 
 BUILT: tuple[type[AbstractStructure], ...] = (HammersteinWiener, WienerHammerstein, PolynomialNARX)
 """Structures that become equations when they are fitted."""

@@ -13,11 +13,11 @@ from typing import Any
 
 from sysid.equations import RUNGE_KUTTA, SOLVERS, Lowered, System, Terms, lower
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractStructure
 from sysid.models.case_values import case_of, cases_among, cases_of, unknown_case
 from sysid.models.history import Start, StartKind
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
+from sysid.models.structure import AbstractStructure
 
 MOST_PARAMETERS = 500
 MOST_SUBSTEPS = 1_000

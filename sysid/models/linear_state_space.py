@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractStructure, SeveralOutputs
+from sysid.models.base import SeveralOutputs
 from sysid.models.continuous import ContinuousStateSpace, rates
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
@@ -23,6 +23,7 @@ from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
 from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_space import StateSpace
+from sysid.models.structure import AbstractStructure
 from sysid.models.to_control import Matrices, state_space
 
 MOST_STATES = 100

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.activations import PLAIN, Activation, check_activation
-from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit
 from sysid.models.lags import MOST, Lagged, Lags, LagSpec, parse_lags, whole
 from sysid.models.mapping import Mapping
@@ -20,6 +20,7 @@ from sysid.models.output_limits import Between, parse_limits, written
 from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
 from sysid.models.scaling import Scaling
+from sysid.models.structure import AbstractStructure
 
 CLAMP = 3.0
 """Bound of the output in scaled numbers. Training data lie within -1 to 1; a free run that leaves three times

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.activations import PLAIN, Activation, check_activation
-from sysid.models.base import AbstractModel, AbstractStructure, SeveralOutputs
+from sysid.models.base import AbstractModel, SeveralOutputs
 from sysid.models.history import History
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
@@ -20,6 +20,7 @@ from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP
 from sysid.models.neural_form import NeuralForm, Sizes
 from sysid.models.scaling import Scaling, VectorScaling
+from sysid.models.structure import AbstractStructure
 
 OUTPUTS = ("plain", "absolute")
 MOST_UNITS = 1_000

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractStructure
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
 from sysid.models.lags import per_input, whole
@@ -27,6 +26,7 @@ from sysid.models.ratio import Ratio
 from sysid.models.realisation import ObserverBlock
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
+from sysid.models.structure import AbstractStructure
 from sysid.models.to_control import Matrices
 
 Array = NDArray[np.float64]

@@ -9,11 +9,11 @@ from math import comb
 from typing import Annotated, Any
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import AbstractStructure
 from sysid.models.curves import number, quoted
 from sysid.models.lags import Lags, LagSpec, parse_lags, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
+from sysid.models.structure import AbstractStructure
 
 MOST_CANDIDATES = 200_000
 MOST_TERMS = 100

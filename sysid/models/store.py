@@ -7,7 +7,7 @@ from typing import Any
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.arx import ARX, ARXModel
-from sysid.models.base import AbstractModel, AbstractStructure
+from sysid.models.base import AbstractModel
 from sysid.models.built_model import BUILT, BuiltModel
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_program import Limit
@@ -27,6 +27,7 @@ from sysid.models.neural_state_space import (
     VectorNeuralStateSpaceModel,
 )
 from sysid.models.polynomial import POLYNOMIALS, PolynomialModel
+from sysid.models.structure import AbstractStructure
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
 from sysid.models.vector_narx import VectorNARX, VectorNARXModel
 

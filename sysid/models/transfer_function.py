@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models import orthonormal_basis as bases
-from sysid.models.base import AbstractStructure
 from sysid.models.continuous import ContinuousStateSpace
 from sysid.models.history import History
 from sysid.models.lags import MOST, per_input, whole
@@ -26,6 +25,7 @@ from sysid.models.ratio import Ratio
 from sysid.models.realisation import Realisation, realise
 from sysid.models.scaling import Scaling
 from sysid.models.state_space import StateSpace
+from sysid.models.structure import AbstractStructure
 from sysid.models.to_control import Matrices
 
 MOST_POLES = 100

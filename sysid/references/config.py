@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from sysid.errors import UnitError
+from sysid.field_checks import FieldError
 from sysid.units import Reference, check_unit, is_pressure, plain_unit
-from sysid.yaml_files import FieldError
 
 MOST_SAMPLES = 5_000_000
 """Of one run."""

@@ -13,11 +13,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from sysid.errors import ConfigError
 from sysid.excitation import excite
 from sysid.excitation.kinds import KINDS, kind_of
+from sysid.field_checks import FieldError
 from sysid.references.config import MOST_SAMPLES, InputPort, ReferenceConfig
 from sysid.references.coverage import cells, most_seen
 from sysid.references.events import Events
 from sysid.references.runs import Case
-from sysid.yaml_files import FieldError
 
 OWN = ("events",)
 """Signals that are drawn here, beside those of :mod:`sysid.excitation`."""

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from sysid.field_checks import FieldError
 from sysid.references.config import InputPort
-from sysid.yaml_files import FieldError
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 

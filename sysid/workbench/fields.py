@@ -22,10 +22,10 @@ from sysid.estimation import (
 from sysid.estimation.estimator import Estimator
 from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.export.exporters import EXPORTERS
+from sysid.field_checks import FieldError
 from sysid.models import AbstractStructure, Mapping, Start, structure_from_dict
 from sysid.models.lags import LagSpec, parse_lags
 from sysid.workbench.old_words import JOINT_TRAINING, STRICT, TRAINING, TRAINING_VALUES, Words, with_new_words
-from sysid.yaml_files import FieldError
 
 STRUCTURES: dict[str, type[AbstractStructure]] = {kind: row.structure for kind, row in ESTIMATORS.items()}
 """Structures that a pipeline can fit; their fields are those of the classes."""

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from sysid.content import what_to_do_with_data
 from sysid.errors import ConfigError
+from sysid.field_checks import Origins
 from sysid.plugins import entry_points
-from sysid.yaml_files import Origins, read_yaml
+from sysid.yaml_files import read_yaml
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from sysid.yaml_files import FieldError
+from sysid.field_checks import FieldError
 
 STRICT = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 """A field that is not known is an error; nothing changes once it is read."""

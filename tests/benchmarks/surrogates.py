@@ -25,12 +25,13 @@ import numpy as np
 import yaml
 
 import sysid
+from sysid.field_checks import check
 from sysid.references.described import Wish
 from sysid.references.design import drawn
 from sysid.references.runs import ReferenceRuns
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.surrogates.plan import written
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 
 MODELS = Path(__file__).parents[1] / "references"
 MINUTES = 5.0

@@ -17,6 +17,7 @@ from sysid.composite.stages import fit_member
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions
 from sysid.estimation.estimators import ESTIMATORS
+from sysid.field_checks import check
 from sysid.models import Start, structure_from_dict
 from sysid.traces import Role, TraceSet
 from sysid.workbench.assembly.member_config import MemberConfig
@@ -27,7 +28,7 @@ from sysid.workbench.runner.store import strict
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.run import Sweep, run_sweep
 from sysid.workbench.sweep.workers import InThisProcess
-from sysid.yaml_files import check, yaml_text
+from sysid.yaml_files import yaml_text
 
 MAPPING = "inlet+valve -> outlet"
 STABILITY = {"count": 15}

@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 from sysid.errors import SysidError
 from sysid.export import read_bundle
 from sysid.export.manifest import manifest_digest
+from sysid.field_checks import check
 from sysid.ingest import DatasetDescription
 from sysid.reporting.results import read_results
 from sysid.workbench.fits.config import PipelineConfig
-from sysid.yaml_files import check, parse_yaml, yaml_text
+from sysid.yaml_files import parse_yaml, yaml_text
 
 HOSTILE: list[Any] = [
     None, True, -1, 0, 2.5, 1e30, float("inf"), float("nan"), 10**7, 10**30, 2**63, "", "two", "0:1e7", "0:10000000",

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.field_checks import FieldError, check
 from sysid.workbench.assembly.stage_config import RoundConfig
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fields import JointConfig, TrainingConfig
 from sysid.workbench.old_words import ASSEMBLY, JOINT_TRAINING, TRAINING, OldWordWarning, with_new_words
-from sysid.yaml_files import FieldError, check
 
 RENAMED = [
     *((TrainingConfig, old, new, 3) for old, new in TRAINING.items() if old != "leave_out"),

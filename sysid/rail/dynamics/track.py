@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.rail.constants import KMH
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 
 Steps = Sequence[tuple[float, float]]
 """Rows of position in m and the value that holds from there on."""

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.rail.dynamics.coupler import Coupler
 from sysid.rail.dynamics.vehicle import Davis, NotchCurves, Rigging, Shoe, Vehicle, diesel_electric, modified_davis
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

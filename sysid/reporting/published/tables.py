@@ -16,7 +16,8 @@ from pydantic import BaseModel, ConfigDict
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
-from sysid.yaml_files import check, read_yaml
+from sysid.field_checks import check
+from sysid.yaml_files import read_yaml
 
 _COLUMNS = (
     "source", "mapping", "structure", "variant", "loop", "run", "case", "signal", "quantity", "value", "unit",

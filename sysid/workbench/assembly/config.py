@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sysid.composite import Composite, TrainingPlan
+from sysid.field_checks import FieldError
 from sysid.models import Limit
 from sysid.workbench.assembly.extending import extending_schema
 from sysid.workbench.assembly.member_config import FixedConfig, MemberConfig, StandingConfig
@@ -23,7 +24,6 @@ from sysid.workbench.assembly.stage_config import (
 from sysid.workbench.fits.config import ExportConfig
 from sysid.workbench.old_words import ASSEMBLY, STRICT, Words
 from sysid.workbench.stability import ExcursionConfig
-from sysid.yaml_files import FieldError
 
 
 class LimitConfig(BaseModel):

@@ -13,8 +13,9 @@ from pydantic import BaseModel, Field
 
 from sysid.composite import FixedMember, equation_of, fixed_by_equations
 from sysid.errors import ConfigError
+from sysid.field_checks import Loc, Origins, check
 from sysid.workbench.old_words import STRICT
-from sysid.yaml_files import Loc, Origins, check, yaml_text
+from sysid.yaml_files import yaml_text
 
 
 class FixedEquations(BaseModel):

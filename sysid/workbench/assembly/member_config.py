@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field, ValidationInfo, ValidatorFunctionWrapHand
 from sysid.composite import FixedMember, Member
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training
+from sysid.field_checks import FieldError
 from sysid.models import NARX
 from sysid.workbench.fields import (
     SingleMappingField,
@@ -20,7 +21,6 @@ from sysid.workbench.fields import (
     options_config,
 )
 from sysid.workbench.old_words import STRICT, Words
-from sysid.yaml_files import FieldError
 
 
 class StandingConfig(Words):

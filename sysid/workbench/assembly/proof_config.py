@@ -6,8 +6,8 @@ from itertools import pairwise
 
 from pydantic import BaseModel, Field, model_validator
 
+from sysid.field_checks import FieldError
 from sysid.workbench.old_words import STRICT
-from sysid.yaml_files import FieldError
 
 
 class MonteCarloConfig(BaseModel):

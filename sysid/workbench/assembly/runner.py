@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from sysid.composite import train
 from sysid.errors import ConfigError
 from sysid.export.exporters import wanted_formats
+from sysid.field_checks import check
 from sysid.models import Cascade, cascade_from_dict
 from sysid.reporting.assembly.document import headline
 from sysid.reporting.assembly.results import AssemblyResults
@@ -26,7 +27,6 @@ from sysid.workbench.judging.runner import closing
 from sysid.workbench.runner.program import Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.store import read_json
-from sysid.yaml_files import check
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest

@@ -10,9 +10,9 @@ from pydantic import BaseModel, Field, model_validator
 from sysid.composite import ActiveLearning, OneStep, Retraining, RoundPlan
 from sysid.errors import ConfigError
 from sysid.estimation import JointTraining
+from sysid.field_checks import FieldError
 from sysid.workbench.fields import JointConfig, LagsField, as_field_error
 from sysid.workbench.old_words import JOINT_TRAINING, STRICT, Words
-from sysid.yaml_files import FieldError
 
 
 class OneStepConfig(BaseModel):

@@ -6,13 +6,13 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
+from sysid.field_checks import FieldError
 from sysid.models import AbstractStructure, Start, StartKind
 from sysid.workbench.fields import MappingField, StartField
 from sysid.workbench.fits.config import ExportConfig, ReportConfig
 from sysid.workbench.old_words import STRICT
 from sysid.workbench.stability import StabilityConfig
 from sysid.workbench.sweep.config import SweepConfig
-from sysid.yaml_files import FieldError
 
 MINUTES = 10.0
 """Spent where nothing is said."""

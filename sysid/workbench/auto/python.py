@@ -15,6 +15,7 @@ from sysid.api.looking import mapping_of
 from sysid.api.notebook import html_of
 from sysid.errors import ConfigError
 from sysid.extras import need
+from sysid.field_checks import check
 from sysid.models import Mapping, Start, StartKind, StartLike
 from sysid.names import slug
 from sysid.reporting.sweep_record import FIGURES, SweepRecord
@@ -25,7 +26,6 @@ from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.runner.store import RunFolder
-from sysid.yaml_files import check
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from sysid.estimation import FitResult
+from sysid.field_checks import check
 from sysid.models.store import structure_from_dict
 from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord, write_sweep
@@ -35,7 +36,7 @@ from sysid.workbench.runner.store import digest, strict, write_bytes
 from sysid.workbench.sweep.store import TRIALS, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess, LocalWorkers, NoWorkers
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest

@@ -8,6 +8,7 @@ from typing import Any
 
 from sysid.api.fitting import load
 from sysid.api.looking import mapping_of
+from sysid.field_checks import check
 from sysid.names import slug
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.finish import finish_s, span
@@ -17,7 +18,6 @@ from sysid.workbench.fits.data import data_of
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.listeners import perform
 from sysid.workbench.runner.console import console
-from sysid.yaml_files import check
 
 
 def auto_command(source: str, *, given: Mapping[str, Any], fresh: bool, out: Path | None, tracking: bool) -> int:

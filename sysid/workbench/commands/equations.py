@@ -18,10 +18,10 @@ def equations_command(pipeline: str) -> None:
     Raises:
         UserError: If it cannot be read, or nothing is fixed in it.
     """
+    from sysid.field_checks import check
     from sysid.workbench.assembly.config import AssemblyConfig
     from sysid.workbench.assembly.extending import read_joined
     from sysid.workbench.assembly.fixed_words import equations_text
-    from sysid.yaml_files import check
 
     path = find_pipeline(pipeline)
     joined = read_joined(path)

@@ -105,8 +105,8 @@ def reading_options(given: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         ConfigError: If a value cannot be.
     """
+    from sysid.field_checks import check
     from sysid.ingest import GridOptions, RepairOptions
-    from sysid.yaml_files import check
 
     parts: dict[str, type[Any]] = {"repairs": RepairOptions, "grid": GridOptions}
     defaults = {"grid": {"fewest_samples": 2}}
@@ -176,8 +176,8 @@ def files_from(given: Mapping[str, Any]) -> FileOptions:
     Raises:
         ConfigError: If a value cannot be.
     """
+    from sysid.field_checks import check
     from sysid.ingest import FileOptions
-    from sysid.yaml_files import check
 
     return check(FileOptions, given, where="the command line") if given else FileOptions()
 

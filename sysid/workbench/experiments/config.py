@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import BaseModel, Field, model_validator
 
+from sysid.field_checks import FieldError
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.old_words import STRICT
-from sysid.yaml_files import FieldError
 
 
 class GrowConfig(BaseModel):

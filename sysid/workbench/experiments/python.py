@@ -8,13 +8,14 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+from sysid.field_checks import check
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
 from sysid.traces import TraceSet
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.experiments.run import Experimented, program_of
 from sysid.workbench.runner.program import carry_out
-from sysid.yaml_files import check, yaml_text
+from sysid.yaml_files import yaml_text
 
 COMMAND = "sysid.experiment(...)"
 

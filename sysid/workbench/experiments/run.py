@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.ingest import load_dataset, write_csv
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import designed
@@ -23,7 +24,7 @@ from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Estimate, NotKnownError, Outlined, Step, Work
 from sysid.workbench.runner.store import write_bytes, write_json
-from sysid.yaml_files import check, read_yaml, yaml_text
+from sysid.yaml_files import read_yaml, yaml_text
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest

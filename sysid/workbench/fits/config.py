@@ -22,6 +22,7 @@ from sysid.errors import ConfigError
 from sysid.estimation.estimator import Options
 from sysid.estimation.estimators import check as check_request
 from sysid.estimation.estimators import estimator_of
+from sysid.field_checks import FieldError, check
 from sysid.models import Start, StartKind
 from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig
@@ -38,7 +39,7 @@ from sysid.workbench.fields import (
 from sysid.workbench.fits.orders import OrdersConfig
 from sysid.workbench.old_words import STRICT
 from sysid.workbench.stability import StabilityConfig
-from sysid.yaml_files import FieldError, check, parse_yaml, read_yaml
+from sysid.yaml_files import parse_yaml, read_yaml
 
 
 class FitConfig(BaseModel):

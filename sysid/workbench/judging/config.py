@@ -6,8 +6,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from sysid.field_checks import FieldError
 from sysid.workbench.old_words import STRICT
-from sysid.yaml_files import FieldError
 
 
 class PartConfig(BaseModel):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.names import slug
 from sysid.reporting.judging.results import FOLDER, JudgementResults, SubjectRecord, parse_judgement
 from sysid.reporting.judging.tables import judgement_headline
@@ -23,7 +24,7 @@ from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import REPORT, Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Estimate, Outlined, Step, Work
 from sysid.workbench.runner.store import digest, strict, write_bytes, write_json
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest

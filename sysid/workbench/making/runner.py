@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
+from sysid.field_checks import check
 from sysid.ingest import load_dataset
 from sysid.traces import TraceSet
 from sysid.workbench.making.config import MakingConfig
@@ -19,7 +20,7 @@ from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Outlined, Step, Work
 from sysid.workbench.runner.store import write_bytes
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest

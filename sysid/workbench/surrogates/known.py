@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from sysid.estimation.estimators import estimator_of
+from sysid.field_checks import check
 from sysid.models import Mapping, Start
 from sysid.reporting.results import Results
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.run import program_of as fits_program
 from sysid.workbench.runner.program import Program
-from sysid.yaml_files import check, yaml_text
+from sysid.yaml_files import yaml_text
 
 NAME = "model"
 

@@ -17,6 +17,7 @@ from sysid.bounded_text import read_bounded
 from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
+from sysid.field_checks import check
 from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
@@ -45,7 +46,7 @@ from sysid.workbench.surrogates.known import pipeline_of
 from sysid.workbench.surrogates.known import program_of as known_program
 from sysid.workbench.surrogates.plan import PROOF, RUNNING, Times, times
 from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 
 T = TypeVar("T")
 Perform = Callable[[Program[Any], Path], Any]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sysid.field_checks import check
 from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish, proposed
 from sysid.references.design import Counts, Design, drawn
@@ -17,7 +18,7 @@ from sysid.workbench.auto.finish import span
 from sysid.workbench.auto.parts import SEARCHED
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.runner.store import write_bytes
-from sysid.yaml_files import check, yaml_text
+from sysid.yaml_files import yaml_text
 
 RUNNING = 0.2
 """Share of the time in which the reference is run for data; as much again for the proof."""

@@ -8,6 +8,7 @@ from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_v
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training
+from sysid.field_checks import FieldError
 from sysid.models import Start, StartKind
 from sysid.reporting.sweep_record import FIGURES
 from sysid.workbench.fields import MappingField, StartField, as_field_error, with_short_kind
@@ -15,7 +16,6 @@ from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig,
 from sysid.workbench.old_words import STRICT, TRAINING, with_new_words
 from sysid.workbench.stability import StabilityConfig
 from sysid.workbench.sweep.search_space import Space, parse_space
-from sysid.yaml_files import FieldError
 
 WINNER = "sweep winner"
 """Name of the fit that the sweep hands to the pipeline."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sysid.field_checks import check
 from sysid.workbench.fits.table import table_of_fits, told_of_fits
 from sysid.workbench.runner import events
 from sysid.workbench.runner.program import Closing, Program, carry_out
@@ -15,7 +16,7 @@ from sysid.workbench.sweep.sweep_steps import Hire, Sweep, SweepSteps, Swept
 from sysid.workbench.sweep.table import table_of_trials
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, LocalWorkers
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest

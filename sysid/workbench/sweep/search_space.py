@@ -15,12 +15,12 @@ from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.estimation.estimator import Estimator
 from sysid.estimation.estimators import ESTIMATORS
+from sysid.field_checks import check
 from sysid.models import AbstractStructure
 from sysid.models.ranges import WORD, AbstractRange, declared_ranges, parse_range
 from sysid.workbench.fields import StructureField, given_options, options_of
 from sysid.workbench.old_words import STRICT
 from sysid.workbench.runner.store import digest
-from sysid.yaml_files import check
 
 MAX_POINTS = 100_000
 """Points of a sweep: more cannot be tried, and to list them takes minutes."""

@@ -14,9 +14,9 @@ from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.damping import DAMPINGS, damping_of
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.termination import MAX_DAMPING, Termination
+from sysid.field_checks import check
 from sysid.testing import first_order_record
 from sysid.workbench.fields import TrainingConfig
-from sysid.yaml_files import check
 from tests.estimation.least_squares.test_levenberg_marquardt import ROSENBROCK, flat_prior
 
 EVERY = pytest.mark.parametrize("kind", DAMPINGS)

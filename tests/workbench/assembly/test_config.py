@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.yaml_files import check, parse_yaml
+from sysid.yaml_files import parse_yaml
 from tests.workbench.assembly.conftest import PIPELINE
 
 TWO_PLACES = """\

@@ -10,11 +10,12 @@ import pytest
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
-from sysid.yaml_files import check, parse_yaml, read_yaml
+from sysid.yaml_files import parse_yaml, read_yaml
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results
 
 BASE = """\

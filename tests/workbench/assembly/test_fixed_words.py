@@ -10,11 +10,12 @@ from jsonschema import validate
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.assembly.fixed_words import equations_text
 from sysid.workbench.commands.equations import equations_command
-from sysid.yaml_files import check, read_yaml
+from sysid.yaml_files import read_yaml
 from tests.workbench.assembly.conftest import PIPELINE
 
 WEIGHTS = """\

@@ -9,11 +9,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.workbench.assembly.member_config import FixedConfig
 from sysid.workbench.assembly.runner import read_assembly
 from sysid.workbench.commands.run import run_request
 from sysid.workbench.kinds import RunRequest
-from sysid.yaml_files import check, parse_yaml
+from sysid.yaml_files import parse_yaml
 
 FIELDS = "{mapping: a+b -> d, gains: {a: 2, b: -1}, constant: 0.5, low: -1, high: 3, rest: 0}"
 

@@ -12,11 +12,11 @@ import pytest
 from sysid.content import content_folders
 from sysid.errors import ConfigError
 from sysid.estimation import Loop, Training
+from sysid.field_checks import check
 from sysid.models import NARX, StartKind
 from sysid.workbench.assembly.extending import read_joined
 from sysid.workbench.fits.config import find_pipeline, json_schema, parse_pipeline
 from sysid.workbench.kinds import kind_of, kinds
-from sysid.yaml_files import check
 
 GOOD = """\
 name: first

@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 import sysid
 from sysid.errors import ConfigError
 from sysid.export import read_bundle
+from sysid.field_checks import check
 from sysid.models import model_from_dict
 from sysid.reporting.results import Results, read_results
 from sysid.reporting.training_view import RELATIVE, error_unit, trained_models
@@ -24,7 +25,6 @@ from sysid.workbench.runner import events
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.run import Sweep, run_sweep
 from sysid.workbench.sweep.workers import InThisProcess
-from sysid.yaml_files import check
 
 DATASET = """\
 name: tanks

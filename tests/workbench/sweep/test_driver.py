@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.models import ARX
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.runner.store import digest
@@ -19,7 +20,6 @@ from sysid.workbench.sweep.driver import Driver, as_trial
 from sysid.workbench.sweep.store import TrialStore
 from sysid.workbench.sweep.trial import Bench, Job
 from sysid.workbench.sweep.workers import AbstractWorkers
-from sysid.yaml_files import check
 
 SWEEP = {
     "kind": "sweep",

@@ -9,11 +9,11 @@ import optuna
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.reporting.sweep_record import SweepRecord, Trial
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.sampler import publish, strategy
 from sysid.workbench.sweep.search_space import Point
-from sysid.yaml_files import check
 
 NETWORK = {"kind": "NARX", "input_delays": {"from": 1, "to": 3}, "output_delays": 1, "neurons": {"from": 1, "to": 6}}
 BY_SET = {"kind": "NARX", "input_delays": {"among": ["0:1", [1, 4]]}, "output_delays": 2, "neurons": 3}

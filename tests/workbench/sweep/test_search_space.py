@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.field_checks import check
 from sysid.kernels.neurons import NEURONS
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.search_space import parse_space
-from sysid.yaml_files import check
 
 CHAPTER = {
     "kind": "NARX",
