@@ -14,6 +14,7 @@ from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit
 from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ConfigError
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
@@ -198,6 +199,7 @@ class OrderSearch:
         return f"<pre>{escape(str(self))}</pre>"
 
 
+@one_blas_thread()
 def search_orders(
     traces: TracesLike,
     mapping: str | Mapping | Dict[str, Any],

@@ -127,7 +127,7 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
     segments, told = segments_of(traces, model.mapping.each[0]), []  # of each output the same inputs
     for j, needed in asked.items():
         parts = [segment.inputs[:, j] for segment in segments]
-        if needed > MOST or sum(map(len, parts)) < LEAST_SAMPLES or still(np.concatenate(parts)):
+        if not 0 < needed <= MOST or sum(map(len, parts)) < LEAST_SAMPLES or still(np.concatenate(parts)):
             continue
         order, _ = excitation_order(parts, needed, seen=NOTHING)
         if order < needed:

@@ -341,3 +341,8 @@ def test_records_at_other_levels_are_told_as_that(structure: object) -> None:
     records = [(u, y - level) for (u, y), level in zip(records, levels, strict=True)]
     told = sysid.fit(sysid.data(records, sample_time=1.0), "u -> y", structure).warnings
     assert not [note for note in told if "levels" in note]
+
+
+def test_an_input_without_coefficients_is_not_asked_how_it_moves():
+    fit = _fit(_u(), _y(_u(), 1), sysid.ARX(na=1, nb=0, nk=1))
+    assert not any("too few ways" in note for note in fit.notes)

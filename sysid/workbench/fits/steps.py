@@ -307,6 +307,8 @@ def choose(
 
 def _outside(pairs: Sequence[tuple[FitResult, Scores]], tolerance: float | None) -> int:
     """Selection traces on which some output leaves the tolerance."""
+    if tolerance is None:
+        return 0
     return outside(np.array([scores.selection_rms_shares for _, scores in pairs]).T, tolerance)
 
 

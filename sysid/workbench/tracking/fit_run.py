@@ -85,7 +85,7 @@ def describe(
 
 
 def log_values(client: Any, run_id: str, ready: FitReady, entities: Entities) -> None:
-    """Log a fit's figures, learning curve and parameters.
+    """Log a fit's figures, learning curve, free runs and parameters.
 
     Args:
         client: A client of the tracking store.
@@ -96,6 +96,7 @@ def log_values(client: Any, run_id: str, ready: FitReady, entities: Entities) ->
     now = int(time.time() * 1000)
     values = [entities.metric(name, value, now, 0) for name, value in tracked.metrics(ready).items()]
     values += [entities.metric("learning_curve_mse", mse, now, step) for step, mse in tracked.learning_curve(ready)]
+    values += [entities.metric(name, value, now, sample) for name, sample, value in tracked.lines(ready)]
     params = [entities.param(name, value[:PARAM_LIMIT]) for name, value in tracked.parameters(ready).items()]
     for number, batch in enumerate(tracked.batches(values)):
         client.log_batch(run_id, metrics=batch, params=() if number else params)

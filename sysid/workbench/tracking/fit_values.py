@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 MAX_METRICS = 1000
 """Metrics that MLflow takes in one batch (``mlflow.utils.validation.MAX_METRICS_PER_BATCH``)."""
+COLUMNS = 75
+"""Of a line over the samples of a case: its peaks stay, and a case has some three hundred points."""
+OUTPUT, TARGET = "output", "target"
+"""What the free run and the record are called in charts, before a slash and the case."""
 COLOUR_TAG = "mlflow.runColor"
 """Tag of a run with its colour in charts; without it MLflow may give two fits the same."""
 
@@ -186,6 +190,26 @@ def learning_curve(ready: FitReady) -> list[tuple[int, float]]:
     history = ready.fit.history
     pairs = zip(history["iteration"], history["mse"], strict=True)
     return [(int(iteration), float(mse)) for iteration, mse in pairs if math.isfinite(mse)]
+
+
+def lines(ready: FitReady) -> Iterator[tuple[str, int, float]]:
+    """Target and free run of each case as lines over its samples, so that a chart has those of several fits in one.
+
+    Args:
+        ready: The fit.
+
+    Yields:
+        Name, sample and value; those samples at which either line has a peak, and no value that is not finite.
+    """
+    from sysid.reporting.figures.thinning import thin
+
+    keys = distinct(ready.evaluation.cases, tracking_key)
+    for name, case in ready.evaluation.cases.items():
+        both, samples = {TARGET: case.target, OUTPUT: case.simulated}, np.arange(len(case.target), dtype=np.float64)
+        kept = np.unique(np.concatenate([thin(samples, values, COLUMNS)[0] for values in both.values()])).astype(int)
+        for line, values in both.items():
+            finite = kept[np.isfinite(values[kept])]
+            yield from ((f"{line}/{keys[name]}", int(k), float(f"{values[k]:.6g}")) for k in finite)
 
 
 def pictures(ready: FitReady) -> Iterator[tuple[str, NDArray[np.uint8]]]:

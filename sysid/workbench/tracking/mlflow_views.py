@@ -13,6 +13,8 @@ import zlib
 from collections.abc import Sequence
 from typing import Any, Final
 
+from sysid.workbench.tracking.fit_values import OUTPUT, TARGET
+
 VIEW: Final = "sysid"
 """Name of the view in the address of its page."""
 
@@ -46,7 +48,12 @@ METRIC_WIDTH: Final = 150
 ORDER_WIDTH: Final = 170
 """Pixels for the metric that sorts, which has a mark beside its name."""
 
-LAYOUT: Final = {"at a glance": (3, 360), "learning": (1, 360), "target and output": (2, 420)}
+LAYOUT: Final = {
+    "at a glance": (3, 360),
+    "learning": (1, 360),
+    "outputs over the target": (1, 420),
+    "target and output": (2, 420),
+}
 """Charts side by side and their height in pixels, by section."""
 
 
@@ -102,7 +109,8 @@ def _state(cases: Sequence[str]) -> dict[str, Any]:
     columns = [column(kind, name) for kind, names in COLUMNS.items() for name in names]
     sections = [
         ("at a glance", _overview()),
-        ("learning", [_line("learning_curve_mse")]),
+        ("learning", [_line("learning_curve_mse", scale="log")]),
+        ("outputs over the target", [_line(f"{TARGET}/{case}", f"{OUTPUT}/{case}") for case in cases]),
         ("target and output", [_images(f"target and output/{case}") for case in cases]),
         ("free_run_mse", [_bar(f"free_run_mse/{case}") for case in cases]),
         ("nrmse_fit", [_bar(f"nrmse_fit/{case}") for case in cases]),
@@ -150,8 +158,9 @@ def _bar(metric: str) -> dict[str, Any]:
     return {"type": "BAR", "metricKey": metric, "runsCountToCompare": 20}
 
 
-def _line(metric: str) -> dict[str, Any]:
-    return {"type": "LINE", "metricKey": metric, "selectedMetricKeys": [metric], "scaleType": "log", "xAxisKey": "step"}
+def _line(*metrics: str, scale: str = "linear") -> dict[str, Any]:
+    chosen = {"metricKey": metrics[0], "selectedMetricKeys": list(metrics)}
+    return {"type": "LINE", **chosen, "scaleType": scale, "xAxisKey": "step"}
 
 
 def _images(key: str) -> dict[str, Any]:

@@ -84,7 +84,7 @@ def test_a_killed_workers_job_is_done_again_with_the_same_result(crew: LocalWork
     assert crew.free == 0
     assert set(collect(crew, 2)) == {2, 3}
     # Long enough to be killed in the middle of it.
-    long = job(20, training={"seed": 1, "max_iterations": 1000, "patience": 1000}, iterations=1000)
+    long = job(20, training={"seed": 1, "max_iterations": 3000, "patience": 3000}, iterations=3000)
     crew.submit(long, None)
     time.sleep(0.1)
     assert not crew.finished()

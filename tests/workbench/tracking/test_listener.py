@@ -105,6 +105,19 @@ def test_the_learning_curve_is_a_stepped_metric(tracked_once) -> None:
     ]
 
 
+def test_free_runs_are_lines_over_the_samples_of_a_case_beside_their_target(tracked_once) -> None:
+    _, client, results = tracked_once
+    run = runs_of(client)["closed loop"].info.run_id
+    output, target = (
+        {entry.step: entry.value for entry in client.get_metric_history(run, f"{line}/run-3")}
+        for line in (tracked.OUTPUT, tracked.TARGET)
+    )
+    assert output.keys() == target.keys()
+    assert np.ptp(list(target.values())) > 0.0
+    errors = [output[step] - target[step] for step in output]
+    assert np.mean(np.square(errors)) == pytest.approx(results.fits[2].cases["run-3"].free_run.mse, rel=0.01)
+
+
 def test_the_data_set_is_an_input_with_its_digest(tracked_once) -> None:
     _, client, results = tracked_once
     for run in runs_of(client).values():
@@ -157,6 +170,9 @@ def test_the_experiment_shows_first_what_matters_first(tracked_once) -> None:
     known = {name for run in runs_of(client).values() for name in run.data.metrics}
     charts = state["compareRunCharts"]
     assert {chart["metricKey"] for chart in charts if "metricKey" in chart} <= known
+    lines = [chart["selectedMetricKeys"] for chart in charts if chart["type"] == "LINE"]
+    assert {name for line in lines for name in line} <= known
+    assert ["target/run-2", "output/run-2"] in lines
     pictures = [chart["imageKeys"] for chart in charts if chart["type"] == "IMAGE"]
     assert pictures == [[f"target and output/run-{n}"] for n in (1, 2, 3)]
 
