@@ -173,6 +173,7 @@ def test_the_experiment_shows_first_what_matters_first(tracked_once) -> None:
     lines = [chart["selectedMetricKeys"] for chart in charts if chart["type"] == "LINE"]
     assert {name for line in lines for name in line} <= known
     assert ["target/run-2", "output/run-2"] in lines
+    assert {chart["lineSmoothness"] for chart in charts if chart["type"] == "LINE"} == {0}
     pictures = [chart["imageKeys"] for chart in charts if chart["type"] == "IMAGE"]
     assert pictures == [[f"target and output/run-{n}"] for n in (1, 2, 3)]
 
