@@ -16,6 +16,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, JointTraining, Training
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.networks.halving import planned_iterations
+from sysid.estimation.stability.check import LEAST_S
 from sysid.traces import Trace, TraceSet
 from sysid.workbench.fields import given_options, options_of
 from sysid.workbench.fits import steps
@@ -32,6 +33,9 @@ CALIBRATION_LIMIT_S = 10.0
 
 FEW = ("max_iterations", "pretraining_iterations", "starts", "ensemble", "input_subsets", "max_time_s")
 """Options that make a training short."""
+
+FEW_SEQUENCES = 20
+"""Sequences over which the check of a free run is timed; of slow equations all of them take a minute."""
 
 SHARE = 8
 """A linear fit is timed on this part of the samples: its work is proportional to them."""
@@ -53,10 +57,25 @@ def how_long(fit: FitConfig, config: PipelineConfig, data: Data) -> Estimate:
         return _joint(training, lambda few: _fitted(fit, config, data, few, lambda _: None))
     if not isinstance(training, Training):
         return Estimate(seconds=_linear(fit, config, data), basis=f"measured now on 1/{SHARE} of the samples")
-    return network_time(
+    fits: list[FitResult] = []
+    trained = network_time(
         training.with_starts(estimator_of(fit.structure).starts),
-        lambda few, note: _fitted(fit, config, data, few, note),
+        lambda few, note: fits.append(_fitted(fit, config, data, few, note)),
     )
+    seconds = trained.seconds or 0.0
+    checked = min(_checked(fits[-1], fit, config, data), max(LEAST_S, config.stability.time_share * seconds))
+    if checked < 1.0:
+        return trained
+    return Estimate(seconds=seconds + checked, basis=f"{trained.basis}, and {duration(checked)} for its check")
+
+
+def _checked(found: FitResult, fit: FitConfig, config: PipelineConfig, data: Data) -> float:
+    """How long the check of a free run takes, from a few of its sequences."""
+    asked = config.stability.options(data.sequences)
+    few = dataclasses.replace(asked, count=min(asked.count, FEW_SEQUENCES))
+    began = time.perf_counter()
+    estimator_of(fit.structure).stability.of(few, found.model.mapping, data.estimation).applied(found)
+    return (time.perf_counter() - began) * asked.count / max(few.count, 1)
 
 
 def _joint(training: JointTraining, fit: Callable[[JointTraining], object]) -> Estimate:
@@ -132,6 +151,7 @@ def _fitted(
 ) -> FitResult:
     few = {name: getattr(training, name) for name in FEW if hasattr(training, name)}
     given = options_of(estimator_of(fit.structure))(**{**(given_options(fit.training) or {}), **few})
+    config = config.model_copy(update={"stability": config.stability.model_copy(update={"count": 0})})
     return steps.fit_traces(fit.model_copy(update={"training": given, "initial": None}), config, data, None, note)
 
 
