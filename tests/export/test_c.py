@@ -145,6 +145,19 @@ def test_a_program_around_it_gets_what_the_model_gives(*, sources, inputs, name,
     np.testing.assert_allclose(rows[:, :-1], surrogate.simulate(u), rtol=0.0, atol=tolerance)
 
 
+@pytest.mark.parametrize(
+    ("flag", "own"), [("-O2", True), ("-mavx512fp16", True), ("-mfpmath=387", False), ("-ffast-math", False)]
+)
+def test_the_tanh_of_its_own_is_taken_where_sums_are_computed_as_written(*, sources, flag, own):
+    """Arithmetic in half precision is no reason against it: libm's takes four times as long."""
+    surrogate, folder = sources["NARX 4/4/20"]
+    command = ["gcc", "-E", "-dM", flag, f"{surrogate.identifier}.c"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if "unrecognized" in done.stderr:
+        pytest.skip(f"this compiler does not know {flag}")
+    assert ("#define TANH_LANES" in done.stdout) is own
+
+
 NUMBERS = {
     "double": ([], "nextafter((double)fabsl(exact), 2.0) - (double)fabsl(exact)", 5.0),
     "float": (["-D{P}_FLOAT"], "nextafterf((float)fabsl(exact), 2.0f) - (float)fabsl(exact)", 5.0),
