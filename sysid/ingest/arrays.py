@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.field_checks import check
-from sysid.ingest.assemble import Wanted, assemble, stamps_in_seconds
+from sysid.ingest.assemble import Wanted, assemble
 from sysid.ingest.frames import INDEX, as_array, check_distinct, check_labels, check_rows, columns_by_name, not_numbers
 from sysid.ingest.headers import parse_header
 from sysid.ingest.in_python import remedies_in_python
+from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.meaning import with_clock
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.split import Split, split_traces

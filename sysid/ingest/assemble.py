@@ -6,24 +6,21 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError, UnitError, UserError
+from sysid.errors import ConfigError, TraceError, UserError
 from sysid.ingest import repairs as repair
 from sysid.ingest.grid import Gridded, fill, grid_places, place, resample
+from sysid.ingest.in_units import clock_by_its_steps, in_unit, stamps_in_seconds
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions
 from sysid.ingest.repairs import Record
-from sysid.ingest.table import RawColumn, RawTable, time_unit
+from sysid.ingest.table import RawColumn, RawTable
 from sysid.ingest.timing import Timing, survey
 from sysid.traces import Channel, Trace
-from sysid.units import Reference, convert
 
 _MOST_POINTS, _MOST_TIMES = 1_000_000, 1000
-
-T = TypeVar("T", str, Reference)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,12 +114,15 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
     names = [columns_of.get(channel.name, channel.name) for channel in wanted.channels]
     table = table.narrowed(names, files.time.column)
     notes = [table.origin or _read_from(table.source), *table.notes]
+    if wanted.fixed:
+        files, clock = clock_by_its_steps(table, files, wanted.sample_time)
+        notes += [clock] if clock else []
     stamps = stamps_in_seconds(table, files)
     columns = []
     for channel in wanted.channels:
         given = files.columns.get(channel.name, ColumnOptions(column=channel.name))
         column = table.find(given.column)
-        values, note = _in_unit(column, channel, given, files, table.source)
+        values, note = in_unit(column, channel, given, files, table.source)
         columns.append(values)
         notes += [note] if note else []
     return Record(
@@ -162,119 +162,6 @@ def _check_names(channels: Sequence[Channel], files: FileOptions, source: Path) 
                 got=strangers[0],
                 remedy="write channel names on the left, column names or values on the right",
             )
-
-
-def stamps_in_seconds(table: RawTable, files: FileOptions) -> NDArray[np.float64]:
-    """The time stamps of a table.
-
-    Args:
-        table: The file as columns.
-        files: Which column holds time, and in which unit.
-
-    Returns:
-        Shape ``(n_rows,)``, seconds; NaN where the file has none.
-
-    Raises:
-        TraceError: If no time column is named or recognised.
-        UnitError: If its unit is missing or not one of time.
-    """
-    if files.time.step is not None:
-        return files.time.step * np.arange(len(table), dtype=np.float64)
-    name = files.time.column or table.time
-    if name is None and table.step is not None:
-        return table.step * np.arange(len(table), dtype=np.float64)
-    if name is None:
-        raise TraceError(
-            "no time column was recognised",
-            where=table.source,
-            expected="a column named t or time, or one with a unit of time",
-            got=", ".join(table.names),
-            remedy="name it: files: {time: 't [ms]'}, or, for a file without one, files: {time: {step: 0.1}}",
-        )
-    column = table.find(name)
-    unit = column.unit if files.time.unit in {None, "datetime"} else files.time.unit
-    if unit is None:
-        raise UnitError(
-            "the time column has no unit",
-            where=f"{table.source}, column {column.name}",
-            expected="s, ms, min or another unit of time",
-            got="none",
-            remedy=f"write files: {{time: '{column.name} [s]'}}",
-        )
-    return _converted(column.values, time_unit(unit), "s", where=f"{table.source}, column {column.name}")
-
-
-def _in_unit(
-    column: RawColumn, channel: Channel, given: ColumnOptions, files: FileOptions, source: Path
-) -> tuple[NDArray[np.float64], str | None]:
-    where = f"{source}, channel {channel.name} (column {column.name})"
-    if column.counted_from:
-        raise TraceError(
-            "integers are too large for float64",
-            where=where,
-            expected="integers of at most 53 bits",
-            got=f"values from {column.counted_from}",
-            remedy="subtract the first value before the export, or leave the channel out",
-        )
-    declared = given.unit or _for_channel(files.units, channel.name)
-    unit = declared or column.unit
-    if unit is None:
-        raise UnitError(
-            "a column has no unit",
-            where=where,
-            expected="a unit in the file or in the description",
-            got="none",
-            remedy=f"if it is {channel.unit}, write '{column.name} [{channel.unit}]' as its header, "
-            f"or files: {{units: {{{channel.name}: {channel.unit}}}}} in a dataset.yaml",
-        )
-    reference = given.reference or _for_channel(files.references, channel.name) or column.reference
-    if channel.reference is not Reference.NONE and reference is None:
-        raise UnitError(
-            "the file does not say what a pressure is measured from",
-            where=where,
-            expected="gauge or absolute",
-            got="neither",
-            remedy=f"write '{column.name} [{unit} gauge]' (or absolute) as its header, "
-            f"or files: {{references: {{{channel.name}: gauge}}}} in a dataset.yaml",
-        )
-    if channel.reference is Reference.NONE and isinstance(files.references, Reference):
-        reference = column.reference  # one reference for all pressures is not meant for the others
-    values = _converted(
-        column.values, unit, channel.unit, where=where, reference=reference, to_reference=channel.reference
-    )
-    notes = []
-    if declared and column.unit and declared != column.unit:
-        notes.append(f"taken as {declared} although the file says {column.unit}")
-    origin, target = reference or Reference.NONE, channel.reference
-    if (unit, origin) != (channel.unit, target):
-        notes.append(f"converted from {_label(unit, origin)} to {_label(channel.unit, target)}")
-    return values, f"{channel.name}: {', '.join(notes)}" if notes else None
-
-
-def _for_channel(given: T | Mapping[str, T], name: str) -> T | None:
-    return given.get(name) if isinstance(given, Mapping) else given
-
-
-def _label(unit: str, reference: Reference) -> str:
-    return unit if reference is Reference.NONE else f"{unit} {reference.value}"
-
-
-def _converted(
-    values: NDArray[np.float64],
-    unit: str,
-    to_unit: str,
-    *,
-    where: str,
-    reference: Reference | None = None,
-    to_reference: Reference = Reference.NONE,
-) -> NDArray[np.float64]:
-    reference = reference or Reference.NONE
-    if unit == to_unit and reference is to_reference:
-        return values
-    try:
-        return convert(values, unit, to_unit, reference=reference, to_reference=to_reference)
-    except UnitError as error:
-        raise UnitError(error.what, where=where, expected=error.expected, got=error.got, remedy=error.remedy) from error
 
 
 def _cut(record: Record, wanted: Wanted) -> Record:

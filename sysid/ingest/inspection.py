@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.ingest.assemble import stamps_in_seconds
 from sysid.ingest.attempts import Attempt, read_somehow
 from sysid.ingest.blanks import blanks_mean
 from sysid.ingest.clocks import clock_of
 from sysid.ingest.events import are_events
 from sysid.ingest.findings import CaseFinding, ColumnFinding, FileFinding, counted
 from sysid.ingest.headers import is_unit, split_reference
+from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.restarts import finer_than_clock, records_by_clock

@@ -9,6 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from sysid.field_checks import FieldError
 from sysid.ingest.headers import parse_header
+from sysid.ingest.table import is_time_unit
 from sysid.units import Reference
 
 
@@ -48,6 +49,16 @@ class TimeOptions(Options):
     format: str | None = None
     zone: str | None = None
     step: Annotated[float, Field(gt=0)] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _unit_behind_the_name(cls, given: Any) -> Any:
+        # ``--time 't [ms]'`` and ``column: t [ms]`` say what ``time: t [ms]`` says.
+        if isinstance(given, dict) and isinstance(given.get("column"), str) and not given.get("unit"):
+            header = parse_header(given["column"])
+            if header.unit is not None and is_time_unit(header.unit):
+                return {**given, "column": header.name, "unit": header.unit}
+        return given
 
     @model_validator(mode="after")
     def _consistent(self) -> TimeOptions:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import UnitError
-from sysid.ingest.assemble import Wanted, assemble, stamps_in_seconds
+from sysid.ingest.assemble import Wanted, assemble
+from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions
 from sysid.ingest.readers import READERS, choose_reader, read_with
 from sysid.ingest.table import RawTable

@@ -27,6 +27,7 @@ def test_every_option_of_the_model_can_be_typed() -> None:
         (["--separator", "tab"], {"separator": "\t"}),
         (["--no-header", "--skip-lines", "3"], {"header": False, "skip_lines": 3}),
         (["--time", "clock", "--time-unit", "ms"], {"time": {"column": "clock", "unit": "ms"}}),
+        (["--time", "clock [ms]"], {"time": "clock [ms]"}),
         (["--zone", "Europe/Berlin"], {"time": {"zone": "Europe/Berlin"}}),
         (["--states", "OFF=0", "--states", "ON=1"], {"states": {"OFF": 0.0, "ON": 1.0}}),
         (["--states", "{valve: {shut: 0, 'half open': 0.5}}"], {"states": {"valve": {"shut": 0, "half open": 0.5}}}),

@@ -176,6 +176,25 @@ def test_the_remedy_is_an_option_of_this_command(run, tmp_path, capsys, columns,
     assert simulated(run, file, *repaired, out=tmp_path / "a.csv")[0] == 0
 
 
+@pytest.mark.parametrize(("unit", "in_seconds"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)])
+def test_a_clock_without_a_unit_is_told_by_the_models_sample_time(run, tmp_path, capsys, unit, in_seconds):
+    rows = np.column_stack([0.1 * np.arange(40) / in_seconds, RAMP, RAMP])
+    np.savetxt(tmp_path / "s.csv", rows, delimiter=",", header="t,u [V],v [V]", comments="")
+    code, found = simulated(run, str(tmp_path / "s.csv"), out=tmp_path / "a.csv")
+    assert code == 0 and len(found) == 40
+    assert f"t is taken in {unit}" in capsys.readouterr().out
+
+
+def test_a_clock_of_another_step_is_declared_as_the_remedy_says(run, tmp_path, capsys):
+    rows = np.column_stack([0.2 * np.arange(40), RAMP, RAMP])
+    np.savetxt(tmp_path / "s.csv", rows, delimiter=",", header="t,u [V],v [V]", comments="")
+    assert simulated(run, str(tmp_path / "s.csv"), out=tmp_path / "a.csv")[0] == 2
+    assert "--time 't [s]'" in capsys.readouterr().err
+    words = ["--time", "t [s]", "--grid", "method=linear"]
+    code, found = simulated(run, str(tmp_path / "s.csv"), *words, out=tmp_path / "a.csv")
+    assert code == 0 and len(found) == 79
+
+
 def test_another_sample_time_is_resampled_where_that_is_asked_for(run, tmp_path, capsys):
     rows = np.column_stack([0.2 * np.arange(40), RAMP, RAMP])
     np.savetxt(tmp_path / "s.csv", rows, delimiter=",", header="time [s],u [V],v [V]", comments="")

@@ -81,6 +81,8 @@ def simulate_command(wish: Wish) -> None:
         with as_typed():
             options = InputOptions(constants=constants, measured=measured, **reading_options(wish.reading))
             inputs = read_inputs(read, Path(str(wish.inputs)), options)
+        for done in inputs.provenance[1:]:  # the first is the file itself
+            console().print(done, soft_wrap=True, markup=False)
         simulation = simulate_bundle(read, inputs, initial=wish.initial, start=start)
     write_trace(replace(simulation.trace, name=wish.out.stem), wish.out)
     _tell(simulation, wish.out)
