@@ -85,14 +85,37 @@ def test_the_bare_address_leads_to_the_fits_and_nothing_covers_them(page, addres
     assert all(len(text.replace(".", "").lstrip("0")) <= 4 for text in figures), figures
 
 
-def test_two_fits_are_compared_with_their_pictures_side_by_side(page, address, picture) -> None:
+def compare(page, address: str, count: int) -> None:
+    """MLflow's comparison of the first fits of its list."""
     open_runs(page, address)
     boxes = [box for box in page.locator(".ag-row input[type=checkbox]").all() if box.is_visible()]
-    for box in boxes[:2]:
+    for box in boxes[:count]:
         box.check()
     page.get_by_role("button", name="Compare", exact=True).click()
-    page.get_by_text("Comparing 2 Runs from 1 Experiment").wait_for()
+    page.get_by_text(f"Comparing {count} Runs from 1 Experiment").wait_for()
     page.locator(".js-plotly-plot .parcoords").first.wait_for()
+
+
+def test_a_comparison_of_all_kinds_of_fits_leads_to_their_outputs_over_the_target(page, address, picture) -> None:
+    if not entry_points(group="mlflow.app", name=APP):
+        pytest.skip("installed before it had the entry point for MLflow: make setup")
+    compare(page, address, len(RUNS))
+    bar = page.get_by_role("navigation", name="Outputs over the target")
+    bar.wait_for()
+    picture("comparison")
+    assert not page.get_by_text("unknown", exact=True).first.is_visible(), "an axis that only some of them have"
+    bar.get_by_role("link", name=CASE, exact=True).click()
+    lines = ".js-plotly-plot .scatterlayer .trace path.js-line"
+    page.wait_for_function(f"document.querySelectorAll('{lines}').length >= {2 * len(RUNS)}")
+    picture("outputs over the target")
+    assert page.get_by_text(f"target/{CASE} vs output/{CASE}").first.is_visible()
+    widths = page.evaluate(f"[...document.querySelectorAll('{lines}')].map(line => line.getBBox().width)")
+    assert min(widths) > 300, "time is the record's: all samples at one moment are one stroke"
+    assert bar.count() == 0
+
+
+def test_two_fits_are_compared_with_their_pictures_side_by_side(page, address, picture) -> None:
+    compare(page, address, 2)
     picture("comparison")
     assert not page.get_by_text("unknown", exact=True).first.is_visible(), "an axis that only one of them has"
     assert page.get_by_text("cm²").first.is_visible(), "the unit of the errors"

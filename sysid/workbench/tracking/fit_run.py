@@ -96,7 +96,12 @@ def log_values(client: Any, run_id: str, ready: FitReady, entities: Entities) ->
     now = int(time.time() * 1000)
     values = [entities.metric(name, value, now, 0) for name, value in tracked.metrics(ready).items()]
     values += [entities.metric("learning_curve_mse", mse, now, step) for step, mse in tracked.learning_curve(ready)]
-    values += [entities.metric(name, value, now, sample) for name, sample, value in tracked.lines(ready)]
+    # MLflow's page of a metric has time for its axis at first: a sample's time is the record's, in seconds.
+    step_ms = 1000.0 * ready.fit.model.sample_time
+    values += [
+        entities.metric(name, value, now + round(step_ms * sample), sample)
+        for name, sample, value in tracked.lines(ready)
+    ]
     params = [entities.param(name, value[:PARAM_LIMIT]) for name, value in tracked.parameters(ready).items()]
     for number, batch in enumerate(tracked.batches(values)):
         client.log_batch(run_id, metrics=batch, params=() if number else params)

@@ -117,7 +117,7 @@ def parameters(ready: FitReady) -> dict[str, str]:
     """
     structure = ready.fit.model.structure.to_dict()
     # MLflow's page of a comparison draws the first three names of the alphabet that differ. These stand for every fit,
-    # so that none of them is "unknown" between two structures.
+    # and before those that some have, so that none of them is "unknown" between two structures.
     model = ready.fit.model
     chosen: dict[str, Any] = {
         "chosen_kind": model.structure.kind,
@@ -127,7 +127,7 @@ def parameters(ready: FitReady) -> dict[str, str]:
         "error_unit": squared(ready.unit),
         "mapping": ready.pipeline.mapping,
         "start": ready.pipeline.start.kind.value,
-        **structure,
+        **{f"structure.{name}": value for name, value in structure.items() if name != "kind"},
     }
     training = ready.config.training_options(ready.pipeline.seed)
     if training is not None:

@@ -1,13 +1,14 @@
-"""The bare address of the tracking server leads to the fits.
+"""The bare address of the tracking server leads to the fits, and a comparison of runs to their outputs in one chart.
 
 MLflow's own page opens there in its mode for language models. What follows ``#`` in an address reaches no server; so
-the page itself is given a line more, which leads on where no page is asked for.
+the page itself is given a script more, which leads on where no page is asked for, and does what its own file says.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Awaitable, Callable, MutableMapping
+from importlib.resources import files
 from typing import Any
 
 Message = MutableMapping[str, Any]
@@ -69,10 +70,11 @@ def with_lead(html: bytes, page: str) -> bytes:
         True
     """
     where = json.dumps(page).replace("<", "\\u003c")
+    compare = files(__package__).joinpath("compare_page.js").read_text(encoding="utf-8")
     script = (
         f"<script>for (const [name, value] of Object.entries({json.dumps(SETTINGS)}))"
         " if (localStorage.getItem(name) === null) localStorage.setItem(name, value);"
-        f" if (location.hash.length < 3) location.hash = {where}</script>"
+        f" if (location.hash.length < 3) location.hash = {where};\n{compare}</script>"
     )
     return html.replace(b"<head>", b"<head>" + script.encode(), 1)
 

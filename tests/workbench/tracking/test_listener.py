@@ -84,7 +84,7 @@ def test_parameters_and_figures_are_those_of_the_results(tracked_once) -> None:
     _, client, results = tracked_once
     closed = runs_of(client)["closed loop"]
     record = results.fits[2]
-    assert closed.data.params["neurons"] == "2"
+    assert closed.data.params["structure.neurons"] == "2"
     assert closed.data.params["training.max_iterations"] == "8"
     assert closed.data.params["training.loop"] == "closed"
     for name, case in record.cases.items():
