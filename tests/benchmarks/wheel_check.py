@@ -22,7 +22,7 @@ from sysid.workbench.trackers import UNTRACKED
 from tests.test_readme import ROOT, Command, blocks, check, commands, stand_in
 
 LARGEST_MB = 600.0
-"""A base installation, with pip in it."""
+"""What the wheel and all that it needs may take; what an environment has before, as pip, is told beside it."""
 
 
 def build(folder: Path) -> Path:
@@ -33,17 +33,21 @@ def build(folder: Path) -> Path:
     return wheel
 
 
-def install(wheel: Path, python: str, extras: str, folder: Path) -> tuple[Path, float, float]:
-    """An environment with the wheel in it: its programs, seconds, and MB of its packages."""
+def megabytes(folder: Path) -> float:
+    """What the packages of an environment take on the disk."""
+    (packages,) = folder.glob("**/site-packages")
+    return sum(file.stat().st_blocks * 512 for file in packages.rglob("*") if not file.is_symlink()) / 2**20
+
+
+def install(wheel: Path, python: str, extras: str, folder: Path) -> tuple[Path, float, float, float]:
+    """An environment with the wheel in it: its programs, seconds, MB that it added, and MB that were there before."""
     subprocess.run([python, "-m", "venv", str(folder)], check=True)
     programs = folder / ("Scripts" if os.name == "nt" else "bin")
-    began = time.monotonic()
+    before, began = megabytes(folder), time.monotonic()
     asked = f"{wheel}[{extras}]" if extras else str(wheel)
     subprocess.run([programs / "python", "-m", "pip", "install", "--quiet", asked], check=True)
     seconds = time.monotonic() - began
-    (packages,) = folder.glob("**/site-packages")
-    size = sum(file.stat().st_blocks * 512 for file in packages.rglob("*") if not file.is_symlink())
-    return programs, seconds, size / 2**20
+    return programs, seconds, megabytes(folder) - before, before
 
 
 class Person:
@@ -105,8 +109,9 @@ def main() -> int:
     asked = options.parse_args()
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
-        programs, seconds, size = install(build(place / "dist"), asked.python, asked.extras, place / "environment")
-        print(f"installed in {seconds:.0f} s, {size:.0f} MB of packages")
+        wheel, environment = build(place / "dist"), place / "environment"
+        programs, seconds, size, before = install(wheel, asked.python, asked.extras, environment)
+        print(f"installed in {seconds:.0f} s: {size:.0f} MB, beside {before:.0f} MB that were there")
         (place / "home").mkdir()
         began, before = time.monotonic(), Path.cwd()
         tracked = asked.extras == "all" or "mlflow" in asked.extras
