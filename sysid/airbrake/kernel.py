@@ -16,6 +16,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.own_folders import keep_kernels_where_it_is_allowed
+
+keep_kernels_where_it_is_allowed()
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 SMALLEST_DROP = 1e-6

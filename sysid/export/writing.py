@@ -196,7 +196,8 @@ def _published(folder: Path) -> Iterator[Path]:
             remedy="choose another folder, or remove what lies there",
         )
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as workplace:
+    beside = f".{folder.name}."
+    with _named(folder, beside), tempfile.TemporaryDirectory(prefix=beside, dir=folder.parent) as workplace:
         draft, old = Path(workplace) / "new", Path(workplace) / "old"
         draft.mkdir()
         yield draft
@@ -209,3 +210,14 @@ def _published(folder: Path) -> Iterator[Path]:
                 old.rename(folder)
             raise
         shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def _named(folder: Path, beside: str) -> Iterator[None]:
+    """What the system refuses is refused for the folder: an error names a draft that nobody knows, or nothing."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None or any(part.startswith(beside) for part in Path(str(error.filename)).parts):
+            error.filename = str(folder)
+        raise

@@ -30,9 +30,14 @@ _log = logging.getLogger(__name__)
 
 
 def default_cache_folder() -> Path:
-    """``$SYSID_CACHE`` if it is set, else ``~/.cache/sysid``."""
+    """``$SYSID_CACHE`` if it is set, else ``~/.cache/sysid``; for who has no home a folder for temporary files."""
     given = os.environ.get("SYSID_CACHE")
-    return Path(given) if given else Path.home() / ".cache" / "sysid"
+    try:
+        return Path(given) if given else Path.home() / ".cache" / "sysid"
+    except RuntimeError:  # a user without a name, as in a container
+        from sysid.own_folders import own_folder
+
+        return own_folder("cache")
 
 
 def content_key(content: Mapping[str, Any]) -> str:

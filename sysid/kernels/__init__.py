@@ -8,6 +8,8 @@ the newest file of this room is taken away.
 import time
 from pathlib import Path
 
+from sysid.own_folders import keep_kernels_where_it_is_allowed
+
 
 def forget_what_is_older(folder: Path, callers: Path | None = None) -> None:
     """Take away the indices of compiled functions that are older than some file of a folder.
@@ -29,3 +31,4 @@ def forget_what_is_older(folder: Path, callers: Path | None = None) -> None:
 
 
 forget_what_is_older(Path(__file__).parent, Path(__file__).parent.parent)
+keep_kernels_where_it_is_allowed()

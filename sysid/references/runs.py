@@ -86,10 +86,12 @@ class _Process:
     def __init__(self, config: ReferenceConfig) -> None:
         self.answers: queue.Queue[str] = queue.Queue()
         self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
+        # It is ended in the middle of what it does: what it unpacked and wrote is cleared away from here.
+        self.place = tempfile.TemporaryDirectory(prefix="sysid-worker-", ignore_cleanup_errors=True)
         # Our own module, and nothing of a user's but the configuration that names what is run.
         self.process = subprocess.Popen(
             [sys.executable, "-m", "sysid.references.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=self.errors, text=True, encoding="utf-8", start_new_session=True, env=_environment(),
+            stderr=self.errors, text=True, encoding="utf-8", start_new_session=True, env=_environment(self.place.name),
         )  # fmt: skip
         threading.Thread(target=self._listen, daemon=True).start()
         self.send(config.model_dump_json())
@@ -130,13 +132,15 @@ class _Process:
         for one in (self.process.stdin, self.process.stdout, self.errors):
             with contextlib.suppress(OSError):
                 one.close()  # type: ignore[union-attr]
+        self.place.cleanup()
         how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
         return how + (f": {said[0]}" if said else "")
 
 
-def _environment() -> dict[str, str]:
-    """One thread a run: there are as many runs as processors."""
-    return {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+def _environment(place: str) -> dict[str, str]:
+    """One thread a run, for there are as many runs as processors; and a folder of its own for temporary files."""
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    return {**os.environ, **threads, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), place)}
 
 
 @dataclass(kw_only=True, eq=False)

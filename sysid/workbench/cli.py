@@ -1,7 +1,7 @@
 """The command line: thin commands that import what they need when they need it.
 
 Exit codes: 0 done, 2 the user's input has to change, 1 ours (a bug, a failed check, or results that are
-complete but could not be tracked), 130 stopped by the user.
+complete but could not be tracked), 130 stopped by the user (Ctrl-C), 143 ended by SIGTERM, 129 by SIGHUP.
 """
 
 from __future__ import annotations
@@ -40,13 +40,32 @@ for panel, room in {
         command.rich_help_panel = panel
         app.registered_commands.append(command)
 
+STOPPED = 130
+"""Exit code of who was stopped by Ctrl-C, as a shell has it: 128 and the signal's number."""
+
+RESUMED = ("run", "sweep", "auto", "surrogate")
+"""What keeps what is done, and goes on there; of any other command a second one begins anew."""
+
+
+class _EndedError(SystemExit):
+    """Asked to end by the system. No fit takes it for Ctrl-C, which would only end the fit.
+
+    Args:
+        signal_number: Of the signal.
+    """
+
+    def __init__(self, signal_number: int) -> None:
+        super().__init__(128 + signal_number)
+        self.exit_code = 128 + signal_number
+
 
 def main() -> None:
     """Entry point of the command ``sysid``."""
     try:
+        _end_in_order()
         code = run_cli(sys.argv[1:])
     except KeyboardInterrupt:  # the second one, while the first was being told
-        code = 130
+        code = STOPPED
     # A further Ctrl-C meets an interpreter that is already leaving, and would end it with a trace.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.exit(code)
@@ -70,6 +89,22 @@ def run_cli(arguments: list[str]) -> int:
         warnings.showwarning = _note
         warnings.simplefilter("default", FutureWarning)  # once each, whatever the caller's filters say
         return _run(arguments, debug=debug)
+
+
+def _end_in_order() -> None:
+    """A signal that ends the process unwinds it: drafts are removed, workers ended, tracked runs closed.
+
+    Batch systems, containers and ``timeout`` send one, and kill some seconds later. A second one ends it at once.
+    """
+
+    def end(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        raise _EndedError(number)
+
+    for name in ("SIGTERM", "SIGHUP"):
+        known = getattr(signal, name, None)
+        if known is not None and signal.getsignal(known) is signal.SIG_DFL:  # nohup's stays as it is
+            signal.signal(known, end)
 
 
 def _with_commands_of_fields(words: list[str]) -> None:
@@ -106,10 +141,12 @@ def _run(arguments: list[str], *, debug: bool) -> int:
     try:
         _with_commands_of_fields(arguments)
         code = app([word for word in arguments if word != "--debug"], prog_name="sysid", standalone_mode=False)
-        return code if isinstance(code, int) else 0
+        # Some versions of Typer leave with the code of a keyboard's interruption in place of raising it.
+        return _stopped(STOPPED, arguments) if code == STOPPED else code if isinstance(code, int) else 0
     except KeyboardInterrupt:
-        _say("stopped; the same command goes on where this one was")
-        return 130
+        return _stopped(STOPPED, arguments)
+    except _EndedError as ended:
+        return _stopped(ended.exit_code, arguments)
     except BrokenPipeError:
         # The reader of our output went away (sysid ... | head).
         return 0
@@ -117,6 +154,15 @@ def _run(arguments: list[str], *, debug: bool) -> int:
         return _refuse(error, debug=debug)
     except Exception as error:  # noqa: BLE001 - the last line of defence: whatever it is, it is named and ends with a code
         return _unexpected(error, arguments, debug=debug)
+
+
+def _stopped(code: int, arguments: list[str]) -> int:
+    """Who ended it, and what the same command does next."""
+    by = "stopped" if code == STOPPED else f"ended by {signal.Signals(code - 128).name}"
+    again = "the same command without --fresh" if "--fresh" in arguments else "the same command"
+    resumed = not {*RESUMED}.isdisjoint(arguments[:1])
+    _say(f"{by}; {again} goes on where this one was" if resumed else f"{by}; {again} begins anew")
+    return code
 
 
 def _refuse(error: SysidError, *, debug: bool) -> int:

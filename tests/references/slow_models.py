@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 import time as clock
 from collections.abc import Mapping
 
@@ -199,6 +200,12 @@ def leaves_numbers(time: Array, inputs: Array, parameters: Mapping[str, float]) 
 def rubbish(time: Array, inputs: Array, parameters: Mapping[str, float]) -> object:
     """Gives words where the input goes above 1."""
     return "rubbish" if inputs.max() > 1.0 else inputs[:, :1]
+
+
+def litters(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Leaves temporary files behind, as everything does that is ended in the middle."""
+    tempfile.mkdtemp()
+    return inputs[:, :1]
 
 
 def raises(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -77,6 +78,16 @@ def test_what_a_function_gives_is_taken_by_name_where_it_has_names_and_never_for
     for one in outcomes[:6]:
         assert one.trace is not None
         np.testing.assert_array_equal(one.trace.columns(["y", "z"]), inputs * [0.5, 100.0])
+
+
+def test_a_worker_leaves_no_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is ended by a signal that nothing survives: an unpacked FMU stayed for good, a folder a worker."""
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
+    outcomes = run(reference("litters"), tmp_path, CASES)
+    assert [one.reason for one in outcomes] == [None] * 3
+    assert not list(place.iterdir())
 
 
 def test_what_is_no_function_is_refused_in_words(tmp_path: Path) -> None:

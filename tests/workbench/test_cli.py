@@ -160,6 +160,36 @@ def test_stopping_has_the_code_of_the_signal(
     assert "goes on where this one was" in capsys.readouterr().err
 
 
+def test_a_command_that_is_stopped_says_so_whatever_typer_makes_of_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Some of its versions raise the interruption, others leave with its code."""
+    from sysid.workbench.commands import schema
+
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(schema, "schema_command", stop)
+    assert run_cli(["schema"]) == 130
+    assert capsys.readouterr().err == "stopped; the same command begins anew\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals there")
+@pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGHUP", 129)])
+def test_what_the_system_ends_clears_up_behind_itself(name: str, code: int, tmp_path: Path) -> None:
+    script = (
+        "import os, pathlib, signal, sys\nfrom sysid.atomic import replacing\nfrom sysid.workbench import cli\n"
+        f"def work(*_, **__):\n  with replacing(pathlib.Path({str(tmp_path)!r}) / 'a.txt') as draft:\n"
+        f"    draft.write_text('half')\n    try: os.kill(os.getpid(), signal.{name})\n"
+        "    except KeyboardInterrupt: pass  # as a fit does, which would go on\n"
+        "cli._with_commands_of_fields = work\nsys.argv = ['sysid', 'run', 'first', '--fresh']\ncli.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == code
+    assert done.stderr == f"ended by {name}; the same command without --fresh goes on where this one was\n"
+    assert not list(tmp_path.iterdir())
+
+
 def sysid(workspace: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*SYSID, *arguments], cwd=workspace, capture_output=True, text=True, check=False)
 
