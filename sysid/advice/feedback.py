@@ -7,6 +7,11 @@ from dataclasses import asdict
 
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record
+from sysid.models import Mapping
+
+WELL, TIMES = 0.8, 5.0
+"""The part of an input that a linear response to the output has to explain, and how many times less it leaves than the
+response to the inputs leaves of the output, so that the two are taken to be exchanged."""
 
 
 def check_feedback(record: Record) -> Iterator[Finding]:
@@ -25,9 +30,30 @@ def check_feedback(record: Record) -> Iterator[Finding]:
         yield Finding(topic=Topic.FEEDBACK, code="feedback.unknown", verdict=Verdict.UNKNOWN, reason=found)
         return
     if found.found:
+        exchanged = list(_exchanged(record))
+        yield from exchanged
+        if exchanged:
+            return
         code, verdict = "feedback.found", Verdict.LOOK
     elif found.slight:
         code, verdict = "feedback.slight", Verdict.NOTE
     else:
         code, verdict = "feedback.none", Verdict.FINE
     yield Finding(topic=Topic.FEEDBACK, code=code, verdict=verdict, subject=record.moving, figures=asdict(found))
+
+
+def _exchanged(record: Record) -> Iterator[Finding]:
+    """Inputs that a linear response to the output explains well, where the other way round it does not."""
+    forward = record.impulse
+    if isinstance(forward, str):
+        return
+    output = record.mapping.output
+    for name in record.moving:
+        backward = Record(traces=record.traces, mapping=Mapping(inputs=(output,), output=name)).impulse
+        if isinstance(backward, str) or backward.explained < WELL:
+            continue
+        if 1.0 - forward.explained > TIMES * (1.0 - backward.explained):
+            figures = {"forward": max(forward.explained, 0.0), "backward": backward.explained}
+            yield Finding(
+                topic=Topic.FEEDBACK, code="feedback.exchanged", verdict=Verdict.LOOK, subject=(name,), figures=figures
+            )

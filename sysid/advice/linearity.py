@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from sysid.advice.dynamics import BARELY
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, Residual
+from sysid.estimation.informative import beyond_chance, by_chance
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.noise import whitener
@@ -209,8 +210,7 @@ def _tested(
     q, rows = features[0].shape[1], sum(len(y) - len(whiten) + 1 for y in left)
     share = _explained(features, left, whiten, corrected=False)
     free = rows - q - len(left)
-    F = share / q / max((1.0 - share) / free, 1e-300)
-    return max(0.0, 1.0 - (1.0 - share) * (rows - len(left)) / free), float(scipy.stats.f.sf(F, q, free))
+    return beyond_chance(share, rows - len(left), free), by_chance(share, q, free)
 
 
 def _explained(
@@ -227,7 +227,7 @@ def _explained(
     found = triangle(blocks, free=0)
     q, rows = features[0].shape[1], sum(map(len, blocks))
     share = 1.0 - float(np.sum(found.z[q:] ** 2)) / max(float(found.z @ found.z), 1e-300)
-    return max(0.0, 1.0 - (1.0 - share) * (rows - 1) / max(rows - q - 1, 1)) if corrected else share
+    return beyond_chance(share, rows - 1, max(rows - q - 1, 1)) if corrected else share
 
 
 def _coherence(record: Record) -> Iterator[Finding]:

@@ -14,6 +14,7 @@ from sysid.models import ARX, NARX, Start, StartKind, TransferFunction
 NOT_LINEAR = {"linearity.curved", "linearity.distorted", "linearity.perhaps_curved", "linearity.nothing_explained"}
 NOT_LINEAR |= {"channel.clipped_above", "channel.clipped_below"}
 """Findings that ask for a network."""
+NOISY, FEEDBACK = {"noise.some", "noise.loud", "noise.coloured"}, {"feedback.found", "feedback.exchanged"}
 MOST_ORDER, MOST_CANDIDATES = 8, 60_000
 
 
@@ -39,7 +40,7 @@ def suggestions(record: Record, findings: Sequence[Finding]) -> tuple[Suggestion
         m = len(arx.nb)
         delays = tuple(max(int(k), 0) for k in arx.nk)
         transfer = TransferFunction(poles=(poles,) * m, zeros=(poles - 1,) * m, delays=delays)
-        if codes & {"noise.some", "noise.loud", "noise.coloured"} and not codes & {"feedback.found", *NOT_LINEAR}:
+        if codes & NOISY and not codes & (FEEDBACK | NOT_LINEAR):
             found.insert(0, Suggestion(structure=transfer, code="structure.transfer_function_noise"))
         else:
             found.append(Suggestion(structure=transfer, code="structure.transfer_function"))

@@ -87,3 +87,17 @@ def by_chance(share: float, used: int, free: int) -> float:
     """
     left = max(1.0 - share, float(np.finfo(np.float64).eps))
     return float(scipy.special.fdtrc(used, free, share / used * free / left))
+
+
+def beyond_chance(share: float, before: int, after: int) -> float:
+    """The part of squares that columns explain, less what they would of noise.
+
+    Args:
+        share: The part that they explain.
+        before: Degrees of freedom without them.
+        after: Degrees of freedom with them.
+
+    Returns:
+        From 0 to 1.
+    """
+    return max(0.0, 1.0 - (1.0 - share) * before / after)

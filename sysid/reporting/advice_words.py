@@ -111,6 +111,12 @@ SAID: Final[dict[str, Words]] = {
         "Closed loop: use ARX or a network one step ahead, with enough noise model; instrumental variables and"
         " correlations from these inputs are biased. Record with an external set point.",
     ),
+    "feedback.exchanged": Words(
+        "{who} answers the output, and not the output {who}: a linear response explains {backward:.0%} of {who}, and"
+        " {forward:.0%} the other way round.",
+        "Are input and output exchanged? Then write the mapping the other way round. If not, the clocks of two loggers"
+        " are apart, or a controller sets {who} from the output.",
+    ),
     "feedback.slight": Words(
         "Inputs to come hold {share:.1%} of what the past leaves open: slight feedback, or inputs that are not held"
         " between samples.",

@@ -102,6 +102,15 @@ def test_feedback_is_found_and_the_same_plant_without_it_has_none(gain: float) -
     assert verdicts == [Verdict.FINE, Verdict.LOOK]
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_input_and_output_that_are_exchanged_are_told_from_feedback(seed: int) -> None:
+    u = steps(1500, seed)
+    found = finding(look(trace(plant(u) + noise(1500, seed, 0.05), u)), "feedback.exchanged", "u1")
+    assert found.verdict is Verdict.LOOK
+    assert found.figures["backward"] > 0.9
+    assert found.figures["forward"] < 0.6
+
+
 def test_collinear_inputs_are_named() -> None:
     a, b = steps(1200, 3), steps(1200, 4)
     found = look(

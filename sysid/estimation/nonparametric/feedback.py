@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-from sysid.estimation.informative import informative
+from sysid.estimation.informative import beyond_chance, by_chance, informative
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.segments import Segment, columns_of_lags, segments_of
 from sysid.models import Mapping
@@ -129,9 +128,8 @@ def _first(segments: Sequence[Segment]) -> list[Segment]:
 
 def _tested(without: float, with_them: float, count: int, free: tuple[int, int]) -> tuple[float, float]:
     """Probability that chance explains as much, and the share explained less what chance does of it."""
-    F = (without - with_them) / count / max(with_them / free[1], 1e-300)
     share = 1.0 - with_them / max(without, 1e-300)
-    return float(scipy.stats.f.sf(F, count, free[1])), max(0.0, 1.0 - (1.0 - share) * free[0] / free[1])
+    return by_chance(share, count, free[1]), beyond_chance(share, *free)
 
 
 def _at_once(segments: Sequence[Segment], past: int) -> float:
