@@ -8,7 +8,7 @@ from typing import Any
 
 from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit, SystemFit
-from sysid.api.given import TracesLike, traces_of
+from sysid.api.given import TracesLike, check_order, path_of, traces_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
@@ -49,7 +49,7 @@ def load(source: str | Path) -> TraceSet:
         >>> traces.names, traces.sample_time, len(traces.traces[0])
         (('record',), 0.5, 200)
     """
-    path = Path(source)
+    path = path_of(source, word="load")
     if not is_file_of_traces(path):
         return load_dataset(source)
     with remedies_of_a_file(path):
@@ -95,7 +95,11 @@ def fit(
             apply to it.
         ChannelError: If a channel of the mapping is missing.
     """
-    traces, mapped, start = traces_of(traces, word="fit"), Mapping.of(mapping), Start.of(start)
+    traces = traces_of(traces, word="fit")
+    check_order(mapping, structure)
+    mapped, start = Mapping.of(mapping), Start.of(start)
+    estimators.estimator_of(structure)
+    estimators.check_given(initial, stability)
     structure = structure.for_outputs(len(mapped.outputs))
     chosen = structure.mappings(mapped)
     estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysid.api.given import TracesLike, traces_of
+from sysid.api.given import TracesLike, path_of, traces_of
 from sysid.api.several import Several
 from sysid.estimation import FitResult
 from sysid.models import Start, StartLike
@@ -62,4 +62,4 @@ def read_bundle(folder: str | Path) -> Bundle:
     """
     from sysid.export import read_bundle as read
 
-    return read(Path(folder))
+    return read(path_of(folder, word="read_bundle"))

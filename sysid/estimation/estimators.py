@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from typing import Any
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.estimation.blocks.fit import STARTS as BLOCK_STARTS
 from sysid.estimation.blocks.fit import check_training as check_block_training
 from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
@@ -240,10 +240,38 @@ def estimator_of(structure: AbstractStructure) -> Estimator:
             "no estimator belongs to the structure",
             where="structure",
             expected=", ".join(row.structure.__name__ for row in ESTIMATORS.values()),
-            got=type(structure).__name__,
-            remedy="choose one of these",
+            got=f"the class {structure.__name__}" if isinstance(structure, type) else shortened(structure, limit=60),
+            remedy="choose one of these, with its numbers, as in ARX(na=2, nb=2, nk=1)",
         )
     return found
+
+
+def check_given(initial: object, stability: object) -> None:
+    """Refuse what is no fit to begin with, and what says nothing of how a free run is checked.
+
+    Args:
+        initial: What was given as a fit to start from.
+        stability: What was given as options.
+
+    Raises:
+        ConfigError: If either is something else.
+    """
+    if not isinstance(initial, FitResult | None):
+        raise ConfigError(
+            "initial is a fit",
+            where="initial",
+            expected="what a fit has given",
+            got=shortened(initial, limit=60),
+            remedy="give the fit itself, and not its model or its structure",
+        )
+    if not isinstance(stability, StabilityOptions | None):
+        raise ConfigError(
+            "stability says how the free run is checked",
+            where="stability",
+            expected="StabilityOptions",
+            got=shortened(stability, limit=60),
+            remedy="write StabilityOptions(count=...); count=0 asks nothing",
+        )
 
 
 def check(
@@ -306,6 +334,7 @@ def fit(
         ChannelError: If a trace lacks a channel of the mapping.
     """
     row = estimator_of(structure)
+    check_given(initial, stability)
     if not structure.several_outputs:
         mapping.check_single(row.name)
     begun = None if initial is None else initial.model.structure

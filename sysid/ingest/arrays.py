@@ -15,13 +15,13 @@ from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.field_checks import check
 from sysid.ingest.assemble import Wanted, assemble
 from sysid.ingest.frames import INDEX, as_array, check_distinct, check_labels, check_rows, columns_by_name, not_numbers
-from sysid.ingest.headers import parse_header
+from sysid.ingest.headers import parse_header, unit_in_name
 from sysid.ingest.in_python import remedies_in_python
 from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.meaning import with_clock
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.split import Split, split_traces
-from sysid.ingest.table import RawTable, array_column, by_length, recognise_time
+from sysid.ingest.table import RawTable, array_column, by_length, is_time_unit, recognise_time
 from sysid.ingest.timing import survey
 from sysid.traces import Channel, Trace, TraceSet, check_units
 from sysid.units import Reference, check_unit
@@ -85,7 +85,7 @@ def data(
     repaired = check(RepairOptions, {"constant": "accept", **_options(repairs, "repairs")}, where="repairs")
     gridded = check(GridOptions, {"fewest_samples": 2, **_options(grid, "grid")}, where="grid")
     step = None if sample_time is None else check(TimeOptions, {"step": sample_time}, where="sample_time").step
-    experiments = _experiments(values)
+    experiments = _experiments(values, wanted_inputs if wanted_outputs is None else wanted_outputs)
     whole: list[Trace] = []
     marks: list[NDArray[Any] | None] = []
     for number, (label, one) in enumerate(experiments.items()):
@@ -117,7 +117,7 @@ def _names(given: Names) -> tuple[str, ...] | None:
     return tuple(".".join(map(str, one)) if isinstance(one, tuple) else str(one) for one in several)
 
 
-def _experiments(values: Any) -> dict[str, Any]:
+def _experiments(values: Any, channels: Names) -> dict[str, Any]:
     """Experiments by name; a single one is called ``record``.
 
     Arrays of a single column are columns, whether they lie flat or stand, as those of ``scipy.io.loadmat`` do.
@@ -128,8 +128,26 @@ def _experiments(values: Any) -> dict[str, Any]:
     if isinstance(values, Mapping) and values and not standing and all(_is_record(one) for one in values.values()):
         return {str(label): one for label, one in values.items()}
     if isinstance(values, list) and values and not np.isscalar(values[0]):
+        if channels is None and len(values) == 2 and all(_is_column(one) for one in values):
+            raise ConfigError(
+                "a list is of several experiments",
+                expected="the pair (u, y), which is one experiment with an input",
+                got="a list of two columns, which is two experiments without one",
+                remedy='write sysid.data((u, y), ...); two records without input: outputs="y" beside the list',
+            )
         return {f"record-{number}": one for number, one in enumerate(values, start=1)}
     return {"record": values}
+
+
+def _is_column(value: Any) -> bool:
+    """Whether a value is one bare column of numbers: neither a table nor a series, which has a name."""
+    if isinstance(value, list):
+        return bool(value) and bool(np.isscalar(value[0]))
+    return (
+        not hasattr(value, "to_frame")
+        and getattr(value, "ndim", 0) == 1
+        and getattr(value.dtype, "names", None) is None
+    )
 
 
 def _is_record(value: Any) -> bool:
@@ -194,6 +212,14 @@ def inputs_of(
     where = "the inputs of a simulation"
     if not names and isinstance(values, int):
         return np.zeros((values, 0))
+    if isinstance(values, TraceSet):
+        raise ConfigError(
+            "a run is over one record",
+            where=where,
+            expected="a trace, an array or a frame",
+            got=f"a data set of {len(values.traces)}: {', '.join(values.names)}",
+            remedy=f'write traces["{values.names[0]}"]',
+        )
     if isinstance(values, Trace):
         _check_step(values.sample_time, sample_time, where=where)
         found = values.columns(names)
@@ -415,8 +441,13 @@ def _table(columns: Mapping[str, NDArray[Any]], *, name: str) -> RawTable:
     )
     # Time is in seconds in every function of ours, unless its name or the size of its numbers says otherwise.
     table = with_clock(table)
-    timed = [replace(one, unit="s") if one.name == table.time and not one.unit else one for one in table.columns]
+    timed = [replace(c, unit=_clock_unit(c.name)) if c.name == table.time and not c.unit else c for c in table.columns]
     return replace(table, columns=tuple(timed))
+
+
+def _clock_unit(name: str) -> str:
+    unit = unit_in_name(name)
+    return unit if unit is not None and is_time_unit(unit) else "s"
 
 
 def _digest(columns: Mapping[str, NDArray[Any]]) -> str:

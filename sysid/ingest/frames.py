@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, ReaderError
-from sysid.ingest.headers import parse_header
-from sysid.ingest.table import RawColumn, recognise_time
+from sysid.ingest.headers import parse_header, unit_in_name
+from sysid.ingest.table import RawColumn, is_time_unit, recognise_time, time_unit
+from sysid.units import convert
 
 INDEX = "(index)"
 """Name of the column that a frame's index becomes where it is time; no file can have it by chance."""
@@ -271,13 +272,13 @@ def _index(index: Any) -> Columns:
     if getattr(index, "nlevels", 1) > 1:
         return {}
     array = as_column(index)
-    if array.dtype.kind in "mM" or array.dtype.kind == "f":
+    if array.dtype.kind in "mM":
         return {INDEX: array}
-    if array.dtype.kind in "iu" and index.name is not None and recognise_time([_nameless(str(index.name))]):
-        return {INDEX: array}
-    return {}
-
-
-def _nameless(name: str) -> RawColumn:
-    header = parse_header(name)
-    return RawColumn(name=header.name, values=np.zeros(1), unit=header.unit)
+    header = parse_header(str(index.name or ""))
+    unit = header.unit or unit_in_name(header.name)
+    if array.dtype.kind not in "iuf" or (unit is not None and not is_time_unit(unit)):  # a way in mm, say
+        return {}
+    column = RawColumn(name=header.name, values=np.zeros(1), unit=unit)
+    if array.dtype.kind != "f" and recognise_time([column]) is None:
+        return {}
+    return {INDEX: array if unit is None else convert(array.astype(np.float64), time_unit(unit), "s")}

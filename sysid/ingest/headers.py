@@ -20,6 +20,12 @@ _FUSED = {
     "psia": ("psi", Reference.ABSOLUTE),
 }
 
+_UNITS_IN_NAMES = frozenset(
+    {"bar", "mbar", "barg", "bara", "Pa", "hPa", "kPa", "MPa", "psi", "psig", "psia", "V", "mV", "A", "mA"}
+    | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
+    | {"g", "rad", "deg"}
+)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
@@ -34,6 +40,23 @@ class Header:
     name: str
     unit: str | None = None
     reference: Reference | None = None
+
+
+def unit_in_name(name: str) -> str | None:
+    """The unit that a name ends with, where it is a usual one.
+
+    Args:
+        name: Of a column.
+
+    Returns:
+        The unit, or ``None``.
+
+    Example:
+        >>> unit_in_name("t_ms"), unit_in_name("p.bar"), unit_in_name("ms"), unit_in_name("x_2")
+        ('ms', 'bar', None, None)
+    """
+    last = re.split(r"[_.]", name)[-1]
+    return last if last != name and last in _UNITS_IN_NAMES else None
 
 
 def is_unit(text: str) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from sysid.ingest.blanks import blanks_mean
 from sysid.ingest.clocks import clock_of
 from sysid.ingest.events import are_events
 from sysid.ingest.findings import CaseFinding, ColumnFinding, FileFinding, counted
-from sysid.ingest.headers import is_unit, split_reference
+from sysid.ingest.headers import is_unit, split_reference, unit_in_name
 from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.readers.records import role_of
@@ -30,11 +29,6 @@ _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though n
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
 _EMPTY_SHARE = 0.8  # of a column, above which its missing values are no reason to leave samples out
 _STEP_NAMES = frozenset({"ts", "dt", "sample_time", "sampling_time", "sampletime"})
-_UNITS_IN_NAMES = frozenset(
-    {"bar", "mbar", "barg", "bara", "Pa", "hPa", "kPa", "MPa", "psi", "psig", "psia", "V", "mV", "A", "mA"}
-    | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
-    | {"g", "rad", "deg"}
-)
 
 
 def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileFinding:
@@ -234,7 +228,7 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     by_rising = "" if name in {asked.column, table.time} else f"{name} is taken for time, as it rises"
     clock = clock_of(column.values, column.name, origin=column.counted_from) if asked.unit is None else None
     said = None if clock is not None and "clock" in table.settings else column.unit
-    unit = asked.unit or (said if said is not None and is_time_unit(said) else None) or _unit_in_name(name)
+    unit = asked.unit or (said if said is not None and is_time_unit(said) else None) or unit_in_name(name)
     if unit is not None:
         return TimeOptions(column=column.name, unit=unit), by_rising and f"guessed: {by_rising}"
     if clock is not None:
@@ -303,7 +297,7 @@ def _column(column: RawColumn) -> ColumnFinding:
     if column.counted_from and not problem:
         problem = f"whole numbers of about {column.counted_from}, more than float64 can hold"
     in_file = column.unit if column.unit is not None and is_unit(column.unit) else None
-    unit_text = in_file or _unit_in_name(column.name) or "1"
+    unit_text = in_file or unit_in_name(column.name) or "1"
     unit, in_name = split_reference(unit_text)
     reference = column.reference or in_name
     guess = _guess_reference(finite, unit) if reference is None else reference
@@ -329,11 +323,6 @@ def _nearly_empty(values: NDArray[np.float64]) -> str:
     if missing <= _EMPTY_SHARE * len(values) or blanks_mean(values) == "hold":
         return ""
     return f"{missing} of {len(values)} values are missing"
-
-
-def _unit_in_name(name: str) -> str | None:
-    last = re.split(r"[_.]", name)[-1]
-    return last if last != name and last in _UNITS_IN_NAMES else None
 
 
 def _guess_reference(values: NDArray[np.float64], unit: str) -> Reference:

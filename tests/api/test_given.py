@@ -65,3 +65,35 @@ def test_records_without_a_set_are_fitted_as_one_of_them() -> None:
     assert sysid.fit(one, "u -> y", ARX).traces.name == "e"
     with pytest.raises(sysid.errors.TraceError, match="the same name"):
         sysid.fit([one, one], "u -> y", ARX)
+
+
+SET = record("e")
+WRONG: dict[str, tuple[Callable[[], Any], str]] = {
+    "mapping and structure": (lambda: sysid.fit(SET, ARX, "u -> y"), "mapping and structure are swapped"),
+    "a class for both": (lambda: sysid.fit(SET, sysid.ARX, None), "a structure stands where the mapping belongs"),
+    "mapping first": (lambda: sysid.fit("u -> y", SET, ARX), r"the data set comes first: sysid.fit\(traces"),
+    "structure first": (lambda: sysid.fit(ARX, SET, "u -> y"), "the data set comes first"),
+    "fit first": (lambda: sysid.compare(sysid.fit(SET, "u -> y", ARX), SET), r"comes first: sysid.compare"),
+    "a class": (lambda: sysid.fit(SET, "u -> y", sysid.ARX), "the class ARX(.|\n)*with its numbers"),
+    "a kind": (lambda: sysid.fit(SET, "u -> y", "ARX"), "no estimator belongs to the structure"),
+    "orders": (lambda: sysid.fit(SET, "u -> y", [1, 1, 1]), "as in ARX"),
+    "a model to begin with": (
+        lambda: sysid.fit(SET, "u -> y", ARX, initial=sysid.fit(SET, "u -> y", ARX).model),
+        "initial is a fit(.|\n)*not its model",
+    ),
+    "no stability": (lambda: sysid.fit(SET, "u -> y", ARX, stability=False), "count=0 asks nothing"),
+    "a set to run over": (
+        lambda: sysid.fit(SET, "u -> y", ARX).simulate(sysid.data((SET["u"], SET["y"]), sample_time=0.1)),
+        r'write traces\["record"\]',
+    ),
+    "a frame to load": (lambda: sysid.load({"u": [1.0]}), "sysid.data"),
+    "a fit to read": (lambda: sysid.read_bundle(None), "takes a name or a path"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_arguments_in_each_others_place_are_told_by_name(what: str) -> None:
+    """Each was a trace of Python, or was called no mapping."""
+    call, words = WRONG[what]
+    with pytest.raises(ConfigError, match=words):
+        call()

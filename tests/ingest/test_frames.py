@@ -36,6 +36,9 @@ SAME: dict[str, Any] = {
     "ns since 1970": FRAME.assign(t=(1_700_000_000_000_000_000 + (T * 1e9).astype(np.int64))),
     "ms since 1970": FRAME.assign(t=1.7e12 + 1000 * T),
     "days since 1900": FRAME.assign(t=45_363 + T / 86_400),
+    "an index that says its unit": pd.DataFrame({"u": U, "y": Y}, index=pd.Index(1e3 * T, name="t [ms]")),
+    "an index with a unit in its name": pd.DataFrame({"u": U, "y": Y}, index=pd.Index(1e3 * T, name="t_ms")),
+    "a column with a unit in its name": pd.DataFrame({"u": U, "y": Y, "t_ms": 1e3 * T}),
     "an index in ns": pd.DataFrame({"u": U, "y": Y}, index=1.7e18 + 1e9 * T),
 }
 
@@ -64,6 +67,8 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "a name twice as text": (lambda: data(pd.DataFrame({"t": T, 1: U, "1": Y})), "two columns are named 1"),
     "a name in two units": (lambda: data(pd.DataFrame({"t": T, "u [V]": U, "u [A]": Y})), "two columns are named u"),
     "a channel on both sides": (lambda: data(FRAME, inputs="u", outputs="u"), "two columns are named u"),
+    "an index of way": (lambda: data(FRAME[["u"]].set_index(pd.Index(T, name="x [mm]"))), "sample_time=0.1"),
+    "two columns for a pair": (lambda: data([U, Y], sample_time=1), "sysid.data((u, y), ...)"),
     "rows dropped": (lambda: data(FRAME[["u"]].drop(index=[7, 8]), sample_time=1), "frame.reindex"),
     "rows shuffled": (lambda: data(FRAME[["u"]].sample(frac=1, random_state=0), sample_time=1), "frame.sort_index"),
     "two records as one": (lambda: data(pd.concat([FRAME, FRAME])[["u"]], sample_time=1), "a list of frames"),
