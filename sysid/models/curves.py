@@ -64,7 +64,12 @@ class Curve:
         """
         found = None
         if isinstance(written, Curve):
-            return written
+            again = {"table": list(written.points)} if written.points else written.kind
+            again = f"{written.kind} {written.size}" if written.size or written.kind in SIZES else again
+            found = cls.parse({written.kind: list(written.limits)} if written.limits else again, where)
+            if found == written:
+                return found
+            written, found = repr(written), None
         if isinstance(written, str):
             kind, _, size = written.rpartition(" ")
             if written in PLAIN:

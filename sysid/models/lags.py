@@ -47,7 +47,26 @@ def per_input(given: object) -> tuple[Any, ...]:
         >>> per_input(2), per_input([2, 3])
         ((2,), (2, 3))
     """
-    return tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
+    return tuple(given) if isinstance(given, Iterable) and not isinstance(given, str | bytes) else (given,)
+
+
+def is_one_set(spec: object) -> bool:
+    """Whether lags are one set, for all channels, and not a collection of sets.
+
+    Args:
+        spec: In one of the forms that people write, or several of them.
+
+    Returns:
+        Whether it is; numbers of NumPy are numbers.
+
+    Example:
+        >>> is_one_set(3), is_one_set(np.arange(1, 4)), is_one_set([1, "0:3"])
+        (True, True, False)
+    """
+    if isinstance(spec, str | bytes) or not isinstance(spec, Iterable):
+        return True
+    entries = list(spec)
+    return bool(entries) and all(isinstance(one, int | np.integer) for one in entries)
 
 
 def parse_lags(spec: LagSpec, *, first: int, where: str) -> tuple[int, ...]:
@@ -74,8 +93,10 @@ def parse_lags(spec: LagSpec, *, first: int, where: str) -> tuple[int, ...]:
             low, _, high = spec.partition(":")
             ends = int(low), int(high or low)
             lags = tuple(range(ends[0], ends[1] + 1)) if whole(ends[0]) and whole(ends[1]) else ()
-        elif isinstance(spec, int):
-            lags = tuple(range(1, spec + 1)) if whole(spec) else ()
+        elif isinstance(spec, bytes):
+            lags = ()
+        elif isinstance(spec, int | np.integer):
+            lags = tuple(range(1, int(spec) + 1)) if whole(spec) else ()
         else:
             entries = tuple(spec)
             lags = tuple(int(lag) for lag in entries) if all(whole(lag) for lag in entries) else ()

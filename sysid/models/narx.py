@@ -14,7 +14,7 @@ from sysid.errors import ConfigError, shortened
 from sysid.models.activations import PLAIN, Activation, check_activation
 from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit
-from sysid.models.lags import MOST, Lagged, Lags, LagSpec, parse_lags, whole
+from sysid.models.lags import MOST, Lagged, Lags, LagSpec, is_one_set, parse_lags, whole
 from sysid.models.mapping import Mapping
 from sysid.models.output_limits import Between, parse_limits, written
 from sysid.models.ranges import IntRange
@@ -173,12 +173,10 @@ class NARX(AbstractStructure):
 
 
 def _per_input(spec: LagSpec | Iterable[LagSpec]) -> tuple[tuple[int, ...], ...]:
-    if isinstance(spec, str) or not isinstance(spec, Iterable):
-        return (parse_lags(spec, first=0, where="input_delays"),)
-    entries = list(spec)
-    if entries and all(isinstance(entry, int) for entry in entries):
-        return (parse_lags(cast("list[int]", entries), first=0, where="input_delays"),)
-    return tuple(parse_lags(entry, first=0, where=f"input_delays, input {i + 1}") for i, entry in enumerate(entries))
+    if is_one_set(spec):
+        return (parse_lags(cast("LagSpec", spec), first=0, where="input_delays"),)
+    sets = cast("Iterable[LagSpec]", spec)
+    return tuple(parse_lags(entry, first=0, where=f"input_delays, input {i + 1}") for i, entry in enumerate(sets))
 
 
 def _short(lags: tuple[int, ...]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +10,13 @@ from sysid.errors import ConfigError
 from sysid.models.history import Start
 from sysid.models.lags import Lagged
 from sysid.models.mapping import Mapping
+from sysid.models.typed_fields import Switches
 
 if TYPE_CHECKING:
     pass
 
 
-class AbstractStructure(ABC):
+class AbstractStructure(Switches):
     """What is chosen before a fit: orders, delays, neurons. Frozen, keyword-only, free of data."""
 
     kind: str

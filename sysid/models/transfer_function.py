@@ -66,7 +66,11 @@ class TransferFunction(AbstractStructure):
         object.__setattr__(self, "poles", per_input(self.poles))
         object.__setattr__(self, "zeros", per_input(self.zeros))
         delays: object = self.delays
-        object.__setattr__(self, "delays", None if delays is None or delays == "auto" else per_input(delays))
+        object.__setattr__(
+            self,
+            "delays",
+            None if delays is None or delays == "auto" else per_input(delays),
+        )
         object.__setattr__(self, "domain", _domain(self.domain))
         known = self.delays or (0,) * len(self.poles)
         same = len(self.poles) == len(self.zeros) == len(known)

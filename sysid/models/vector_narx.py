@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from sysid.models.activations import PLAIN, Activation
 from sysid.models.base import SeveralOutputs
 from sysid.models.cascade_program import Limit
 from sysid.models.history import History
-from sysid.models.lags import Lags, LagSpec
+from sysid.models.lags import Lags, LagSpec, is_one_set
 from sysid.models.mapping import Mapping
 from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP, NARX
@@ -73,13 +73,14 @@ class VectorNARX(AbstractStructure):
         activation: str = PLAIN,
         limits: Any = None,
     ) -> None:
-        several = not isinstance(output_delays, (int, str)) and not all(isinstance(e, int) for e in output_delays)
-        sets = list(output_delays) if several and not isinstance(output_delays, int) else [output_delays]
+        sets: list[Any] = (
+            [output_delays] if is_one_set(output_delays) else [*cast("Iterable[LagSpec]", output_delays)] or [()]
+        )
         # Each set goes through the structure of one output, which checks it and the neurons.
         parts = [
             NARX(
                 input_delays=input_delays,
-                output_delays=one,  # type: ignore[arg-type]  # checked there
+                output_delays=one,
                 neurons=neurons,
                 feedthrough=feedthrough,
                 activation=activation,

@@ -111,7 +111,7 @@ def linear_start(
     Returns:
         The start.
     """
-    training = Training(starts=1, max_iterations=ITERATIONS, max_time_s=seconds, choose_by="evidence")
+    training = Training(starts=1, max_iterations=ITERATIONS, max_time_s=max(seconds, 0.0), choose_by="evidence")
     structure = NeuralStateSpace(states=states, neurons=0, output=output)
     fit = fit_neural_state_space(traces, mapping, structure, training, start=start, rest_output=rest_output)
     model = fit.model

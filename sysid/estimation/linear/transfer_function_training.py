@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from sysid.errors import ConfigError
 from sysid.models import Mapping
+from sysid.models.typed_fields import TypedFields
 
 
 @dataclass(frozen=True, kw_only=True)
-class TransferFunctionTraining:
+class TransferFunctionTraining(TypedFields):
     """How a transfer function is fitted.
 
     Args:

@@ -25,6 +25,7 @@ from sysid.estimation.networks.multistart import INITIAL_ALPHA
 from sysid.estimation.networks.training import FitProgress, check_choice
 from sysid.estimation.result import Evidence, Status
 from sysid.models import Cascade, cascade_from_dict
+from sysid.models.typed_fields import TypedFields
 from sysid.traces import Trace
 
 NEGLIGIBLE = 1e-6
@@ -33,7 +34,7 @@ a target that is exactly right on a trace, such as a channel held at its bound, 
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointTraining:
+class JointTraining(TypedFields):
     """How the members of a cascade are trained together, in free run of the whole.
 
     Args:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.result import Loop
+from sysid.models.typed_fields import TypedFields
 
 CHOICES = {
     "choose_by": ("selection", "evidence"),
@@ -42,8 +44,19 @@ def check_choice(name: str, value: object, choices: Sequence[str]) -> None:
         )
 
 
+def _check_listed(value: object, kind: Any, name: str, example: str) -> None:
+    if not isinstance(value, list | tuple) or not all(isinstance(one, kind) for one in value):
+        raise ConfigError(
+            f"not a list of {name}",
+            where=name,
+            expected=f"a list as {example}",
+            got=repr(value),
+            remedy=f"write for example {name}={example}",
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
-class Training:
+class Training(TypedFields):
     """How a network is trained.
 
     Args:
@@ -109,7 +122,10 @@ class Training:
     input_subsets: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
+        check_choice("loop", getattr(self.loop, "value", self.loop), tuple(one.value for one in Loop))
         object.__setattr__(self, "loop", Loop(self.loop))
+        _check_listed(self.offsets, dict, "offsets", '[{"u": 0.1}]')
+        _check_listed(self.input_subsets, list | tuple, "input_subsets", '[["u1"]]')
         object.__setattr__(self, "offsets", tuple(dict(offset) for offset in self.offsets))
         object.__setattr__(self, "input_subsets", tuple(tuple(names) for names in self.input_subsets))
         for name, choices in CHOICES.items():

@@ -20,6 +20,7 @@ from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run,
 from sysid.estimation.stability.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
 from sysid.models import ARX, AbstractModel, Mapping, Start, StartKind, beginning
 from sysid.models.lags import whole
+from sysid.models.typed_fields import TypedFields
 from sysid.traces import Trace
 
 STILL_S = 20.0
@@ -40,7 +41,7 @@ Vet = Callable[[AbstractModel], bool]
 
 
 @dataclass(frozen=True, kw_only=True)
-class StabilityOptions:
+class StabilityOptions(TypedFields):
     """Over which sequences a network's free run has to stay bounded and to settle; a linear model has its poles.
 
     Args:

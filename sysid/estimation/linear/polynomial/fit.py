@@ -30,6 +30,7 @@ from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import Mapping, Start
 from sysid.models.polynomial import AbstractPolynomial, PolynomialModel
+from sysid.models.typed_fields import TypedFields
 from sysid.traces import Trace
 
 SHORTEST = 4
@@ -44,7 +45,7 @@ NESTED, CANCELLED = 200_000, (0.0, 0.5, 0.9)
 
 
 @dataclass(frozen=True, kw_only=True)
-class PolynomialTraining:
+class PolynomialTraining(TypedFields):
     """How a polynomial model is fitted.
 
     Args:

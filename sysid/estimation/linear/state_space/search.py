@@ -34,6 +34,7 @@ from sysid.estimation.linear.subspace.yardstick import beyond_chance
 from sysid.estimation.result import Status
 from sysid.models import LinearStateSpace
 from sysid.models.innovations import Innovations
+from sysid.models.typed_fields import TypedFields
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ CHARTS = 6
 
 
 @dataclass(frozen=True, kw_only=True)
-class StateSpaceTraining:
+class StateSpaceTraining(TypedFields):
     """How a linear state space is fitted.
 
     Args:
