@@ -1,4 +1,4 @@
-"""Where the free runs of a report begin, and what of the records is not as it was declared."""
+"""Where the free runs of a report begin."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HOW = {
 
 
 def beginnings_section(results: Results) -> Section | None:
-    """How each free run begins, over which window its state was estimated, and which records are off.
+    """How each free run begins, and over which window its state was estimated.
 
     Args:
         results: Of the run.
@@ -32,31 +32,9 @@ def beginnings_section(results: Results) -> Section | None:
     if kind not in HOW:
         return None
     parts: list[Part] = [HOW[kind]]
-    warned = tuple((Cell(text=fit.name, header=True), Cell(text=text)) for fit in results.fits for text in fit.warnings)
-    if warned:
-        parts.append(
-            Table(caption="Records that do not begin as declared.", head=(("fit", ""), ("warning", "")), rows=warned)
-        )
     if any(case.begins_at for fit in results.fits for case in fit.cases.values()):
         parts.append(_windows(results))
     return Section(anchor="beginnings", title="How the free runs begin", parts=tuple(parts))
-
-
-def warning_points(results: Results) -> list[tuple[str, str]]:
-    """What of the warnings stands at the head of the report.
-
-    Args:
-        results: Of the run.
-
-    Returns:
-        One point, of the first fit that has any; none without.
-    """
-    warned = [fit for fit in results.fits if fit.warnings]
-    if not warned:
-        return []
-    more = sum(len(fit.warnings) for fit in warned) - 1
-    rest = f" {more} more under 'How the free runs begin'." if more else ""
-    return [("Warning", f"{warned[0].name}: {warned[0].warnings[0]}{rest}")]
 
 
 def _windows(results: Results) -> Table:

@@ -11,7 +11,7 @@ import numpy as np
 from sysid.names import output_side
 from sysid.reporting.advice_section import advice_section
 from sysid.reporting.amplitude import amplitude_section
-from sysid.reporting.beginnings import beginnings_section, warning_points
+from sysid.reporting.beginnings import beginnings_section
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.fit_tables import (
@@ -40,6 +40,7 @@ from sysid.reporting.sweep.section import sweep_points, sweep_sections
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
 from sysid.reporting.training_view import RELATIVE, error_unit, trained_models, training_parts, trust_sections
 from sysid.reporting.verdict import verdict
+from sysid.reporting.warnings_of_fits import warning_points, warnings_section
 from sysid.reporting.worst_instants import Instant, worst_instants
 from sysid.units import squared
 
@@ -64,8 +65,8 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         judged = scored_cases(best) or best.cases
         instants[best.name] = worst_instants({name: signals[best.slug][name] for name in judged}, 5)
     sections = [overview_section(results, signals), _accuracy(results, published)]
-    begun = beginnings_section(results)
-    sections += [*([] if begun is None else [begun]), *sweep_sections(folder, published)]
+    sections += [one for one in (warnings_section(results), beginnings_section(results)) if one is not None]
+    sections += [*sweep_sections(folder, published)]
     columns = _columns(results)
     for index, best in enumerate(results.best_fits):
         suffix = f"-{index + 1}" if index else ""

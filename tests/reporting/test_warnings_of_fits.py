@@ -1,0 +1,34 @@
+"""What the records say against a fit has a section of its own, and the chosen fit comes first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sysid.reporting import read_results
+from sysid.reporting.tables import Table
+from sysid.reporting.warnings_of_fits import warning_points, warnings_section
+
+PAIR = ("ARX", "NARX free run")
+
+
+def warned(document: dict[str, Any]) -> None:
+    document["fits"][0]["warnings"] = ["its free run is no better than a constant."]
+    document["fits"][1]["warnings"] = ["it has too little memory.", "one input stands still."]
+
+
+def test_warnings_of_the_chosen_fit_stand_first(make_run: Callable[..., Path], tmp_path: Path) -> None:
+    results = read_results(make_run(tmp_path / "run", samples=50, names=PAIR, edit=warned))
+    ((_, point),) = warning_points(results)
+    assert point == "NARX free run: it has too little memory. 2 more under 'What to look at'."
+    section = warnings_section(results)
+    assert section is not None and section.title == "What to look at"
+    (table,) = section.parts
+    assert isinstance(table, Table)
+    assert [row[0].text for row in table.rows] == ["NARX free run", "NARX free run", "ARX"]
+
+
+def test_without_warnings_there_is_neither(make_run: Callable[..., Path], tmp_path: Path) -> None:
+    results = read_results(make_run(tmp_path / "run", samples=50, names=PAIR))
+    assert warning_points(results) == [] and warnings_section(results) is None
