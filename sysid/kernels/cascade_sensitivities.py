@@ -31,8 +31,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import FREE, HIGH_CHANNEL, LOW_CHANNEL, gates_at
-from sysid.kernels.neurons.table import slopes
+from sysid.kernels.neurons.table import slopes_of_sums, slopes_of_values
 
+ONE = np.uintp(1)
+_u = np.uintp
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 
@@ -67,117 +69,111 @@ def rows_for(kept: NDArray[np.int64], n_parameters: int) -> Rows:
     return Rows(np.empty((total, n_parameters)), np.zeros(total, dtype=np.bool_), np.cumsum(size) - size, size - 1)
 
 
+# What is called for every sample takes flat arrays and where in them something begins, and calls nothing itself: to cut
+# a piece out of an array, or to hand it on, is to count who holds it, which took more than half of the time. Places are
+# unsigned: of others numba looks at the sign, each time, and no loop is vectorised.
+
+
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _add(row, factor, past, n):
+def _clear(J, first, end):
+    for i in range(first, end):
+        J[i] = 0.0
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _add(J, row, n, factor, other):
     for i in range(n):
-        row[i] += factor * past[i]
+        J[row + i] += factor * J[other + i]
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _add_four(row, f0, f1, f2, f3, p0, p1, p2, p3, n):
+def _add_two(J, row, n, f0, f1, p0, p1):
     for i in range(n):
-        row[i] += f0 * p0[i] + f1 * p1[i] + f2 * p2[i] + f3 * p3[i]
+        J[row + i] += f0 * J[p0 + i] + f1 * J[p1 + i]
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _gains(g, theta, readout, gates, n, n_x, x):
+def _add_four(J, row, n, f0, f1, f2, f3, p0, p1, p2, p3):
+    for i in range(n):
+        J[row + i] += f0 * J[p0 + i] + f1 * J[p1 + i] + f2 * J[p2 + i] + f3 * J[p3 + i]
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _gains(g, theta, readout, gated, gates, n, n_x, x):
     """What stands before each activation: the readout, and the gate of a member that has gates."""
     for k in range(n):
-        g[k] = theta[readout + k]
-        if gates >= 0:
+        total = theta[readout + k]
+        if gated:
             for i in range(n_x):
-                g[k] += theta[gates + k * n_x + i] * x[i]
+                total += theta[gates + k * n_x + i] * x[i]
+        g[k] = total
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _own(row, at, gates, j, n, n_x, n_y, linear, x, h, s, g):
+def _own(J, at, gated, gates, j, n, n_x, n_y, linear, x, h, s, g):
     """The part of a row that does not go through earlier samples; ``at`` is where the member's parameters stand."""
+    biases = at + n * n_x
+    readout = biases + n * (ONE + j)
+    constants = at + n * (n_x + ONE + n_y)
+    weights = constants + n_y + j * n_x
     for k in range(n):
         slope = g[k] * s[k]
         for i in range(n_x):
-            row[at + k * n_x + i] = slope * x[i]
-        row[at + n * n_x + k] = slope
-        row[at + n * (n_x + 1) + j * n + k] = h[k]
-    constants = at + n * (n_x + 1 + n_y)
-    row[constants + j] = 1.0
+            J[at + k * n_x + i] = slope * x[i]
+        J[biases + k] = slope
+        J[readout + k] = h[k]
+    J[constants + j] = 1.0
     if linear:
         for i in range(n_x):
-            row[constants + n_y + j * n_x + i] = x[i]
-    if gates >= 0:
+            J[weights + i] = x[i]
+    if gated:
         for k in range(n):
             for i in range(n_x):
-                row[gates + k * n_x + i] = h[k] * x[i]
+                J[gates + k * n_x + i] = h[k] * x[i]
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _factors(c, theta, first, gates, j, n, n_x, n_y, linear, h, s, g):
+def _factors(c, theta, first, gated, gates, j, n, n_x, n_y, linear, h, s, g):
     """Derivative of an output with respect to each regressor."""
-    weights = first + n * (n_x + 1 + n_y) + n_y + j * n_x
+    weights = first + n * (n_x + ONE + n_y) + n_y + j * n_x
     for i in range(n_x):
         c[i] = theta[weights + i] if linear else 0.0
     for k in range(n):
         slope = g[k] * s[k]
         for i in range(n_x):
             c[i] += slope * theta[first + k * n_x + i]
-        if gates >= 0:
+        if gated:
             for i in range(n_x):
                 c[i] += h[k] * theta[gates + k * n_x + i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _through_the_past(row, c, p, m, t, extent, source, rows, factors, others, reach):
-    """Add what earlier samples and upstream outputs pass on, four rows at a time; whether there was anything."""
-    found = 0
-    for i in range(p.regressor_first[m], p.regressor_first[m + 1]):
-        s, lag = source[i], p.regressor_lag[i]
-        # Samples before the first do not depend on the parameters.
-        if s < 0 or lag > t or extent[s] == 0:
-            continue
-        other = rows.first[s] + ((t - lag) & rows.mask[s])
-        if rows.moves[other]:
-            factors[found] = c[i - p.regressor_first[m]] * (p.output_scale[s] / p.regressor_scale[i])
-            others[found], reach[found] = other, extent[s]
-            found += 1
-    i = 0
-    while i < found:
-        if i + 4 <= found and reach[i] == reach[i + 1] == reach[i + 2] == reach[i + 3]:
-            _add_four(
-                row, factors[i], factors[i + 1], factors[i + 2], factors[i + 3],
-                rows.J[others[i]], rows.J[others[i + 1]], rows.J[others[i + 2]], rows.J[others[i + 3]], reach[i],
-            )  # fmt: skip
-            i += 4
-        else:
-            _add(row, factors[i], rows.J[others[i]], reach[i])
-            i += 1
-    return found > 0
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
-def _limit(p, o, code, t, rows, extent, row):
+def _limit(p, o, code, t, rows, extent, J, row):
     """Write the row of the channel that holds an output; whether it is more than zeros."""
     channel = p.limit_channel[o, 0 if code == LOW_CHANNEL else 1]
     for s in range(o):
         if p.output_channel[s] == channel:
             other = rows.first[s] + (t & rows.mask[s])
             if rows.moves[other]:
-                row[: extent[o]] = 0.0
-                _add(row, p.output_scale[s] / p.output_scale[o], rows.J[other], extent[s])
+                _clear(J, row, row + _u(extent[o]))
+                scale = p.output_scale[s] / p.output_scale[o]
+                _add(J, row, _u(extent[s]), scale, _u(other * rows.J.shape[1]))
                 return True
     return False
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent, source, rows):
+def sensitivities(p, past, first, n_rows, values, kept, held, own_first, extent, source, rows):
     """The Jacobians of all outputs at samples ``first`` to ``first + n_rows``, in their scaled numbers.
 
     A record is walked in blocks; what a block needs of the one before stands in ``rows``.
 
     Args:
         p: The members.
-        rest: As in the pass over the samples.
+        past: Rows of ``values`` before the first sample, at least the longest lag; no parameter moves them.
         first: First sample of the block.
         n_rows: Samples in the block.
-        values: As from the pass, shape ``(n_samples, n_channels)``.
+        values: As from the pass, shape ``(past + n_samples, n_channels)``.
         kept: As from the pass, shape ``(n_samples, n_neurons)``.
         held: As from the pass, shape ``(n_samples, n_outputs)``.
         own_first: Where each member's parameters stand in a row; -1 for a member that is not trained.
@@ -185,43 +181,76 @@ def sensitivities(p, rest, first, n_rows, values, kept, held, own_first, extent,
         source: Output that each regressor reads; -1 for an input of the whole.
         rows: Of each output the rows that are read again; written.
     """
-    members, width = len(p.neurons), 0
-    for m in range(members):
-        width = max(width, p.regressor_first[m + 1] - p.regressor_first[m])
+    widest = 0
+    for m in range(len(p.neurons)):
+        widest = max(widest, p.regressor_first[m + 1] - p.regressor_first[m])
     most = max(1, p.neurons.max())
-    x, c, g, s, sums = np.empty(width), np.empty(width), np.empty(most), np.empty(most), np.empty(most)
-    factors, others, reach = np.empty(width), np.empty(width, dtype=np.int64), np.empty(width, dtype=np.int64)
+    h, g, s, sums = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
+    x, c, factors = np.empty(widest), np.empty(widest), np.empty(widest)
+    others, reach = np.empty(widest, dtype=np.uintp), np.empty(widest, dtype=np.uintp)
+    J, length, moves, firsts, masks = rows.J.reshape(-1), rows.J.shape[1], rows.moves, rows.first, rows.mask
+    theta, lags, scales, regressor_scale = p.theta, p.regressor_lag, p.output_scale, p.regressor_scale
+    flat, wide = values.reshape(-1), values.shape[1]
+    back = (lags * wide - p.regressor_channel).view(np.uintp)
     for t in range(first, first + n_rows):
-        at_neuron = 0
-        for m in range(members):
-            n = p.neurons[m]
+        here, at_neuron = _u((past + t) * wide), 0
+        for m in range(len(p.neurons)):
+            n, at = p.neurons[m], p.theta_first[m]
             first_x, n_x = p.regressor_first[m], p.regressor_first[m + 1] - p.regressor_first[m]
             first_y, n_y = p.output_first[m], p.output_first[m + 1] - p.output_first[m]
-            h = kept[t, at_neuron : at_neuron + n]
+            for i in range(n):
+                h[i] = kept[t, at_neuron + i]
             at_neuron += n
             for i in range(n_x):
-                before, channel = t - p.regressor_lag[first_x + i], p.regressor_channel[first_x + i]
-                value = values[before, channel] if before >= 0 else rest[channel]
-                x[i] = (value - p.regressor_offset[first_x + i]) / p.regressor_scale[first_x + i]
-            slopes(p.kinds[m], p.theta, p.theta_first[m], n, x[:n_x], h, sums, s)
-            linear = p.theta_first[m + 1] - p.theta_first[m] > n * (n_x + 1 + n_y) + n_y
-            gates = gates_at(p.theta_first, m, n, n_x, n_y)
+                x[i] = (flat[here - back[first_x + i]] - p.regressor_offset[first_x + i]) / regressor_scale[first_x + i]
+            if not slopes_of_values(p.kinds[m], h, n, s):
+                slopes_of_sums(p.kinds[m], theta, at, n, x, n_x, sums, s)
+            size = p.theta_first[m + 1] - at
+            linear, gates = size > n * (n_x + 1 + n_y) + n_y, gates_at(p.theta_first, m, n, n_x, n_y)
+            gated, to_gates = gates >= 0, _u(max(gates - at, 0))
+            k, r, y = _u(n), _u(n_x), _u(n_y)
             for j in range(n_y):
                 o = first_y + j
-                at = rows.first[o] + (t & rows.mask[o])
-                row, code = rows.J[at], held[t, o]
-                rows.moves[at] = False
+                place = firsts[o] + (t & masks[o])
+                row, code = _u(place * length), held[t, o]
+                moves[place] = False
                 if code != FREE:
                     if code in (LOW_CHANNEL, HIGH_CHANNEL):
-                        rows.moves[at] = _limit(p, o, code, t, rows, extent, row)
+                        moves[place] = _limit(p, o, code, t, rows, extent, J, row)
                     continue
                 if extent[o] == 0:
                     continue
-                row[: extent[o]] = 0.0
-                _gains(g, p.theta, p.theta_first[m] + n * (n_x + 1) + j * n, gates, n, n_x, x)
+                _gains(g, theta, _u(at + n * (n_x + 1 + j)), gated, _u(at) + to_gates, k, r, x)
+                whole = own_first[m] >= 0 and n_y == 1  # its own part is written anew, number by number
+                _clear(J, row, row + _u(own_first[m] if whole else extent[o]))
                 if own_first[m] >= 0:
-                    own_gates = own_first[m] + gates - p.theta_first[m] if gates >= 0 else -1
-                    _own(row, own_first[m], own_gates, j, n, n_x, n_y, linear, x, h, s, g)
-                _factors(c, p.theta, p.theta_first[m], gates, j, n, n_x, n_y, linear, h, s, g)
-                passed = _through_the_past(row, c, p, m, t, extent, source, rows, factors, others, reach)
-                rows.moves[at] = own_first[m] >= 0 or passed
+                    own = row + _u(own_first[m])
+                    _own(J, own, gated, own + to_gates, _u(j), k, r, y, linear, x, h, s, g)
+                if whole:
+                    _clear(J, row + _u(own_first[m] + size), row + _u(extent[o]))
+                _factors(c, theta, _u(at), gated, _u(at) + to_gates, _u(j), k, r, y, linear, h, s, g)
+                found = 0
+                for i in range(first_x, first_x + n_x):
+                    of = source[i]
+                    if of < 0 or extent[of] == 0:
+                        continue
+                    other = firsts[of] + ((t - lags[i]) & masks[of])
+                    if moves[other]:
+                        factors[found] = c[i - first_x] * (scales[of] / regressor_scale[i])
+                        others[found], reach[found] = _u(other * length), _u(extent[of])
+                        found += 1
+                i = 0
+                while i < found:  # as many rows at a time as are equally long
+                    if i + 4 <= found and reach[i] == reach[i + 1] == reach[i + 2] == reach[i + 3]:
+                        _add_four(
+                            J, row, reach[i], factors[i], factors[i + 1], factors[i + 2], factors[i + 3],
+                            others[i], others[i + 1], others[i + 2], others[i + 3],
+                        )  # fmt: skip
+                        i += 4
+                    elif i + 2 <= found and reach[i] == reach[i + 1]:
+                        _add_two(J, row, reach[i], factors[i], factors[i + 1], others[i], others[i + 1])
+                        i += 2
+                    else:
+                        _add(J, row, reach[i], factors[i], others[i])
+                        i += 1
+                moves[place] = own_first[m] >= 0 or found > 0

@@ -47,7 +47,7 @@ from numba import njit
 
 from sysid.kernels.arrays import copy_numbers
 from sysid.kernels.neurons.neuron import FAST
-from sysid.kernels.neurons.table import activate, activate_with_slopes, slopes
+from sysid.kernels.neurons.table import activate, activate_with_slopes, slopes_of_sums, slopes_of_values
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
@@ -288,7 +288,8 @@ def sensitivities(
             x[n_in + i] = y[depth + past] if past >= window else measured[depth + past]
         if gated:
             _affine(V_columns, v, x, g)
-        slopes(kind, theta, 0, n_neurons, x, h[t], sums, slope)
+        if not slopes_of_values(kind, h[t], n_neurons, slope):
+            slopes_of_sums(kind, theta, 0, n_neurons, x, n_x, sums, slope)
         for k in range(n_neurons):
             z, behind = h[t, k], g[k] * slope[k]
             at = k * n_x

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from collections.abc import Mapping as Dict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,29 +26,31 @@ from sysid.models import Cascade, Member
 from sysid.traces import Trace
 
 _Found = TypeVar("_Found")
+_Rows = tuple[NDArray[Any], NDArray[np.float64]]
 
-BLOCK = 256
-"""Rows of each target's Jacobian that are alive at a time: 256 rows of 1,500 parameters for four outputs are 12 MB."""
+BLOCK, MOST = 256, 1024
+"""Rows of each target's Jacobian that are alive at a time at least, and at most: powers of two."""
 
+ALIVE = 256 * 1500 * 4
+"""Numbers of all targets' rows together up to which there are more than the least: 12 MB."""
 
 GATHERED = 1024
-"""Rows that are gathered before they are squared: adding a matrix of 1,500 by 1,500 costs as much as some 500 rows."""
+"""Rows at most that are gathered before they are squared, where there are fewer than parameters: adding a matrix of
+1,500 by 1,500 costs as much as some 500 rows."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Record:
-    """One trace: every channel in a first run, and its level at rest; the targets at the samples that count.
+    """One trace: every channel in a first run, after as many rows as the lags reach back; the targets where they count.
 
-    Inputs, and outputs of members that come before any trained one, keep the values of the first run. The first
-    ``past`` rows are measured and not run; where there are none, the levels stand before the first sample.
+    Inputs, and outputs of members that come before any trained one, keep the values of the first run. ``rows`` are
+    those of the samples that count, among the samples.
     """
 
     values: NDArray[np.float64]
-    levels: NDArray[np.float64]
     rows: NDArray[np.int64]
     target: NDArray[np.float64]
     root_weights: NDArray[np.float64] | None
-    past: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,14 +180,15 @@ class CascadeProvider(AbstractProvider):
         Returns:
             Shape ``(n_records x n_targets x n_counted_samples, n_parameters)``.
         """
-        program, found = self._trained.program_at(theta), []
+        program = self._trained.program_at(theta)
+        found: list[NDArray[np.float64]] = []
         for record in self._records:
             passed = self._pass(program, record, keep=True)
-            columns: list[list[NDArray[np.float64]]] = [[] for _ in self.errors]
-            for _, blocks in self._blocks(program, record, passed, len(theta)):
-                for column, block in zip(columns, blocks, strict=True):
-                    column.append(np.pad(block, ((0, 0), (0, len(theta) - block.shape[1]))))
-            found += [np.concatenate(column) for column in columns]
+            rows = np.zeros((len(self.errors), len(record.rows), len(theta)))
+            for own, blocks in self._blocks(program, record, passed, len(theta)):
+                for j, (moving, block) in enumerate(blocks):
+                    rows[j, own, : block.shape[1]][moving] = self._per_error(program)[j] * block
+            found += list(rows)
         return np.concatenate(found)
 
     def residuals(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -201,7 +204,7 @@ class CascadeProvider(AbstractProvider):
         found = []
         for record in self._records:
             values = self._pass(program, record, keep=False).values
-            found.append(((values[record.rows][:, self._columns] - record.target) / sizes).T.ravel())
+            found.append(((self._counted_values(record, values) - record.target) / sizes).T.ravel())
         return np.concatenate(found)
 
     @property
@@ -224,8 +227,7 @@ class CascadeProvider(AbstractProvider):
         rows = counted_rows(target / np.array(list(self.errors.values())), self.stride, self.moves)
         usable = trace.usable_samples[rows]
         return _Record(
-            values=run.values,
-            levels=cascade.levels(inputs[0], rest),
+            values=np.concatenate([np.tile(cascade.levels(inputs[0], rest), (self._trained.depth, 1)), run.values]),
             rows=rows,
             target=target[rows],
             root_weights=None if usable.all() else usable.astype(np.float64),
@@ -242,11 +244,9 @@ class CascadeProvider(AbstractProvider):
         usable = np.ones(len(rows), dtype=np.bool_) if experiment.usable is None else experiment.usable[rows]
         return _Record(
             values=values,
-            levels=values[0],
-            rows=rows + depth,
+            rows=rows,
             target=experiment.output[rows],
             root_weights=None if usable.all() else usable.astype(np.float64),
-            past=depth,
         )
 
     def _each(self, work: Callable[[_Record], _Found]) -> Iterator[_Found]:
@@ -262,23 +262,24 @@ class CascadeProvider(AbstractProvider):
             yield from pool.map(quietly, self._records)  # on which thread was first
 
     def _pass(self, program: Program, record: _Record, *, keep: bool) -> _Passed:
-        n = len(record.values)
+        depth = self._trained.depth
+        n = len(record.values) - depth
         passed = _Passed(
             record.values.copy(),
             np.empty((n, int(program.neurons.sum()))) if keep else np.empty((0, 0)),
             np.empty((n, len(program.output_channel)), dtype=np.int8),
         )
-        past = record.past
-        if past:
-            kernel.go_on(program, past, passed.values, passed.kept[past:], passed.held[past:])
-        else:
-            kernel.run(program, self._trained.depth, record.levels, passed.values, passed.kept, passed.held)
+        kernel.go_on(program, depth, passed.values, passed.kept, passed.held)
         return passed
+
+    def _counted_values(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The targets where they count, shape ``(n_counted, n_targets)``."""
+        return values[self._trained.depth + record.rows][:, self._columns]
 
     def _residual(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weighted residuals over their errors, shape ``(n_counted, n_targets)``."""
         sizes = np.array(list(self.errors.values()))
-        residual: NDArray[np.float64] = (values[record.rows][:, self._columns] - record.target) / sizes
+        residual: NDArray[np.float64] = (self._counted_values(record, values) - record.target) / sizes
         return residual if record.root_weights is None else residual * record.root_weights[:, None]
 
     def _normal_equations(
@@ -288,14 +289,17 @@ class CascadeProvider(AbstractProvider):
         residual = self._residual(record, passed.values)
         loss, weights = counted(residual, self.robust_scale, _counted(record))
         gradient, matrix = np.zeros(n), np.zeros((n, n))
-        waiting: list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]] = [[] for _ in self.errors]
-        gathered = 0
+        per_error, waiting = self._per_error(program), tuple[list[_Rows], ...]([] for _ in self.errors)
+        # The matrix is summed in the first target's measure: to multiply it is to go through memory once more.
+        measure, gathered = weights * per_error**2, 0
         for rows, blocks in self._blocks(program, record, passed, n):
-            roots = None if record.root_weights is None else record.root_weights[rows]
-            for j, (held, block) in enumerate(zip(waiting, blocks, strict=True)):
-                held.append(self._counting(block, residual[rows, j], roots))
             gathered += rows.stop - rows.start
-            if gathered < GATHERED and rows.stop < len(record.rows):
+            wait = gathered < min(GATHERED, n) and rows.stop < len(record.rows)
+            for j, (moving, block) in enumerate(blocks):
+                roots = None if record.root_weights is None else record.root_weights[rows][moving]
+                weighted, errors = self._counting(block, residual[rows, j][moving], roots, per_error[j])
+                waiting[j].append((weighted.copy() if wait else weighted, errors))
+            if wait:
                 continue
             gathered = 0
             for j, held in enumerate(waiting):
@@ -303,68 +307,91 @@ class CascadeProvider(AbstractProvider):
                     np.concatenate(some) if len(some) > 1 else some[0] for some in zip(*held, strict=True)
                 )
                 reach = weighted.shape[1]
-                gradient[:reach] += weights[j] * (weighted.T @ errors)
-                matrix[:reach, :reach] += weights[j] * (weighted.T @ weighted)
+                gradient[:reach] += measure[j] / per_error[j] * (weighted.T @ errors)
+                # NumPy sees that both factors are one array and calls syrk, half the flops of a general product; unlike
+                # SciPy's wrapper of it, it lets the other threads run meanwhile.
+                square = weighted.T @ weighted
+                if measure[j] != measure[0]:
+                    square *= measure[j] / measure[0]
+                matrix[:reach, :reach] += square
                 held.clear()
-        return loss, gradient, matrix, residual
+        return loss, gradient, measure[0] * matrix, residual
+
+    def _per_error(self, program: Program) -> NDArray[np.float64]:
+        """What a change of each target by one in its scaled numbers is over its error, shape ``(n_targets,)``."""
+        scales = [1.0 if output < 0 else program.output_scale[output] for output in self._outputs]
+        return np.array(scales) / list(self.errors.values())
 
     def _counting(
-        self, block: NDArray[np.float64], residual: NDArray[np.float64], roots: NDArray[np.float64] | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        self,
+        block: NDArray[np.float64],
+        residual: NDArray[np.float64],
+        roots: NDArray[np.float64] | None,
+        per_error: float,
+    ) -> _Rows:
         """Rows of a target's Jacobian as they count, and their residuals; what counts as it is is not copied.
 
         Args:
-            block: The rows, over their error, shape ``(n_rows, n_parameters)``.
+            block: The rows, in the target's scaled numbers, shape ``(n_rows, n_parameters)``.
             residual: Weighted residuals, shape ``(n_rows,)``.
             roots: Square roots of the samples' weights, shape ``(n_rows,)``; ``None`` where all count alike.
+            per_error: The target's scale over its error.
         """
         weighted = block if roots is None else block * roots[:, None]
-        moving = weighted.any(axis=1)  # a target that is held adds nothing
-        if not moving.all():
-            weighted, residual = weighted[moving], residual[moving]
         if np.isinf(self._longest):
             return weighted, residual
-        bounded = leverage_roots(weighted, self._longest)
+        bounded = leverage_roots(weighted, self._longest / per_error)
         return weighted * bounded[:, None], residual * bounded
 
     def _median_row(self) -> float:
         """Median length of the rows of the Jacobian that move, at the start."""
-        theta = self.theta
+        program, n = self._trained.program, len(self.theta)
+        per_error = self._per_error(program)
 
         def one(record: _Record) -> NDArray[np.float64]:
-            passed = self._pass(self._trained.program, record, keep=True)
-            blocks = self._blocks(self._trained.program, record, passed, len(theta))
-            return np.concatenate([np.linalg.norm(block, axis=1) for _, some in blocks for block in some])
+            blocks = self._blocks(program, record, self._pass(program, record, keep=True), n)
+            return np.concatenate(
+                [
+                    np.linalg.norm(block, axis=1) * per_error[j]
+                    for _, some in blocks
+                    for j, (_, block) in enumerate(some)
+                ]
+            )
 
         lengths = np.concatenate(list(self._each(one)))
         return float(np.median(lengths[lengths > 0.0])) if lengths.any() else 1.0
 
     def _blocks(
         self, program: Program, record: _Record, passed: _Passed, n: int
-    ) -> Iterator[tuple[slice, list[NDArray[np.float64]]]]:
-        """Block by block the counted rows of every target's Jacobian over its error, up to where they are zero."""
-        trained, samples = self._trained, len(record.values)
+    ) -> Iterator[tuple[slice, list[_Rows]]]:
+        """Block by block which counted rows of every target's Jacobian move, and these, in its scaled numbers.
+
+        They go up to where all are zero, and stand there until the next block.
+        """
+        trained, samples = self._trained, len(record.values) - self._trained.depth
         kept = 1 + trained.carry
-        kept[[output for output in self._outputs if output >= 0]] += BLOCK - 1
+        size = min(MOST, max(BLOCK, 1 << (ALIVE // max(1, n * len(self.errors))).bit_length() - 1))
+        kept[[output for output in self._outputs if output >= 0]] += size - 1
         room = rows_for(kept, n)
         at = 0
-        for first in range(record.past, samples, BLOCK):
-            rows = min(BLOCK, samples - first)
+        for first in range(0, samples, size):
+            rows = min(size, samples - first)
             sensitivities(
-                program, record.levels, first, rows, passed.values, passed.kept, passed.held,
+                program, trained.depth, first, rows, passed.values, passed.kept, passed.held,
                 trained.own_first, trained.extent, trained.source, room,
             )  # fmt: skip
             picked = record.rows[slice(*np.searchsorted(record.rows, (first, first + rows)))]
             blocks = []
-            for output, error in zip(self._outputs, self.errors.values(), strict=True):
+            for output in self._outputs:
                 if output < 0:
-                    blocks.append(np.zeros((len(picked), 0)))
+                    blocks.append((np.zeros(len(picked), dtype=np.bool_), np.zeros((0, 0))))
                     continue
                 places = room.first[output] + (picked & room.mask[output])
-                block = room.J[places, : trained.extent[output]]
-                block[~room.moves[places]] = 0.0
-                block *= program.output_scale[output] / error
-                blocks.append(block)
+                moving, reach = room.moves[places], trained.extent[output]
+                # A block stands in one piece: both its length and that of the room are powers of two.
+                whole = len(picked) == rows and moving.all()
+                own = slice(places[0], places[0] + rows) if whole else places[moving]
+                blocks.append((moving, room.J[own, :reach]))
             yield slice(at, at + len(picked)), blocks
             at += len(picked)
 

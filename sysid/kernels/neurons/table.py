@@ -50,24 +50,36 @@ def activate_with_slopes(kind, a, slope):
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
-def slopes(kind, theta, first, n, x, h, a, slope):
-    """Write the derivatives of neurons whose activations were kept: of tanh from these, of other kinds from the sums.
+def slopes_of_values(kind, h, n, slope):
+    """Write the derivatives of neurons by their values alone, and say whether this can be done: of tanh it can.
+
+    Args:
+        kind: Code of the kind.
+        h: Values of the neurons, from the first number on.
+        n: Number of neurons.
+        slope: Written, shape ``(n,)`` or more.
+    """
+    if kind != 0:
+        return False
+    for k in range(n):
+        slope[k] = 1.0 - h[k] * h[k]
+    return True
+
+
+@njit(cache=True, nogil=True, fastmath=FAST)
+def slopes_of_sums(kind, theta, first, n, x, n_x, a, slope):
+    """Write the derivatives of neurons of any kind by their sums, which are formed anew.
 
     Args:
         kind: Code of the kind.
         theta: Parameters; from ``first`` on the weights by neuron, then the constants.
         first: Where the neurons' parameters begin.
         n: Number of neurons.
-        x: Regressors.
-        h: Their activations, shape ``(n,)``.
+        x: Regressors, from the first number on.
+        n_x: How many.
         a: Room for the sums, shape ``(n,)`` or more.
         slope: Written, shape ``(n,)`` or more.
     """
-    if kind == 0:
-        for k in range(n):
-            slope[k] = 1.0 - h[k] * h[k]
-        return
-    n_x = len(x)
     for k in range(n):
         total = theta[first + n * n_x + k]
         for i in range(n_x):

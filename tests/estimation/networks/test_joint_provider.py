@@ -69,6 +69,13 @@ def test_an_output_held_by_a_channel_moves_with_it():
     check(provider(cascade))
 
 
+@pytest.fixture
+def short_blocks(monkeypatch):
+    """Blocks are as short as those of large wholes."""
+    monkeypatch.setattr("sysid.estimation.networks.joint_provider.MOST", BLOCK)
+
+
+@pytest.mark.usefixtures("short_blocks")
 def test_blocks_join_without_a_seam():
     one = provider(service(), n=2 * BLOCK + 57)
     theta, direction = one.theta, np.random.default_rng(4).standard_normal(len(one.theta))
@@ -79,6 +86,7 @@ def test_blocks_join_without_a_seam():
 
 @pytest.mark.parametrize(("stride", "moves"), [(1, np.inf), (3, np.inf), (7, np.inf), (7, 150.0)])
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.usefixtures("short_blocks")
 def test_normal_equations_equal_the_dense_ones(stride, moves, workers):
     cascade = service()
     usable = np.random.default_rng(5).random(BLOCK + 90) > 0.2

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sysid.errors import ConfigError
 from sysid.export.onnx_nodes import IR_VERSION, OPSET, Nodes
 from sysid.kernels.neurons import NEURONS, code_of
-from sysid.kernels.neurons.table import activate, activate_with_slopes, slopes
+from sysid.kernels.neurons.table import activate, activate_with_slopes, slopes_of_sums, slopes_of_values
 from sysid.models import NARX, NeuralStateSpace, VectorNARX
 
 SUMS = np.concatenate([[0.0, -0.0], np.linspace(-4.0, 4.0, 37), [1e-9, -25.0, 25.0]])
@@ -61,8 +61,12 @@ def test_slopes_are_found_again_from_what_was_kept(kind):
     W, b, x = rng.normal(size=(5, 3)), rng.normal(size=5), rng.normal(size=3)
     theta = np.concatenate([[9.0, 9.0], W.ravel(), b])
     a, slope = np.empty(7), np.empty(7)
-    slopes(code_of(kind), theta, 2, 5, x, NEURONS[kind].value(W @ x + b), a, slope)
+    slopes_of_sums(code_of(kind), theta, 2, 5, x, 3, a, slope)
     assert_allclose(slope[:5], NEURONS[kind].slope(W @ x + b), rtol=1e-13)
+    slope[:] = np.nan
+    found = slopes_of_values(code_of(kind), NEURONS[kind].value(W @ x + b), 5, slope)
+    assert_allclose(slope[:5], NEURONS[kind].slope(W @ x + b) if found else np.nan, rtol=1e-13)
+    assert found == (kind == "tanh")
 
 
 @kinds

@@ -1,0 +1,88 @@
+"""One network alone and as a cascade of one: free run, and residuals with their normal equations.
+
+    python -m tests.benchmarks engines
+
+Networks of two inputs with random weights over 20,000 samples. Medians of nine after one run that warms up, the two in
+turn; one BLAS thread, processor times.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from sysid.estimation.experiment import Experiment
+from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.estimation.networks.provider import RecursionProvider
+from sysid.models import NARX, Cascade, History, Mapping, NARXModel, Scaling, parameter_count
+from sysid.reporting.numbers import number
+from sysid.traces import Channel, Trace
+from tests.benchmarks._findings import found
+
+SAMPLES, REPEATS = 20_000, 9
+NETWORKS = (
+    NARX(input_delays=5, output_delays=3, neurons=0),
+    NARX(input_delays=2, output_delays=2, neurons=4),
+    NARX(input_delays=5, output_delays=3, neurons=12),
+    NARX(input_delays=5, output_delays=3, neurons=12, gated=True),
+    NARX(input_delays=10, output_delays=10, neurons=40),
+)
+
+
+def providers(network: NARX) -> tuple[RecursionProvider, CascadeProvider]:
+    """The residuals of one network over one record, both ways."""
+    rng, names = np.random.default_rng(0), ("u0", "u1")
+    model = NARXModel(
+        network=network,
+        theta=0.1
+        * rng.standard_normal(parameter_count(network.lags(2), network.neurons, linear=True, gated=network.gated)),
+        scaling=Scaling.identity(2),
+        mapping=Mapping.parse("u0+u1 -> y"),
+        sample_time=0.1,
+        input_units=("", ""),
+        output_unit="",
+        rest_output=0.0,
+    )
+    u, y = rng.uniform(-1.0, 1.0, (SAMPLES, 2)), rng.uniform(-1.0, 1.0, SAMPLES)
+    record = Experiment(inputs=u, output=y, history=History.at_rest(inputs=list(u[0]), output=0.0))
+    channels = tuple(Channel(name=name, unit="") for name in (*names, "y"))
+    trace = Trace(name="record", sample_time=0.1, channels=channels, values=np.column_stack([u, y]))
+    return (
+        RecursionProvider(template=model.recursion, experiments=(record,), closed=True),
+        CascadeProvider(cascade=Cascade(models=(model,)), traces=(trace,), errors={"y": 1.0}),
+    )
+
+
+def medians(calls: list[Callable[[], object]]) -> list[float]:
+    """Processor times of some calls in turn, in milliseconds."""
+    took: list[list[float]] = [[] for _ in calls]
+    for _ in range(1 + REPEATS):
+        for call, times in zip(calls, took, strict=True):
+            began = time.process_time()
+            call()
+            times.append(1e3 * (time.process_time() - began))
+    return [statistics.median(times[1:]) for times in took]
+
+
+def main() -> None:
+    """Every network, both ways."""
+    for network in NETWORKS:
+        alone, whole = providers(network)
+        theta = whole.theta
+        np.testing.assert_allclose(whole.linearise(theta).gradient, alone.linearise(theta).gradient, rtol=1e-6)
+        loss, linearise = (
+            medians([partial(getattr(one, name), theta) for one in (alone, whole)]) for name in ("loss", "linearise")
+        )
+        for what, (one, other) in (("free run", loss), ("normal equations", linearise)):
+            label = f"{network.label}, {len(theta)} parameters: {what}, alone over as a cascade of one"
+            found(label, one / other, "x", note=f"{number(one)} and {number(other)} ms")
+
+
+if __name__ == "__main__":
+    with threadpool_limits(1, "blas"):
+        main()
