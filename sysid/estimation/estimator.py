@@ -197,7 +197,7 @@ class Estimator:
             """The fit with what its records say of how they begin, before what its check says."""
             found = self.fit(*args, **named)
             found = self.with_posterior(found, traces, named["start"], given.get("selection", ()))
-            told = () if found.posterior is not None else (f"No interval of the output: {self.no_posterior}.",)
+            told = () if found.posterior is not None else (f"No interval of the output: {self._unsure(options)}.",)
             off = equilibrium_notes(found.model, traces, named["start"])
             against = contradicted(found.model, traces, named["start"], options)
             few = (*outnumbered(found.model, traces), *underexcited(found.model, traces))
@@ -207,6 +207,11 @@ class Estimator:
 
         with one_blas_thread():
             return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
+
+    def _unsure(self, options: Any) -> str:
+        """Why a fit has no posterior."""
+        given = getattr(options, "regularisation", None)
+        return self.no_posterior if given is None else f"regularisation: {given:g} was given, not found by the evidence"
 
     def with_posterior(
         self, fit: FitResult, traces: Sequence[Trace], start: Start, selection: Sequence[Trace]

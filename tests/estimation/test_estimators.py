@@ -74,3 +74,11 @@ def test_an_initial_fit_at_another_sample_time_is_refused() -> None:
     first = fit([replace(trace(), sample_time=1.0)], MAPPING, ORDERS)
     with pytest.raises(ConfigError, match="the initial fit has another sample time"):
         fit([trace()], MAPPING, NETWORK, Training(max_iterations=1), initial=first)
+
+
+def test_a_fit_without_intervals_says_which_reason_it_has() -> None:
+    short = fit([trace()], MAPPING, NETWORK, Training(max_iterations=2))
+    given = fit([trace()], MAPPING, NETWORK, Training(max_iterations=2, regularisation=0.1))
+    reasons = [[note for note in found.notes if note.startswith("No interval")] for found in (short, given)]
+    assert "training ended before there was evidence" in reasons[0][0]
+    assert reasons[1] == ["No interval of the output: regularisation: 0.1 was given, not found by the evidence."]
