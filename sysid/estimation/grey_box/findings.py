@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -36,6 +37,9 @@ NORMAL = 1.959964
 UNLIKE = 0.2
 """Share of half an interval by which the end of another may differ and not be told."""
 
+WITHIN = re.compile(r"_at?\d")
+"""Names, in equations that nobody wrote, of what lies within the range of its signal: breakpoints, and poles."""
+
 EVIDENCE_STEPS = 3
 """Steps of the evidence of a fit that ended before its first."""
 
@@ -67,7 +71,8 @@ class Findings:
         named: Those that were estimated, those by case once for each case.
         values: In their units.
         covariance: In their units; NaN of those that the records leave open.
-        bound: Of each the bound at which it stands; an empty text for none.
+        bound: Of each the bound at which it stands, or ``scale`` where it is held as a scale that no record can tell;
+            an empty text for none.
         profiles: Of each, where somebody asked for them.
     """
 
@@ -78,13 +83,17 @@ class Findings:
     profiles: Sequence[Profile] = ()
 
     @classmethod
-    def of(cls, solution: Solution, provider: EquationProvider, named: tuple[Named, ...]) -> Findings:
+    def of(
+        cls, solution: Solution, provider: EquationProvider, named: tuple[Named, ...], *, built: bool = False
+    ) -> Findings:
         """What a solution says.
 
         Args:
             solution: Where the fit ended, with its evidence.
             provider: The records.
             named: Those that were estimated.
+            built: Whether nobody wrote the equations: what has a prior there is a scale between blocks that no record
+                can tell, by construction. The others are told for that scale.
 
         Returns:
             The findings. A parameter at a bound is taken to be there for the others' sake, and has no interval.
@@ -93,6 +102,7 @@ class Findings:
         low, high = (side[places] for side in provider.bounds)
         theta, scale = solution.theta[places], provider.scale[places]
         at = ["low" if t <= a else "high" if t >= b else "" for t, a, b in zip(theta, low, high, strict=True)]
+        at = ["scale" if built and one.parameter.prior is not None else s for one, s in zip(named, at, strict=True)]
         held = np.zeros(len(solution.theta), dtype=np.bool_)
         held[places] = [bool(side) for side in at]
         H = prior.beta * solution.at.gauss_newton + np.diag(prior.precision)
@@ -178,7 +188,11 @@ class Findings:
     @property
     def more_than_shown(self) -> tuple[str, ...]:
         """Of equations that nobody wrote, whose parameters nobody can fix: that they hold more than records show."""
-        left, n = self.open, len(self.named)
+        # Breakpoints and coefficients of poles are of the order of 1: one that may be anything there is not known.
+        wide = np.sqrt(np.diag(self.covariance)) > np.maximum(1.0, np.abs(self.values))
+        wide &= [WITHIN.search(one.name) is not None for one in self.named]
+        open_, n = self.open, len(self.named)
+        left = [one.name for one, far in zip(self.named, wide, strict=True) if far or one.name in open_]
         if not left:
             return ()
         names = ", ".join(left[:MOST_NAMES]) + (", ..." if len(left) > MOST_NAMES else "")

@@ -391,7 +391,8 @@ def _told(
     """The result with what is known of its parameters, and what was chosen on the way."""
     model, solution = done.model, done.candidate.solution
     posterior = _posterior(done, *data)
-    findings = Findings.of(solution, done.provider, named)
+    built = isinstance(model, BuiltModel)
+    findings = Findings.of(solution, done.provider, named, built=built)
     notes = []
     if model.grey.intervals == PROFILE and solution.status is Status.CONVERGED:
         try:
@@ -413,7 +414,6 @@ def _told(
             f"the squared error of the exact form is {done.softened:.3g} times that of the soft one."
         )
     notes += findings.profiled
-    built = isinstance(model, BuiltModel)
     warnings = list(findings.more_than_shown if built else findings.warnings)
     if model.lowered.n_continuous and not done.stepping.enough:
         warnings.append(step_warning(model, done.stepping))

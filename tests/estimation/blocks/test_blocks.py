@@ -122,6 +122,20 @@ def test_poles_are_parted_around_the_curve() -> None:
     assert [found["g1_a1_1"], found["g1_a1_2"], found["g2_a1_1"]] == pytest.approx([*POLES[1:], 0.5], abs=1e-3)
 
 
+def test_a_scale_that_no_record_can_tell_is_no_fault_of_the_record() -> None:
+    """How large what lies between two blocks is has no meaning: all gains were told as open, twice as wide as large."""
+    y = sandwich(u := steps(5)) + 1e-3 * np.random.default_rng(1).standard_normal(400)
+    structure = WienerHammerstein(first=2, second=1, curve="polynomial 3")
+    fit = fit_wiener_hammerstein([a_trace(u, y)], MAPPING, structure, Training(starts=1, max_iterations=60))
+    assert not [note for note in fit.notes if "do not tell" in note]
+    known = fit.uncertainty
+    assert known is not None
+    width = known.standard_deviations / np.abs(known.values)
+    held = [name for name, one in zip(known.names, width, strict=True) if np.isnan(one)]
+    assert [name[:4] for name in held] == ["g1_b"]
+    assert width[known.names.index("f_c3")] < 0.2
+
+
 def test_a_model_is_stored_and_read_again() -> None:
     u = steps(1)
     structure = HammersteinWiener(states=2, input="network 2")
