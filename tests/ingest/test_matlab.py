@@ -49,6 +49,17 @@ def test_a_matlab_object_is_refused_with_the_line_that_exports_it(
         read_table(tmp_path / "run.mat")
 
 
+@pytest.mark.parametrize("wrapped", [True, False], ids=["in a structure", "as variables"])
+def test_names_and_units_that_stand_beside_u_and_y_are_theirs(tmp_path: Path, *, wrapped: bool) -> None:
+    about = {"InputName": "voltage", "OutputName": cells("speed"), "InputUnit": "V", "OutputUnit": "rad/s"}
+    fields: dict[str, Any] = {"u": VOLT[None, :], "y": PIPE, "Ts": 0.1, **about}
+    mat("5", **({"exp1": fields} if wrapped else fields))(tmp_path / "run.mat")
+    table = read_table(tmp_path / "run.mat")
+    assert [(column.name, column.unit) for column in table.columns] == [("voltage", "V"), ("speed", "rad/s")]
+    assert table.step == 0.1
+    np.testing.assert_array_equal(table.find("voltage").values, VOLT)
+
+
 def test_a_matlab_object_beside_plain_arrays_does_no_harm_until_it_is_asked_for(tmp_path: Path) -> None:
     import h5py
 

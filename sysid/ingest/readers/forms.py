@@ -16,6 +16,8 @@ _SECONDS = {
     "days": 86400.0, "weeks": 604800.0, "months": 2629746.0, "years": 31556952.0,
 }  # fmt: skip
 
+_NAMED = {"InputName", "OutputName", "InputUnit", "OutputUnit"}
+
 
 def understood(node: Any) -> Any:
     """A tree with the structures that are known replaced by their columns.
@@ -107,6 +109,16 @@ def _rows(data: Any) -> int:
     )
 
 
+def _is_plain_iddata(node: Mapping[str, Any]) -> bool:
+    return leaf_of(node.get("y")) is not None and not _NAMED.isdisjoint(node)
+
+
+def _plain_iddata(node: Mapping[str, Any]) -> Any:
+    """A structure with the fields that ``iddata`` goes by for short: ``u``, ``y``, ``Ts`` with names and units."""
+    stamps = node.get("SamplingInstants", node.get("t", node.get("time")))
+    return _iddata({**node, "InputData": node.get("u"), "OutputData": node["y"], "SamplingInstants": stamps})
+
+
 def _is_timeseries(node: Mapping[str, Any]) -> bool:
     return leaf_of(node.get("Time")) is not None and leaf_of(node.get("Data")) is not None
 
@@ -145,6 +157,7 @@ def _structure_with_time(node: Mapping[str, Any]) -> Any:
 
 _FORMS: tuple[tuple[Callable[[Mapping[str, Any]], bool], Callable[[Mapping[str, Any]], Any]], ...] = (
     (_is_iddata, _iddata),
+    (_is_plain_iddata, _plain_iddata),
     (_is_timeseries, _timeseries),
     (_is_structure_with_time, _structure_with_time),
 )
