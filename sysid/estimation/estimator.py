@@ -201,8 +201,9 @@ class Estimator:
             off = equilibrium_notes(found.model, traces, named["start"])
             against = contradicted(found.model, traces, named["start"], options)
             few = (*outnumbered(found.model, traces), *underexcited(found.model, traces))
-            warned = (*undetermined(traces, mapping), *few, *against, *off)
-            told = (*told, *between_levels(found.model, traces))
+            switches, levels = between_levels(found.model, traces)
+            warned = (*undetermined(traces, mapping), *few, *against, *off, *levels)
+            told = (*told, *switches)
             return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
 
         with one_blas_thread():

@@ -139,7 +139,7 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
     return tuple(told)
 
 
-def between_levels(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...]:
+def between_levels(model: AbstractModel, traces: Sequence[Trace]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Which inputs take so few values that what a model makes of all others is not learnt.
 
     Args:
@@ -147,17 +147,19 @@ def between_levels(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, 
         traces: The records that were fitted.
 
     Returns:
-        One sentence for each such input: no fault, where it is never at others.
+        One sentence for each such input: first of switches, which are 0 or 1 and never at others, then of the others,
+        which may well be.
     """
     if not model.structure.learns_curves:
-        return ()
-    told = []
+        return (), ()
+    switches, others = list[str](), list[str]()
     for name in model.mapping.inputs:
         levels = np.unique(np.concatenate([trace[name][trace.usable_samples] for trace in traces]))
         if 1 < len(levels) <= LEVELS:
             at = ", ".join(f"{value:.6g}" for value in levels)
-            told.append(f"{name} is only ever {at} in these records: what the model makes of other values is a guess.")
-    return tuple(told)
+            told = f"{name} is only ever {at} in these records: what the model makes of other values is a guess."
+            (switches if {*levels.tolist()} == {0.0, 1.0} else others).append(told)
+    return tuple(switches), tuple(others)
 
 
 def contradicted(

@@ -285,10 +285,21 @@ def test_a_structure_that_learns_curves_is_told_what_one_sine_and_two_levels_lea
         mapping=Mapping(inputs=("u",), outputs=("y",)), structure=structure, ratios={}
     )  # what is asked is of structure and records alone
     told = {}
-    for name, u in {"sine": np.sin(0.1 * np.arange(N)), "steps": np.sign(_u()), "random": _u()}.items():
+    sine, steps = np.sin(0.1 * np.arange(N)), np.sign(_u())
+    for name, u in {"sine": sine, "steps": steps, "switch": np.maximum(steps, 0.0), "random": _u()}.items():
         traces = list(sysid.data((u, _y(u, dead=1)), sample_time=1.0))
-        told[name] = (len(underexcited(model, traces)), len(between_levels(model, traces)))
-    assert told == {"sine": (1, 0), "steps": (0, 1), "random": (0, 0)}
+        switches, levels = between_levels(model, traces)
+        told[name] = (len(underexcited(model, traces)), len(levels), len(switches))
+    assert told == {"sine": (1, 0, 0), "steps": (0, 1, 0), "switch": (0, 0, 1), "random": (0, 0, 0)}
+
+
+def test_a_network_of_two_levels_has_a_warning_and_one_of_a_switch_a_note() -> None:
+    warned = []
+    for u in (np.sign(_u()), np.maximum(np.sign(_u()), 0.0)):
+        traces = sysid.data((u, _noisy(_y(u, dead=1))), sample_time=1.0)
+        fit = sysid.fit(traces, "u -> y", CURVED[0], sysid.Training(max_iterations=2))
+        warned.append([any("is only ever" in one for one in told) for told in (fit.warnings, fit.notes)])
+    assert warned == [[True, True], [False, True]]
 
 
 def test_equations_are_not_told_of_curves() -> None:
@@ -296,7 +307,7 @@ def test_equations_are_not_told_of_curves() -> None:
     grey = sysid.GreyBox(equations="dx/dt = (u - x)/tau; y = x", parameters={"tau": 5.0})
     traces = list(sysid.data((u, _y(u, dead=1)), sample_time=1.0))
     model = SimpleNamespace(mapping=Mapping(inputs=("u",), outputs=("y",)), structure=grey, ratios={})
-    assert (underexcited(model, traces), between_levels(model, traces)) == ((), ())
+    assert (underexcited(model, traces), between_levels(model, traces)) == ((), ((), ()))
 
 
 def test_inputs_of_several_outputs_are_looked_at_once() -> None:

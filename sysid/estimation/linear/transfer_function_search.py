@@ -25,7 +25,7 @@ from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_runs import EXACT, Candidate, End, Watch, long_run, short_run, tried
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.transfer_function_uncertainty import transfer_function_uncertainty
-from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_stability, of_starts
+from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_speed, of_stability, of_starts
 from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
 from sysid.estimation.result import FitResult, Loop
 from sysid.estimation.uncertainty import Uncertainty
@@ -185,6 +185,7 @@ class AbstractProblem(ABC):
             raise FitDivergedError("no start gives a finite free run", remedy="lower the number of poles")
         end, unit = reached.end, self.scaling.output_scale**2
         model, uncertainty = reached.problem._model(end)
+        fast = of_speed(model)
         return FitResult(
             model=model,
             status=end.status,
@@ -203,7 +204,9 @@ class AbstractProblem(ABC):
                 *end.notes,
                 *self.told(end),
                 of_stability(model),
+                *fast,
             ),
+            warnings=fast,
         )
 
     def _reached(

@@ -16,6 +16,9 @@ AT_EDGE = (
     "these records cannot tell."
 )
 
+TOO_FAST = 10.0
+"""How many times faster than half of the sampling rate a pole is that no record shows: it settles within a sample."""
+
 
 def of_starts(candidates: Sequence[Candidate], best: Candidate, unit: float) -> tuple[str, ...]:
     """How the starts compare.
@@ -48,7 +51,7 @@ def of_stability(model: TransferFunctionModel) -> str:
     poles = np.concatenate([model.poles(j) for j in range(len(model.sections))])
     discrete = model.orders.domain is Domain.DISCRETE
     away = np.abs(poles) - 1.0 if discrete else poles.real
-    edge = slow_poles.INTEGRATES * (1.0 if discrete else float(np.abs(poles).max(initial=0.0)) or 1.0)
+    edge = slow_poles.INTEGRATES * (1.0 if discrete else 1.0 / model.sample_time)
     at_edge = int(np.count_nonzero(np.abs(away) <= edge))
     if at_edge and float(away.max()) <= edge:
         word = {1: "an integrator", 2: "a double integrator"}.get(at_edge, f"{at_edge} poles at the edge")
@@ -59,4 +62,28 @@ def of_stability(model: TransferFunctionModel) -> str:
     return (
         f"The transfer function is not stable: the pole {complex(largest):.6g} lies outside; its free run grows "
         "without bound, and it is of use in a loop only."
+    )
+
+
+def of_speed(model: TransferFunctionModel) -> tuple[str, ...]:
+    """Which poles of a continuous model are so fast that records with these samples cannot hold them.
+
+    Args:
+        model: The model.
+
+    Returns:
+        One sentence where there are some.
+    """
+    if model.orders.domain is Domain.DISCRETE:
+        return ()
+    poles = np.concatenate([model.poles(j) for j in range(len(model.sections))])
+    nyquist = np.pi / model.sample_time
+    fast = poles[np.abs(poles) > TOO_FAST * nyquist]
+    if not len(fast):
+        return ()
+    fastest = complex(fast[int(np.argmax(np.abs(fast)))])
+    shown = f"{fastest.real:.4g}" if not fastest.imag else f"{fastest:.4g}"
+    return (
+        f"The pole {shown} rad/s is far faster than these records tell (half of their sampling rate is {nyquist:.4g} "
+        "rad/s), and no coefficient is known. Fit a pole less.",
     )
