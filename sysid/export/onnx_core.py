@@ -1,6 +1,7 @@
 """One step of a whole as ONNX nodes, channels along the first axis and cars along the last: few nodes, each wide.
 
-Measured on onnxruntime, a node of this size takes 0.3 to 0.8 us whatever it computes.
+Measured on onnxruntime, a node of this size takes 0.3 to 0.8 us whatever it computes: of the loop of a large cascade
+three quarters of the time (``python -m tests.benchmarks export_cascades``).
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from sysid.export.onnx_nodes import Nodes
 from sysid.export.onnx_products import exact_parts, over, parts_of, product, row_by_row
 from sysid.export.wide_blocks import Block, OwnLimit
 from sysid.export.wide_form import Group, WideForm, columns_of, readings_of
+
+PRODUCT = 2000
+"""Numbers of a table, mostly zeros, up to which one product is quicker than taking rows, scaling and shifting them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +54,7 @@ def step_core(
     *,
     moves: bool = True,
     laid: str = "",
+    moved: str = "",
     ring: tuple[str, str] | None = None,
 ) -> Step:
     """Add the nodes of one step.
@@ -61,17 +66,18 @@ def step_core(
         memory: Shape ``(n_memory, batch)``.
         moves: Whether lines are moved on; else the memory that is given has the newest number of each alone.
         laid: What is laid before the first group, if it is known.
+        moved: The lines moved on by a row, with any numbers for the newest ones, if they are known.
         ring: Where in the memory the past is read and the newest numbers are written, where lines are not moved.
 
     Returns:
         The names.
     """
-    pasts = _pasts(nodes, form, memory, ring)
+    pasts = _pasts(nodes, form, memory, ring, first=1 if laid else 0)
     made: list[_Made] = []
     for g, group in enumerate(form.groups):
         part = nodes.within(f"{nodes.prefix}group{g}_")
         _, inputs, rows = readings_of(form, group)
-        pieces = [pasts[g]] if group.past else []
+        pieces = [pasts[g]] if g in pasts else []
         if inputs:
             whole = inputs == [*range(len(form.inputs))]
             pieces.append(x if whole else part.add("Gather", [x, part.integers(inputs)], "inputs", axis=0))
@@ -85,7 +91,7 @@ def step_core(
         make = _equations if group.computes else _group
         made.append(make(part, form, group, pieces, memory))
     raw = join(nodes, [one.raw for one in made], "raw")
-    following = _memory(nodes, form, memory, made, moves=moves, ring=ring)
+    following = _memory(nodes, form, memory, made, moves=moves, moved=moved, ring=ring)
     if raw == following and moves:  # a loop mixes up what is two of its outputs
         raw = nodes.add("Identity", [raw], "raw_rows")
     return Step(raw=raw, memory=following)
@@ -101,9 +107,11 @@ def past_rows(form: WideForm) -> dict[int, list[int]]:
     return {g: readings_of(form, group)[0] for g, group in enumerate(form.groups) if group.past}
 
 
-def _pasts(nodes: Nodes, form: WideForm, memory: str, ring: tuple[str, str] | None) -> dict[int, str]:
-    """What each group reads of the memory: all of it in one gather, then cut."""
-    rows = past_rows(form)
+def _pasts(
+    nodes: Nodes, form: WideForm, memory: str, ring: tuple[str, str] | None, *, first: int = 0
+) -> dict[int, str]:
+    """What each group from the first on reads of the memory: all of it in one gather, then cut."""
+    rows = {g: own for g, own in past_rows(form).items() if g >= first}
     whole = [row for own in rows.values() for row in own]
     if not whole:
         return {}
@@ -320,6 +328,7 @@ def _memory(
     made: Sequence[_Made],
     *,
     moves: bool,
+    moved: str,
     ring: tuple[str, str] | None,
 ) -> str:
     """What the next step begins with: lines moved on by a sample, states, and what rounding took."""
@@ -333,7 +342,7 @@ def _memory(
         newest = _newest(nodes, form, held, row, sum(counts))
         if ring:
             return nodes.add("ScatterND", [memory, ring[1], newest], "memory_after")
-        pieces, scatter = _moved(nodes, form, memory, newest) if moves else ([newest], [])
+        pieces, scatter = _moved(nodes, form, memory, newest, moved) if moves else ([newest], [])
     states = [int(starts[g]) + at for g, at in _states(form)]
     if states:
         pieces.append(nodes.add("Gather", [held, nodes.integers(states)], "states_after", axis=0))
@@ -348,17 +357,19 @@ def _memory(
     return following
 
 
-def _moved(nodes: Nodes, form: WideForm, memory: str, newest: str) -> tuple[list[str], list[int]]:
+def _moved(nodes: Nodes, form: WideForm, memory: str, newest: str, moved: str) -> tuple[list[str], list[int]]:
     """All lines moved on by one slice; and the rows that their newest numbers have to be put into after that."""
     shifted = sum(line.length for line in form.lines)
     if shifted == len(form.lines):
         return [newest], []
+    firsts = [int(at) for at in np.cumsum([0, *(line.length for line in form.lines)])[:-1]]
+    if moved and len(form.lines) > 1:
+        return [moved], firsts
     older = nodes.add("Slice", [memory, *(nodes.integers([at]) for at in (0, shifted - 1, 0))], "older")
     if len(form.lines) == 1:
         return [newest, older], []
     first = nodes.add("Slice", [newest, *(nodes.integers([at]) for at in (0, 1, 0))], "newest_first")
-    firsts = np.cumsum([0, *(line.length for line in form.lines)])[:-1]
-    return [first, older], [int(at) for at in firsts]
+    return [first, older], firsts
 
 
 def _states(form: WideForm) -> list[tuple[int, int]]:
@@ -372,7 +383,7 @@ def _newest(nodes: Nodes, form: WideForm, held: str, row: dict[int, int], count:
     plain = all((line.slope, line.shift) == (1.0, 0.0) for line in lines)
     if plain and rows == [*range(count)]:
         return held
-    if plain or form.exact:
+    if plain or form.exact or len(lines) * count > PRODUCT:
         newest = nodes.add("Gather", [held, nodes.integers(rows)], "newest", axis=0)
         if plain:
             return newest

@@ -109,18 +109,16 @@ class Units:
     Args:
         outputs: What comes out.
         raw: Rows of all groups, before declared limits.
-        at_limit: Rows that are at a declared limit that is told; ``""`` for none.
+        at_limit: Rows that are at a declared limit, and what each raises: nothing, where it is not told.
         at_bound: Rows that are held at a bound of the model itself, by side or both in one.
-        limit_flags: What each row that is told raises.
         counts: Numbers of rows of raw, and of those at a bound.
         alone: Of one output that no declared limit holds: its scaled number, and their offset and scale.
     """
 
     outputs: str
     raw: str
-    at_limit: str
+    at_limit: tuple[tuple[str, tuple[Flag | None, ...]], ...]
     at_bound: tuple[str, ...]
-    limit_flags: tuple[Flag, ...]
     counts: tuple[int, int]
     alone: tuple[str, float, float] | None
 
@@ -196,7 +194,7 @@ def in_units(nodes: Nodes, form: WideForm, raw: str, u: str) -> Units:
     limits = _Limits(nodes, rows, u, n, values)
     order = [*rows]
     outputs = limits.values([order.index(column - n) for column in form.surrogate.columns], "outputs")
-    at_limit = limits.reached([i for i, row in enumerate(rows.values()) if row.told], "told")
+    at_limit = limits.raised({i: row.limit_flag for i, row in enumerate(rows.values()) if row.told})
     bounded = [i for i, row in enumerate(rows.values()) if row.bounded]
     at_bound: tuple[str, ...] = ()
     if bounded:
@@ -206,7 +204,6 @@ def in_units(nodes: Nodes, form: WideForm, raw: str, u: str) -> Units:
         if at_limits:
             either = at_bound[0] if len(at_bound) == 1 else nodes.add("Or", at_bound, "at_either_bound")
             at_bound = (nodes.add("And", [either, nodes.add("Not", [at_limits], "free")], "at_bound"),)
-    flags = tuple(row.limit_flag for row in rows.values() if row.told)
     count = int(starts[-1])
     if any(group.computes for group in form.groups):  # a state may be lost a sample before it is read
         own = [int(starts[g]) + at for g, group in enumerate(form.groups) for at in range(group.n_outputs)]
@@ -220,7 +217,6 @@ def in_units(nodes: Nodes, form: WideForm, raw: str, u: str) -> Units:
         raw=raw,
         at_limit=at_limit,
         at_bound=at_bound,
-        limit_flags=flags,
         counts=(count, len(bounded)),
         alone=alone,
     )
@@ -282,6 +278,15 @@ class _Limits:
                 self.marks.append((self.nodes.add("And", [one, nothing], "never_reached"), 1))
         spare = (len(self.marks) - 1, 0)
         return self.nodes.rows_of(*_used(self.marks, [place or spare for place in found]), f"{name}_at_limit")
+
+    def raised(self, flags: Dict[int, Flag]) -> tuple[tuple[str, tuple[Flag | None, ...]], ...]:
+        """Which channels are at a limit, with the flag of each; all that is known, where most of it is asked for."""
+        places = {self.marked[i]: flag for i, flag in flags.items()}
+        used = sorted({mark for mark, _ in places})
+        if sum(self.marks[mark][1] for mark in used) > 2 * len(flags):
+            return ((self.reached([*flags], "told"), tuple(flags.values())),)
+        marks = [(mark, *self.marks[mark]) for mark in used]
+        return tuple((name, tuple(places.get((mark, row)) for row in range(count))) for mark, name, count in marks)
 
     def _taken(self, nodes: Nodes, places: Sequence[tuple[int, int]], name: str) -> str:
         return nodes.rows_of(*_used(self.known, places), name)
@@ -382,19 +387,18 @@ def flags_of(nodes: Nodes, surrogate: Surrogate, inputs: tuple[str, str], units:
     """
     ports, n = surrogate.inputs, len(surrogate.inputs)
     given, u = inputs
-    causes: list[tuple[str, Sequence[Flag]]] = []  # rows of causes, and the flag that each raises
+    causes: list[tuple[str, Sequence[Flag | None]]] = []  # rows of causes, and the flag that each raises
     for operator, side in (("Less", "low"), ("Greater", "high")):
         limits = [getattr(port, side) for port in ports]
         if np.isfinite(limits).any():
             name = nodes.add(operator, [given, nodes.column(f"declared_{side}", limits)], f"u_{operator}".lower())
             causes.append((name, [Flag.OUTSIDE_RANGE] * n))
     rows, bounds = units.counts
-    causes += [(name, [Flag.AT_BOUND] * bounds) for name in units.at_bound] + [(units.at_limit, units.limit_flags)]
+    causes += [(name, [Flag.AT_BOUND] * bounds) for name in units.at_bound] + [*units.at_limit]
     causes.append((nodes.add("IsNaN", [u], "u_lost"), [Flag.NOT_A_NUMBER] * n))
     causes.append((nodes.add("IsNaN", [units.raw], "raw_lost"), [Flag.NOT_A_NUMBER] * rows))
-    causes = [cause for cause in causes if cause[0]]
     which = [flag for _, flags in causes for flag in flags]
-    present = sorted(set(which))
+    present = sorted({flag for flag in which if flag is not None})
     numbers = nodes.add("Cast", [join(nodes, [name for name, _ in causes], "causes")], "marks", to=nodes.kind())
     if nodes.trailing > 1:
         numbers = nodes.add("Reshape", [numbers, nodes.integers([len(which), -1])], "marks_in_rows")

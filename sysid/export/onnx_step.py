@@ -13,7 +13,7 @@ from sysid.export.onnx_core import Step, step_core
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.onnx_outputs import ends, flags_of, in_units, known_inputs, reader, scaled_inputs, state_after
 from sysid.export.surrogate import Surrogate
-from sysid.export.wide_form import WideForm
+from sysid.export.wide_form import WideForm, readings_of
 
 GATHERED = 100
 """Numbers of a state up to which gathering all of it is quicker than moving its lines on."""
@@ -41,7 +41,8 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     moves = not form.exact or surrogate.state_length(dtype) > GATHERED
 
     def core(part: Nodes, plan: WideForm) -> Step:
-        return step_core(part, plan, x, memory, moves=moves, laid=_laid(part, plan, scaled, rows, state))
+        laid = _laid(part, plan, scaled, rows, state)
+        return step_core(part, plan, x, memory, moves=moves, laid=laid, moved=_moved(part, plan, state))
 
     made = whole_or_exact(nodes, form, u, core)
     units = in_units(nodes, form, made.raw, u)
@@ -58,9 +59,14 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
 
 
 def _laid(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state: str) -> str:
-    """What is laid before a group that is alone, in one gather; ``""`` where it is not that plain."""
+    """What is laid before the first group, in one gather; ``""`` where others read inputs, or it is not that plain."""
     group, *more = form.groups
-    if more or group.computes or not (group.past and form.inputs) or any(one.older >= 0 for one in form.inputs):
+    if (
+        any(readings_of(form, other)[1] for other in more)
+        or group.computes
+        or not (group.past and form.inputs)
+        or any(one.older >= 0 for one in form.inputs)
+    ):
         return ""
     past = [(1, column) for column in group.past]
     given = [(1, one.first + one.lag - 1) if one.lag else (0, rows[reader(one)]) for one in form.inputs]
@@ -68,6 +74,17 @@ def _laid(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state
     if all(one.lag for one in form.inputs):
         return nodes.rows(state, [column for _, column in past + given], size, "laid")
     return nodes.rows_of([(scaled, len(rows)), (state, size)], past + given, "laid")
+
+
+def _moved(nodes: Nodes, form: WideForm, state: str) -> str:
+    """The lines moved on by a row, in one slice of a state that has them behind something else; ``""`` otherwise."""
+    shifted = sum(line.length for line in form.lines)
+    first = form.memory[0] if form.memory else 0
+    if first == 0 or len(form.lines) < 2 or form.memory[:shifted] != (*range(first, first + shifted),):
+        return ""
+    return nodes.add(
+        "Slice", [state, *(nodes.integers([at]) for at in (first - 1, first - 1 + shifted, 0))], "lines_moved"
+    )
 
 
 def _terms(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state: str) -> str:

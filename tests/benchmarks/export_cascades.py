@@ -20,6 +20,7 @@ import numpy as np
 
 from sysid.export import EXPORTERS, ExportedFile, Kind, Surrogate, read_bundle
 from sysid.models import NARX
+from tests.benchmarks._dispatch import loop_of, on_one_row
 from tests.benchmarks._findings import found
 from tests.benchmarks.export import RANGES, build, time_c
 
@@ -77,6 +78,22 @@ def onnx_times(label: str, surrogate: Surrogate, targets: tuple[float | None, ..
                 took = median(lambda u=u, state=state, run=run: run(u, state), repeats=5) / len(u)
                 note = f"{1e6 * took / cars:.2f} µs a car" if cars > 1 else ""
                 found(f"{label}: {file.name}, {cars} cars, a sample", 1e6 * took, "µs", target=goal, note=note)
+            if name == "onnx" and label in CASCADES:
+                dispatch(label, folder / file.name)
+
+
+def dispatch(label: str, path: Path) -> None:
+    """What the runtime takes to call the nodes of a sequence's loop, each on one row: no graph of these is faster."""
+    import onnxruntime
+
+    body = loop_of(path)
+    model, fed = on_one_row(body)
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    took = 1e6 * median(lambda: session.run(None, fed), repeats=5) / len(fed["x"])
+    note = f"{len(body.node)} nodes, {took / len(body.node):.2f} µs each"
+    found(f"{label}: the nodes of that loop on one row each, a sample", took, "µs", note=note)
 
 
 def c_times(label: str, surrogate: Surrogate, folder: Path) -> None:

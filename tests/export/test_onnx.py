@@ -11,8 +11,9 @@ import onnx
 import pytest
 
 from sysid.export import Kind, Surrogate
+from sysid.export.onnx_core import PRODUCT
 from sysid.export.onnx_exporter import OnnxExporter
-from sysid.models import ARX, NARX, ARXModel, Cascade, Mapping, VectorNARX
+from sysid.models import ARX, NARX, ARXModel, Cascade, Limit, Mapping, VectorNARX
 from tests.export.cascades import wired_narx, wired_vector
 
 
@@ -111,6 +112,34 @@ def test_models_that_do_not_wait_for_each_other_share_their_nodes(tmp_path):
         return len(proto.graph.node)
 
     assert executed(12) <= executed(4) + 2
+
+
+def test_a_step_moves_its_lines_by_one_slice_and_lays_its_first_readings_by_one_gather(tmp_path):
+    """Every node counts: each takes as long as thirty rows."""
+    lags = {"input_delays": [[1, 5]], "output_delays": [1, 60], "neurons": 3}
+    models = tuple(wired_narx(f"{a} -> {b}", NARX(**lags), i) for i, (a, b) in enumerate(pairwise(("U", "Y0", "Y1"))))
+    held = {name: Limit(low=0.0, high=80.0) for name in ("Y0", "Y1")}
+    surrogate, exporter = Surrogate.of(Cascade(models=models, limits=held)), OnnxExporter()
+    file, proto = written(exporter, surrogate, tmp_path)[Kind.STEP]
+    made = {node.output[0]: node for node in proto.graph.node}
+    assert len(made["lines_moved"].input) == 4
+    assert made["laid"].op_type == "Gather"
+    assert not {"older", "newest_first", "group0_readings", "told_at_limit"} & made.keys()
+    u = np.random.default_rng(0).uniform(0.0, 90.0, (100, 1))
+    state = surrogate.at_rest(u[0])[np.newaxis]
+    run = exporter.load(file, tmp_path)(u[:, np.newaxis], state)
+    np.testing.assert_allclose(run.output[:, 0], surrogate.simulate(u), rtol=0.0, atol=1e-11)
+
+
+def test_many_lines_take_their_newest_numbers_row_by_row(tmp_path):
+    """A table with one number in each of many rows takes longer than to take, to scale and to shift them."""
+    lags = {"output_delays": [1, 2], "neurons": 1}
+    read = [wired_narx(f"U{i} -> Y{i}", NARX(input_delays="0:1", **lags), i) for i in range(24)]
+    reading = [wired_narx(f"Y{i} -> Z{i}", NARX(input_delays="1:3", **lags), i) for i in range(24)]
+    _, proto = written(OnnxExporter(), Surrogate.of(Cascade(models=(*read, *reading))), tmp_path)[Kind.STEP]
+    tables = {one.name: np.prod(one.dims) for one in proto.graph.initializer}
+    assert "line_slope" in tables
+    assert tables.get("newest_weights", 0) <= PRODUCT
 
 
 @pytest.mark.parametrize("name", ["ONNX, step", "ONNX, sequence", "ONNX float32, step", "ONNX float32, sequence"])
