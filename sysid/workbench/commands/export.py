@@ -71,7 +71,7 @@ def _called(name: str, known: Sequence[str], path: Path) -> str:
     raise ConfigError(
         f"there is no fit named {name}",
         where=path,
-        expected=f"one of {', '.join(models)}" if models else "a pipeline that fits models",
+        expected=f"one of {'; '.join(models)}" if models else "a pipeline that fits models",
         got=name,
         remedy=f"did you mean {near[0]}?" if near else "name one of them with --fit",
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -201,13 +201,16 @@ class FitSteps:
 
     def _fitted(self, run: Run, fit: FitConfig, loaded: Done[Data], earlier: Mapping[str, Fitted]) -> Fitted:
         begun = earlier[fit.initial].models if fit.initial else {}
-        models, outputs = dict[str, Done[FitResult]](), list[Scored]()
-        for model in models_of(fit, self.config):
+        models, outputs, wanted = dict[str, Done[FitResult]](), list[Scored](), models_of(fit, self.config)
+        for model in wanted:
             mapping = str(model.config.mapping)
             made = models[mapping] = run.do(self._fit(run, model, loaded, begun.get(mapping)))
             for one in model.outputs:
                 folder = run.store.fit(one.fit.slug)
-                scores = run.do(self._score(made, loaded, one, folder))
+                step = self._score(made, loaded, one, folder)
+                if len(wanted) > 1 and model is wanted[-1] and one is model.outputs[-1]:
+                    step = replace(step, called=fit.name, export=partial(self._whole, models, outputs, loaded))
+                scores = run.do(step)
                 outputs.append(Scored(output=one, of=fit, model=model, fit=made, scores=scores, folder=folder))
         return Fitted(config=fit, models=models, outputs=tuple(outputs))
 
@@ -246,6 +249,21 @@ class FitSteps:
         config = model.config.model_copy(update={"export": self.config.export or ExportConfig()})
         scores = {one.config.mapping.output: steps.score(fit, data, one.config) for one in model.outputs}
         return steps.export([fit], scores, data, config, folder=folder, provenance=provenance)
+
+    def _whole(
+        self,
+        models: Mapping[str, Done[FitResult]],
+        outputs: Sequence[Scored],
+        loaded: Done[Data],
+        _: steps.Scores,
+        folder: Path,
+        provenance: dict[str, Any],
+    ) -> Bundle:
+        """All models of a fit that has one an output as a bundle, which is there once the last of them is scored."""
+        config = self.config.model_copy(update={"export": self.config.export or ExportConfig()})
+        scores = {one.output.config.mapping.output: one.scores.value for one in outputs}
+        fits = [one.value for one in models.values()]
+        return steps.export(fits, scores, loaded.value, config, folder=folder, provenance=provenance)
 
     @staticmethod
     def _score(made: Done[FitResult], loaded: Done[Data], output: FitOutput, folder: Path) -> Step[steps.Scores]:

@@ -17,6 +17,7 @@ from sysid.field_checks import check
 from sysid.models import model_from_dict
 from sysid.reporting.results import Results, read_results
 from sysid.reporting.training_view import RELATIVE, error_unit, trained_models
+from sysid.workbench.cli import run_cli
 from sysid.workbench.fits.config import Pipeline, parse_pipeline
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.run import run_pipeline
@@ -105,6 +106,17 @@ def test_each_output_of_each_fit_has_a_record(results: Results) -> None:
     ]
     assert {fit.initial for fit in results.fits if fit.system == "alone"} == {"ARX, level", "ARX, heat"}
     assert len(results.mappings()) == 2
+
+
+@pytest.mark.parametrize(("fit", "outputs"), [("ARX", ["level", "heat"]), ("ARX, heat", ["heat"])])
+def test_a_fit_of_one_model_an_output_is_exported_as_a_whole_and_by_output(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fit: str, outputs: list[str]
+) -> None:
+    monkeypatch.chdir(place)
+    (place / "pipelines").mkdir(exist_ok=True)
+    (place / "pipelines" / "both.yaml").write_text(PIPELINE, encoding="utf-8")
+    assert run_cli(["export", "both", "--fit", fit, "--out", str(tmp_path / "bundle")]) == 0
+    assert [one["name"] for one in read_bundle(tmp_path / "bundle").metadata["outputs"]] == outputs
 
 
 def test_the_whole_is_told_beside_its_outputs(results: Results) -> None:
