@@ -20,6 +20,7 @@ from sysid.validation import Evaluation, evaluate_outputs
 from sysid.validation.beyond import beyond
 from sysid.validation.metrics import percent
 from sysid.validation.repeated import repeated
+from sysid.validation.still import still
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -171,4 +172,5 @@ def _beyond(fit: FitResult, traces: TraceSet) -> tuple[str, ...]:
     # A record that was fitted may stand beside the others, as long as it is called one.
     strangers = [one for one in traces if traces.roles[one.name] is not Role.ESTIMATION or one in scored]
     channels = (*fit.model.mapping.inputs, *fit.model.mapping.outputs)
-    return *beyond(fit.model, fitted, scored), *repeated(channels, fitted, strangers)
+    said = *beyond(fit.model, fitted, scored), *repeated(channels, fitted, strangers)
+    return *said, *still(fit.model.mapping, fitted, scored)

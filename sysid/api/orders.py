@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,10 +14,12 @@ from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit
 from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ConfigError
+from sysid.estimation import estimators
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
+from sysid.estimation.nonparametric.dead_time import longest_dead_time, shares
 from sysid.estimation.nonparametric.feedback import feedback_of
 from sysid.extras import need
 from sysid.models import ARX, Mapping, Start, StartLike
@@ -36,6 +38,8 @@ LARGEST = 400_000
 
 BY_SELECTION = "sorted by the free run over the selection traces"
 CLOSED_LOOP = "The output acts on an input within the sample (closed loop): dead times are searched from 1 on."
+LATE_SHARE, LATE_GAIN = 0.2, 1.2
+"""Part of the output that a longer dead time than the usual ones must explain, and how much more than they do."""
 FINALISTS = 40
 """Candidates that are run freely."""
 
@@ -112,8 +116,12 @@ class OrderSearch:
 
     @property
     def fit(self) -> Fit:
-        """The fit of the first of all."""
-        return Fit.of(self.contenders[0].fit, self.traces, self.start)
+        """The fit of the first of all, with what every fit says of its records."""
+        found = self.contenders[0].fit
+        if isinstance(found.model.structure, ARX):  # those of the search were fitted by the hundred, and say nothing
+            estimation = self.traces.with_role(Role.ESTIMATION)
+            found = estimators.fit(estimation, self.mapping, found.model.structure, start=self.start)
+        return Fit.of(found, self.traces, self.start)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -224,8 +232,8 @@ def search_orders(
         max_na: Largest number of past outputs; by default as large as the record and the number of inputs allow, ten
             at most.
         max_nb: Largest number of past values of each input, likewise.
-        max_nk: Largest dead time, likewise. The smallest is 0, and 1 where an input is set from the output of its own
-            sample (closed loop).
+        max_nk: Largest dead time, likewise; longer where one plainly explains more of the output. The smallest is 0,
+            and 1 where an input is set from the output of its own sample (closed loop).
         start: How each free run begins.
         structures: Kinds beside ARX: ``SS``, ``TF``, ``OE``, ``ARMAX``, ``BJ``.
         most: Largest order of those.
@@ -264,6 +272,8 @@ def search_orders(
     first = int(not isinstance(feedback, str) and feedback.at_once)
     samples = sum(len(trace) for trace in estimation), max(len(trace) for trace in estimation)
     grid = _grid(samples, len(chosen.inputs), (max_na, max_nb, max_nk), first)
+    if max_nk is None:
+        grid = _as_late(grid, estimation, chosen)
     losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
     selection = traces.with_role(Role.SELECTION) if selection is None else tuple(selection)
     found = run_finalists(
@@ -312,6 +322,25 @@ def _grid(
             remedy="lower the orders, or search the inputs one by one",
         )
     return grid
+
+
+def _as_late(grid: OrderGrid, traces: Sequence[Trace], mapping: Mapping) -> OrderGrid:
+    """The grid with dead times as long as one that plainly explains the output better than those in it."""
+    most = longest_dead_time([len(trace) for trace in traces])
+    usable = [trace.usable_samples for trace in traces]
+    targets = [
+        np.where(ok, t[mapping.output] - t[mapping.output][ok].mean(), 0.0) if ok.any() else np.zeros(len(t))
+        for t, ok in zip(traces, usable, strict=True)
+    ]
+    latest = grid.max_nk
+    for name in mapping.inputs:
+        found = shares([trace[name] for trace in traces], targets, most, 1)
+        peak, within = int(np.argmax(found)), float(found[: grid.max_nk + 1].max())
+        latest = max(latest, peak + 3) if found[peak] > max(LATE_SHARE, LATE_GAIN * within) else latest
+    wider, n = replace(grid, max_nk=latest), len(mapping.inputs)
+    parameters = grid.max_na + n * (grid.max_nb + latest) + 1
+    fits = wider.size(n) <= LARGEST and 4 * parameters <= sum(len(t) for t in traces)
+    return wider if fits else grid
 
 
 def _orders(finalist: Finalist) -> ARX:

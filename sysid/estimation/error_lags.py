@@ -185,14 +185,25 @@ def _lag(
     most = len(left) // 3
     if whole.sum() < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(column[whole]):
         return 0, 0.0
-    both = scipy.signal.correlate(_direction(left), _direction(new))
-    shares = both[len(left) - 1 : len(left) - 1 + most] ** 2
+    left, new = _direction(left), _direction(new)
+    shares = _shares(left, new, most)
     shares[but] = 0.0
     share, free = float(shares.max()), int(whole.sum()) - LAGS - 2
     if share <= ELSEWHERE or most * by_chance(share, 1, free) >= SURE:
         return 0, 0.0
-    lag = int(np.flatnonzero(shares >= FIRST * share)[0])
-    return lag, share
+    # Levels that are held go back and forth: a change goes with the one before, and stands for it so long before.
+    peak = int(shares.argmax())
+    moved = np.concatenate([np.zeros(peak), new[: len(new) - peak]])
+    rest = _shares(left - moved * (moved @ left) / max(moved @ moved, SAME), new, peak)
+    rest[but] = 0.0
+    before = np.flatnonzero(rest >= FIRST * share)
+    return int(before[0]) if len(before) else peak, share
+
+
+def _shares(left: NDArray[np.float64], new: NDArray[np.float64], most: int) -> NDArray[np.float64]:
+    """The part of a signal of length 1 that another explains at each lag."""
+    both = scipy.signal.correlate(left, new)
+    return np.asarray(both[len(left) - 1 : len(left) - 1 + most] ** 2)
 
 
 def _innovations(x: NDArray[np.float64], whole: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -157,3 +157,13 @@ def test_every_structure_says_what_its_error_is_of(structure: object, training: 
     fit = sysid.fit(traces, "u -> y", structure, training, stability=sysid.StabilityOptions(count=0))
     assert len([one for one in fit.warnings if CAUSES["curve"] in one]) == 1
     assert set(fit.warnings) <= set(fit.notes)
+
+
+@pytest.mark.parametrize("held", [1, 20, 37])
+def test_a_dead_time_is_told_as_it_is_where_levels_are_held(held: int) -> None:
+    """Levels go back and forth: what a change did 41 samples later was told of the one before, 20 samples too early."""
+    rng = np.random.default_rng(held)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 1500 // held + 1), held)[:1500]
+    y = lfilter([*np.zeros(41), 0.1], [1.0, -0.9], u) + 0.005 * rng.standard_normal(1500)
+    fit = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.ARX(na=1, nb=1, nk=1))
+    assert [note for note in fit.notes if "Begin there (nk: 41)" in note]

@@ -20,6 +20,7 @@ from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
 from sysid.validation.beyond import beyond
 from sysid.validation.metrics import mean_fit
 from sysid.validation.repeated import repeated
+from sysid.validation.still import still
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.evidence import linearity
@@ -161,6 +162,7 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: Tr
     scored = [trace for trace in traces if traces.roles[trace.name] is not Role.ESTIMATION]
     channels = (*model.mapping.inputs, *model.mapping.outputs)
     further = *beyond(model, fitted, scored), *repeated(channels, fitted, scored)
+    further = *further, *still(model.mapping, fitted, scored)
     return {
         "name": ready.config.name,
         "slug": ready.config.slug,
