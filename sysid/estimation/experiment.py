@@ -174,22 +174,6 @@ class Experiment:
             return self
         return replace(self, weights=self._weighted(known))
 
-    def within(self, horizon: int, lags: Lags) -> Experiment:
-        """The same record as free runs over a horizon see it, each beginning at measured outputs.
-
-        Args:
-            horizon: Samples after which a run begins anew.
-            lags: What a row looks at.
-
-        Returns:
-            The record; runs that would begin at a masked output do not count.
-        """
-        known = self._known_rows(lags.depth, set(lags.output))
-        if known.all():
-            return self
-        begins = np.arange(len(known)) // horizon * horizon
-        return replace(self, weights=self._weighted(known[begins]))
-
     def _weighted(self, known: NDArray[np.bool_]) -> NDArray[np.float64]:
         weights = np.ones(len(known)) if self.weights is None else self.weights
         return np.where(known, weights, 0.0)

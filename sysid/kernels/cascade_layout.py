@@ -247,7 +247,7 @@ def from_a_line(size):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _put(weights, first, theta, rows_at, constants_at, n, n_x):
+def put(weights, first, theta, rows_at, constants_at, n, n_x):
     """Put weights and constants of neurons or gates into blocks; where the next begin."""
     for k in range(n):
         own = first + k // LANES * LANES * (n_x + 1) + k % LANES
@@ -274,11 +274,11 @@ def _in_blocks(p, theta, order):
         n, own = p.neurons[m], p.theta_first[m]
         gates, v = gates_at(p.theta_first, m, n, n_x, n_y), own + n * (n_x + 1)
         weights_first[m], neuron_first[m] = at, at_neuron
-        at = _put(weights, at, theta, own, own + n * n_x, n, n_x)
+        at = put(weights, at, theta, own, own + n * n_x, n, n_x)
         at_neuron += padded(n)
         if gates >= 0:
             gate_blocks[m] = padded(n) // LANES
-            at = _put(weights, at, theta, gates, v, n, n_x)
+            at = put(weights, at, theta, gates, v, n, n_x)
         for j in range(n_y):
             readout_first[p.output_first[m] + j] = at_readout
             copy_numbers(theta[v + j * n : v + (j + 1) * n], readout[at_readout:])

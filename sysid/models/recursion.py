@@ -20,6 +20,9 @@ from sysid.models.lags import Lags
 from sysid.models.output_limits import Between
 from sysid.models.scaling import Scaling
 
+NOT_KEPT = (np.empty((0, 0)), np.empty((0, 0), dtype=np.int8))
+"""Room for activations and for what held an output, of which nobody asks."""
+
 
 def parameter_count(lags: Lags, neurons: int, *, linear: bool, gated: bool = False) -> int:
     """Length of the flat parameter vector ``[W | b | v | c | w | V]``.
@@ -196,7 +199,7 @@ class Recursion(AbstractForm):
             Output of shape ``(n_samples,)``, in its unit.
         """
         u, y = self.extended(inputs, history)
-        kernel.free_run(u, y, *self._arguments(len(inputs)))
+        kernel.free_run(u, y, y, *self._arguments(len(inputs)))
         return self.in_units(y[self.lags.depth :])
 
     @property
@@ -225,7 +228,7 @@ class Recursion(AbstractForm):
         def run(past: NDArray[np.float64]) -> NDArray[np.float64]:
             y = measured.copy()
             y[depth - own : depth] = past
-            kernel.free_run(u, y, *self._arguments(len(measured) - depth))
+            kernel.free_run(u, y, y, *self._arguments(len(measured) - depth))
             return y[places]
 
         found = gauss_newton(run, measured[depth - own : depth], measured[places], known)
@@ -262,7 +265,8 @@ class Recursion(AbstractForm):
     def _arguments(self, n_steps: int) -> tuple[object, ...]:
         lags = self.lags
         tables = (lags.input_channel, lags.input_lag, lags.output_lag)
-        return (lags.depth, n_steps, *tables, self.theta, self.neurons, code_of(self.activation), *self.bounds)
+        kind, bounds = code_of(self.activation), self.bounds
+        return (lags.depth, n_steps, *tables, self.theta, self.neurons, kind, *bounds, *NOT_KEPT)
 
 
 STEPS, APART = 12, 1e-5

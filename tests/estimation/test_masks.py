@@ -12,10 +12,9 @@ from scipy.signal import lfilter
 from sysid.errors import TraceError
 from sysid.estimation import Loop, Training, fit_arx, fit_narx
 from sysid.estimation.estimators import fit
-from sysid.estimation.experiment import Experiment, experiments_of
+from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.instrumental import fit_iv4
 from sysid.estimation.linear.order_search import OrderGrid, search_orders
-from sysid.estimation.networks.provider import RecursionProvider
 from sysid.models import (
     ARX,
     NARX,
@@ -97,16 +96,6 @@ def test_a_network_one_step_ahead_does_not_look_at_a_gap() -> None:
     gain = form.scaling.output_scale / form.scaling.input_scale[0]
     np.testing.assert_allclose([form.linear[0] * gain, form.linear[1]], [0.2, 0.8], atol=1e-6)
     assert abs(form.scaling.output_offset) < 2.0  # of what was measured, not of what stands under the mask
-
-
-def test_over_a_horizon_no_run_begins_at_a_masked_output() -> None:
-    trace = masked()
-    template = fit_arx([trace], MAPPING, ARX(na=1, nb=(1,), nk=(1,))).model.recursion
-    experiments = experiments_of([trace], MAPPING, Start(kind=StartKind.MEASURED, n_measured=10), 0.0)
-    provider = RecursionProvider(template=template, experiments=experiments, closed=True, horizon=20)
-    counted = {k for k in range(10, 600) if trace.usable_samples[k]}
-    lost = {k for k in range(10, 600) if not trace.usable_samples[10 + (k - 10) // 20 * 20 - 1]}
-    assert provider.n_samples == len(counted - lost)
 
 
 @pytest.mark.parametrize(

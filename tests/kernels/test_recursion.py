@@ -11,9 +11,7 @@ from sysid.models import NARX, History, Recursion, Scaling, parameter_count
 from sysid.testing import finite_difference_jacobian, simulate
 
 
-def a_provider(
-    network: NARX, *, closed: bool, n: int = 40, seed: int = 0, weights=None, horizon: int | None = None
-) -> RecursionProvider:
+def a_provider(network: NARX, *, closed: bool, n: int = 40, seed: int = 0, weights=None) -> RecursionProvider:
     rng = np.random.default_rng(seed)
     lags = network.lags(2)
     template = Recursion(
@@ -34,7 +32,7 @@ def a_provider(
         )
         for length in (n, n // 2)
     ]
-    return RecursionProvider(template=template, experiments=experiments, closed=closed, horizon=horizon)
+    return RecursionProvider(template=template, experiments=experiments, closed=closed)
 
 
 def outputs(provider: RecursionProvider, theta: np.ndarray) -> np.ndarray:
@@ -74,6 +72,25 @@ def test_sensitivities_equal_finite_differences(network, closed):
     assert_allclose(provider.jacobian(theta), expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("network", STRUCTURES)
+def test_the_free_run_and_the_prediction_are_those_of_the_slow_twin(network):
+    provider = a_provider(network, closed=True, n=16)
+    form = provider.at(0.3 * np.random.default_rng(1).standard_normal(len(provider.template.theta)))
+    e, steps = provider.experiments[0], 3
+    assert_allclose(form.simulate(e.inputs, e.history), simulate(form, e.inputs, e.history), rtol=0.0, atol=1e-13)
+    past = [
+        np.concatenate([getattr(e.history, name), given])
+        for name, given in (("inputs", e.inputs), ("output", e.output))
+    ]
+    expected = []
+    for t in range(len(e.output)):
+        first = max(0, t + 1 - steps)
+        before = len(e.history.output) + first
+        history = History(inputs=u[:before], output=y[:before])
+        expected.append(simulate(form, e.inputs[first : t + 1], history)[-1])
+    assert_allclose(form.predict(e.inputs, e.output, e.history, steps), expected, rtol=0.0, atol=1e-13)
+
+
 @pytest.mark.parametrize("weights", [None, (0.0, 1.0, 2.5)], ids=["plain", "weighted and masked"])
 @pytest.mark.parametrize("closed", [False, True], ids=["open loop", "closed loop"])
 def test_normal_equations_equal_the_dense_ones(closed, weights):
@@ -89,54 +106,6 @@ def test_normal_equations_equal_the_dense_ones(closed, weights):
     assert_allclose(at.gradient, J.T @ (W * residual), rtol=1e-9, atol=1e-12)
     assert_allclose(at.gauss_newton, J.T @ (W[:, None] * J), rtol=1e-9, atol=1e-12)
     assert_allclose(provider.loss(theta), at.loss, rtol=1e-12)
-
-
-def windows(provider: RecursionProvider, theta: np.ndarray) -> np.ndarray:
-    """The slow twin of a horizon: each window is a record of its own that begins from what was measured."""
-    form, k = provider.at(theta), provider.horizon
-    runs = []
-    for e in provider.experiments:
-        past_u, past_y = np.concatenate([e.history.inputs, e.inputs]), np.concatenate([e.history.output, e.output])
-        n = len(e.history.output)
-        for first in range(0, len(e.output), k):
-            history = History(inputs=past_u[: n + first], output=past_y[: n + first])
-            runs.append(simulate(form, e.inputs[first : first + k], history))
-    return np.concatenate(runs)
-
-
-@pytest.mark.parametrize("horizon", [1, 5, 99])
-@pytest.mark.parametrize("network", STRUCTURES)
-def test_a_horizon_is_a_free_run_that_begins_anew(network, horizon):
-    provider = a_provider(network, closed=True, n=16, horizon=horizon)
-    theta = 0.3 * np.random.default_rng(3).standard_normal(len(provider.template.theta))
-    target = np.concatenate([e.output for e in provider.experiments])
-    assert provider.loss(theta) == pytest.approx(0.5 * np.sum((windows(provider, theta) - target) ** 2), rel=1e-10)
-    dense = finite_difference_jacobian(lambda p: windows(provider, p), theta)
-    assert_allclose(provider.jacobian(theta), dense, atol=1e-7)
-
-
-def test_a_horizon_of_one_is_the_open_loop_and_a_long_one_the_closed_loop():
-    network = NARX(input_delays=4, output_delays=4, neurons=5)
-    theta = 0.3 * np.random.default_rng(3).standard_normal(len(a_provider(network, closed=True).template.theta))
-    for horizon, closed in ((1, False), (1000, True)):
-        by_horizon = a_provider(network, closed=True, horizon=horizon).linearise(theta)
-        plain = a_provider(network, closed=closed).linearise(theta)
-        np.testing.assert_array_equal(by_horizon.gauss_newton, plain.gauss_newton)
-        assert by_horizon.loss == plain.loss
-
-
-def test_windows_join_across_blocks():
-    network = NARX(input_delays=2, output_delays=2, neurons=3)
-    provider = a_provider(network, closed=True, n=2 * BLOCK + 100, horizon=BLOCK - 5)
-    theta = 0.3 * np.random.default_rng(3).standard_normal(len(provider.template.theta))
-    first = provider.experiments[0]
-    late = slice(2 * (BLOCK - 5), 2 * (BLOCK - 5) + 30)  # a window that begins shortly before a block ends
-    history = History(inputs=first.inputs[: late.start], output=first.output[: late.start])
-
-    def run(p):
-        return provider.at(p).simulate(first.inputs[late], history)
-
-    assert_allclose(provider.jacobian(theta)[late], finite_difference_jacobian(run, theta), atol=1e-7)
 
 
 def test_blocks_join_without_a_seam():

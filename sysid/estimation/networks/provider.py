@@ -8,20 +8,17 @@ model's output is
     \hat y_t(\theta) = f(x_t; \theta), \qquad e_t = \hat y_t - \text{target}_t, \qquad
     E(\theta) = \tfrac12 \sum_r \sum_t w_t e_t^2.
 
-What stands in :math:`x_t` for the past outputs is all that tells the loops apart. Let :math:`s_t = k \lfloor t / k
-\rfloor` be the first step of the window of ``horizon`` :math:`k` that :math:`t` lies in; the output at lag :math:`l` is
+What stands in :math:`x_t` for the past outputs is all that tells the loops apart. In the open loop they are measured,
+so that :math:`J_t = \partial f / \partial\theta` and the rows do not depend on each other. In the closed loop, the free
+run, only those of the record's ``history`` are, and
 
 .. math::
-    x_{t,l} = \begin{cases} \hat y_{t-l} & t - l \ge s_t \\ \text{measured}_{t-l} & t - l < s_t \end{cases}
-    \qquad\Rightarrow\qquad
-    J_t = \frac{d \hat y_t}{d\theta} = \frac{\partial f}{\partial\theta}
-      + \sum_{l:\, t - l \ge s_t} c_{t,l} J_{t-l}, \qquad c_{t,l} = \frac{\partial f}{\partial x_{t,l}}.
+    J_t = \frac{d \hat y_t}{d\theta} = \frac{\partial f}{\partial\theta} + \sum_{l \le t} c_{t,l} J_{t-l},
+    \qquad c_{t,l} = \frac{\partial f}{\partial x_{t,l}}.
 
-With :math:`k = 1` no past output is the model's own: the open loop, whose rows do not depend on each other. With
-:math:`k` as long as the record only the history is measured: the closed loop, the free run. Each record starts from its
-own ``history``, so that records are never concatenated. The rows :math:`J_t` are exact (``sysid/kernels/recursion.py``
-runs the recursion and derives it for the network); none of them is kept beyond its block of ``BLOCK`` rows, because a
-Gauss-Newton method needs
+Records are never concatenated. The rows :math:`J_t` are exact: the network is a cascade of one, of which the past
+outputs are an input in the open loop (``sysid/kernels/cascade_sensitivities.py``). None of them is kept beyond its
+block of ``BLOCK`` rows, because a Gauss-Newton method needs
 
 .. math:: \text{gradient} = \sum_t w_t e_t J_t, \qquad \text{gauss\_newton} = \sum_t w_t J_t^T J_t
 
@@ -31,14 +28,15 @@ and no more. Their cost is :math:`N p (1 + n_l)` multiply-adds for the rows, of 
 Limits: the second derivatives :math:`\sum w_t e_t\, d^2 \hat y_t / d\theta^2` are left out, as in every Gauss-Newton
 method, which is right where the residuals are small or change sign often. A free run that is unstable has rows that
 grow without bound (:attr:`Linearisation.finite`; outputs are clipped, and a clipped sample has a zero row). A masked
-sample is nobody's past: one step ahead the rows that look at it do not count, nor, over a horizon, the run that would
-begin at it; the inputs of a free run go on through the mask as they stand in the record.
+sample is nobody's past: one step ahead the rows that look at it do not count; the inputs of a free run go on through
+the mask as they stand in the record.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +46,12 @@ from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.kernels import recursion as kernel
 from sysid.kernels.arrays import read_only
+from sysid.kernels.cascade_layout import Program
+from sysid.kernels.cascade_sensitivities import rows_for, sensitivities
 from sysid.kernels.neurons import code_of
-from sysid.models import (
-    Recursion,
-)
+from sysid.models import Ends, Recursion
+from sysid.models.cascade_program import program_of
+from sysid.models.recursion import NOT_KEPT
 
 BLOCK = 1024
 """Rows of the Jacobian that are alive at a time: 1024 rows of 300 parameters are 2.4 MB, which the second-level
@@ -74,31 +74,28 @@ class _Record:
 
 @dataclass(frozen=True, eq=False)
 class _Pass:
-    """What one run over a record leaves for the sensitivities (see the kernel)."""
+    """What one run over a record leaves for the sensitivities; ``values`` are inputs and the output that was read."""
 
-    y: NDArray[np.float64]
+    values: NDArray[np.float64]
     out: NDArray[np.float64]
-    h: NDArray[np.float64]
-    c: NDArray[np.float64]
+    kept: NDArray[np.float64]
+    held: NDArray[np.int8]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecursionProvider(AbstractProvider):
-    """Residuals of a :class:`Recursion`, in open loop (one step ahead), closed loop (free run) or in between.
+    """Residuals of a :class:`Recursion`, in open loop (one step ahead) or closed loop (free run).
 
     Args:
         template: Lags, neurons, scaling and bounds; its parameters are ignored.
         experiments: The records; each starts from its own history.
         closed: Free run if true, one step ahead otherwise.
-        horizon: Samples after which a free run begins anew from measured output; ``None`` for the whole record. Every
-            sample is then predicted between 1 and ``horizon`` steps ahead.
         stride: Every so-manieth sample of a record counts.
     """
 
     template: Recursion
     experiments: tuple[Experiment, ...]
     closed: bool
-    horizon: int | None = None
     stride: int = 1
     n_samples: int = field(init=False)
     _records: tuple[_Record, ...] = field(init=False, repr=False)
@@ -107,9 +104,9 @@ class RecursionProvider(AbstractProvider):
         object.__setattr__(self, "experiments", tuple(self.experiments))
         object.__setattr__(self, "_records", tuple(self._record(e) for e in self.experiments))
         counted = [
-            len(r.target[self._first :: self.stride])
+            len(r.target[:: self.stride])
             if r.root_weights is None
-            else np.count_nonzero(r.root_weights[self._first :: self.stride])
+            else np.count_nonzero(r.root_weights[:: self.stride])
             for r in self._records
         ]
         object.__setattr__(self, "n_samples", int(sum(counted)))
@@ -118,41 +115,19 @@ class RecursionProvider(AbstractProvider):
         experiment = experiment.from_measured(self.template.lags)
         if not self.closed:
             experiment = experiment.one_step(self.template.lags)
-        elif self.horizon is not None:
-            experiment = experiment.within(self.horizon, self.template.lags)
         u, measured = self.template.extended(experiment.inputs, experiment.history)
         target = self.template.scaling.scale_output(experiment.output)
         measured[self.template.lags.depth :] = target
         roots = None if experiment.weights is None else np.sqrt(experiment.weights)
         return _Record(u, measured, target, roots)
 
-    @property
-    def _first(self) -> int:
-        """The first sample that counts.
-
-        Over a horizon it is the last of a window or of a stride: were it the first, a horizon that divides the stride
-        would be judged one step ahead alone.
-        """
-        return min(self.horizon, self.stride) - 1 if self.closed and self.horizon is not None else 0
-
-    def _steps(self, record: _Record) -> int:
-        """The horizon as the kernel wants it."""
-        if not self.closed:
-            return 1
-        return len(record.target) if self.horizon is None else self.horizon
-
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
         total = 0.0
         for record in self._records:
-            if self.closed and self.horizon is None:
-                y = record.measured.copy()  # of which the free run reads what it has written itself
-                kernel.free_run(record.u, y, *self._arguments(record, theta))
-                residual = y[self.template.lags.depth :] - record.target
-            else:
-                residual = self._pass(record, theta).out - record.target
+            residual = self._out(record, theta) - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
-            residual = residual[self._first :: self.stride]
+            residual = residual[:: self.stride]
             total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
 
@@ -167,12 +142,12 @@ class RecursionProvider(AbstractProvider):
             residual = passed.out - record.target
             residual = residual if record.root_weights is None else residual * record.root_weights
             correlated += len(residual) * max(1.0, correlation_time(residual) / self.stride)
-            counted = residual[self._first :: self.stride]
+            counted = residual[:: self.stride]
             loss += 0.5 * float(counted @ counted)
             for first, block in self._blocks(record, theta, passed):
                 rows = slice(first, first + len(block))
                 weighted = block if record.root_weights is None else block * record.root_weights[rows, None]
-                some = slice((self._first - first) % self.stride, None, self.stride)
+                some = slice(-first % self.stride, None, self.stride)
                 # A copy only where rows are left out: products of strided arrays are not done by BLAS.
                 weighted = weighted if self.stride == 1 else np.ascontiguousarray(weighted[some])
                 gradient += weighted.T @ residual[rows][some]
@@ -222,42 +197,61 @@ class RecursionProvider(AbstractProvider):
     def _blocks(
         self, record: _Record, theta: NDArray[np.float64], passed: _Pass
     ) -> Iterator[tuple[int, NDArray[np.float64]]]:
-        lags = self.template.lags
-        carry = max(lags.output, default=0) if self.closed else 0
-        n = len(record.target)
-        J = np.empty((carry + BLOCK, len(theta)))
+        n, n_p, depth = len(record.target), len(theta), self.template.lags.depth
+        reads = max(self.template.lags.output, default=0) if self.closed else 0
+        room = rows_for(np.array([reads + BLOCK]), n_p)
+        program = self._program._replace(theta=theta.copy())
+        own, extent = np.zeros(1, dtype=np.int64), np.array([n_p])
         for first in range(0, n, BLOCK):
             rows = min(BLOCK, n - first)
-            if first:
-                J[:carry] = J[BLOCK : BLOCK + carry]
-            kernel.sensitivities(
-                record.u, passed.y, record.measured, lags.depth, first, rows, *self._tables(), read_only(theta),
-                self.template.neurons, code_of(self.template.activation), self._steps(record), passed.h, passed.c,
-                carry, J,
-            )  # fmt: skip
-            yield first, J[carry : carry + rows]
+            sensitivities(
+                program, depth, first, rows, passed.values, passed.kept, passed.held, own, extent, self._source, room
+            )
+            place = first & int(room.mask[0])
+            block, moves = room.J[place : place + rows], room.moves[place : place + rows]
+            block[~moves] = 0.0
+            yield first, block
+
+    def _out(
+        self,
+        record: _Record,
+        theta: NDArray[np.float64],
+        kept: tuple[NDArray[np.float64], NDArray[np.int8]] = NOT_KEPT,
+    ) -> NDArray[np.float64]:
+        """The output after its history; in closed loop the network reads what it has written itself."""
+        template, y = self.template, record.measured.copy()
+        lags = template.lags
+        kernel.free_run(
+            record.u, y if self.closed else record.measured, y, lags.depth, len(record.target), lags.input_channel,
+            lags.input_lag, lags.output_lag, read_only(theta), template.neurons, code_of(template.activation),
+            *template.bounds, *kept,
+        )  # fmt: skip
+        return y[lags.depth :]
 
     def _pass(self, record: _Record, theta: NDArray[np.float64]) -> _Pass:
         n = len(record.target)
-        passed = _Pass(
-            y=record.measured.copy(),
-            out=np.empty(n),
-            h=np.empty((n, self.template.neurons)),
-            c=np.empty((n, len(self.template.lags.output) + 1)),
-        )
-        arguments = (*self._arguments(record, theta), self._steps(record))
-        kernel.activations(record.u, passed.y, record.measured, *arguments, passed.out, passed.h, passed.c)
-        return passed
+        kept, held = np.empty((n, self.template.neurons)), np.empty((n, 1), dtype=np.int8)
+        out = self._out(record, theta, (kept, held))
+        read = np.concatenate([record.measured[:-n], out]) if self.closed else record.measured
+        return _Pass(np.column_stack([record.u, read]), out, kept, held)
 
-    def _tables(self) -> tuple[NDArray[np.int64], ...]:
+    @cached_property
+    def _program(self) -> Program:
+        """The network as a cascade of one in scaled numbers."""
         lags = self.template.lags
-        return lags.input_channel, lags.input_lag, lags.output_lag
+        names = tuple(f"u{i}" for i in range(lags.n_inputs))
+        columns = replace(self.template.columns, offset=(0.0,) * (len(names) + 1), scale=(1.0,) * (len(names) + 1))
+        ends = Ends(
+            inputs=names, outputs=("y",), input_units=("",) * len(names), output_units=("",), rest_outputs=(0.0,),
+            direct=frozenset(),
+        )  # fmt: skip
+        return program_of([columns], [ends], (*names, "y"), {})
 
-    def _arguments(self, record: _Record, theta: NDArray[np.float64]) -> tuple[object, ...]:
-        template = self.template
-        n = len(record.target)
-        kind, bounds = code_of(template.activation), template.bounds
-        return (template.lags.depth, n, *self._tables(), read_only(theta), template.neurons, kind, *bounds)
+    @cached_property
+    def _source(self) -> NDArray[np.int64]:
+        """For each regressor whether it is the network's own output, 0, or an input, -1."""
+        own = self._program.regressor_channel == self.template.lags.n_inputs
+        return np.where(own, 0, -1) if self.closed else np.full(len(own), -1)
 
     def at(self, theta: NDArray[np.float64]) -> Recursion:
         """The recursion with these parameters.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 from sysid.kernels.recursion import free_run
@@ -24,8 +25,9 @@ def advance(u, y, depth, n_steps, input_channel, input_lag, output_lag, theta, n
         kinds: Code of their kind in each car's model, shape ``(cars,)``.
         bounds: Lower and upper bound of each car's output, shape ``(cars, 2)``.
     """
+    kept, held = np.empty((0, 0)), np.empty((0, 0), dtype=np.int8)
     for car in range(len(u)):
         free_run(
-            u[car], y[car], depth, n_steps, input_channel, input_lag, output_lag, theta[car], n_neurons,
-            kinds[car], bounds[car, 0], bounds[car, 1],
+            u[car], y[car], y[car], depth, n_steps, input_channel, input_lag, output_lag, theta[car], n_neurons,
+            kinds[car], bounds[car, 0], bounds[car, 1], kept, held,
         )  # fmt: skip

@@ -93,7 +93,7 @@ class ModelBank:
         self._lags, self._neurons = recursions[0].lags, recursions[0].neurons
         self._kinds = np.array([code_of(recursion.activation) for recursion in recursions])
         self._theta = read_only(np.array([recursion.theta for recursion in recursions]))
-        self._bounds = np.array([[recursion.low, recursion.high] for recursion in recursions])
+        self._bounds = np.array([recursion.bounds for recursion in recursions])
         scalings = [recursion.scaling for recursion in recursions]
         self._input_offset = np.array([scaling.input_offset for scaling in scalings])
         self._input_scale = np.array([scaling.input_scale for scaling in scalings])
