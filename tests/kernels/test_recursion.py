@@ -78,10 +78,7 @@ def test_the_free_run_and_the_prediction_are_those_of_the_slow_twin(network):
     form = provider.at(0.3 * np.random.default_rng(1).standard_normal(len(provider.template.theta)))
     e, steps = provider.experiments[0], 3
     assert_allclose(form.simulate(e.inputs, e.history), simulate(form, e.inputs, e.history), rtol=0.0, atol=1e-13)
-    past = [
-        np.concatenate([getattr(e.history, name), given])
-        for name, given in (("inputs", e.inputs), ("output", e.output))
-    ]
+    u, y = np.concatenate([e.history.inputs, e.inputs]), np.concatenate([e.history.output, e.output])
     expected = []
     for t in range(len(e.output)):
         first = max(0, t + 1 - steps)

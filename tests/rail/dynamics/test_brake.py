@@ -143,6 +143,19 @@ def test_a_bank_of_models_is_each_model_s_free_run(seed: int) -> None:
         np.testing.assert_allclose(outputs[:, car], alone, rtol=1e-12)
 
 
+def test_a_bank_holds_outputs_between_the_limits_of_its_models() -> None:
+    low, high = 18.0, 30.0
+    model = dataclasses.replace(network(0), between=(low, high))
+    inputs = np.random.default_rng(0).uniform(60.0, 90.0, (40, 1, 2))
+    bank = ModelBank(stage=Stage(models=(model,)), cars=1, rest_inputs=(90.0, 90.0))
+    outputs, alone = (
+        bank.advance(inputs)[:, 0],
+        model.simulate(inputs[:, 0], History.at_rest(inputs=[90.0, 90.0], output=0.0)),
+    )
+    assert {low, high} <= set(alone)
+    np.testing.assert_allclose(outputs, alone, rtol=1e-12)
+
+
 def test_a_chain_is_its_models_one_after_the_other() -> None:
     command = np.repeat([90.0, 74.0, 90.0], [5, 100, 95])
     brake = SurrogateBrake(stages=[pipe_models(), cylinder_models()], consist=TRAIN)
