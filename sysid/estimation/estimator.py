@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -152,7 +152,7 @@ class Estimator:
                     where="training",
                     expected=self.training.__name__,
                     got=type(training).__name__,
-                    remedy=f"give it a {self.training.__name__}, or leave training out",
+                    remedy=f"write {_likewise(training, self.training)}, or leave training out",
                 )
             self.check_training(training)
         if initial is not None:
@@ -250,3 +250,13 @@ class Estimator:
             got=", ".join(training) or "an empty one" if isinstance(training, Dict) else type(training).__name__,
             remedy="leave training out",
         )
+
+
+def _likewise(given: object, kind: type[Any]) -> str:
+    """Options of another kind with what it knows of those that were given."""
+    known = {one.name for one in fields(kind)}
+    own = fields(given) if is_dataclass(given) else ()
+    said = {one.name: getattr(given, one.name) for one in own if getattr(given, one.name) != one.default}
+    kept = ", ".join(f"{name}={value!r}" for name, value in said.items() if name in known)
+    lost = ", ".join(name for name in said if name not in known)
+    return f"{kind.__name__}({kept})" + (f", which has no {lost}" if lost else "")

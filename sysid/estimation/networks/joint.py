@@ -389,8 +389,11 @@ class Joint:
             return Status.UNSTABLE
         if chosen.solution is None:
             return Status.NOT_IMPROVED
-        later = any(one.seed == chosen.seed and one.iteration > chosen.iteration for one in seen)
-        return Status.STOPPED_EARLY if later else chosen.solution.status
+        status = chosen.solution.status
+        # Of a start that was given up for others its iterations did not run out: they were not wanted.
+        given_up = status is Status.MAX_ITERATIONS
+        later = any((given_up or one.seed == chosen.seed) and one.iteration > chosen.iteration for one in seen)
+        return Status.STOPPED_EARLY if later else status
 
 
 def _others(seen: Sequence[_Candidate]) -> list[str]:

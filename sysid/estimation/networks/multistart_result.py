@@ -37,9 +37,14 @@ def multistart_status(
         return Status.INTERRUPTED
     if any(_leaves_its_bounds(chosen.model, inputs, history) for inputs, history in records):
         return Status.UNSTABLE
-    iteration = chosen.solution.state.iteration
-    later = any(c.number == chosen.number and c.solution.state.iteration > iteration for c in candidates)
-    return Status.STOPPED_EARLY if later else chosen.solution.status
+    status = chosen.solution.status
+    # Of a start that was given up for others its iterations did not run out: they were not wanted.
+    given_up = status is Status.MAX_ITERATIONS
+    later = any(
+        (given_up or c.number == chosen.number) and c.solution.state.iteration > chosen.solution.state.iteration
+        for c in candidates
+    )
+    return Status.STOPPED_EARLY if later else status
 
 
 def _leaves_its_bounds(model: starts.Network, inputs: NDArray[np.float64], history: History | None) -> bool:

@@ -72,7 +72,8 @@ def _written(structure: AbstractStructure) -> str:
 
 
 def _table(found: OrderSearch) -> Table:
-    title = f"{len(found.losses):,} ARX structures of {found.mapping}, {found.chosen_by}"
+    others = "" if found.others is None else " and other structures"
+    title = f"{len(found.losses):,} ARX structures{others} of {found.mapping}, {found.chosen_by}"
     table = Table(title=title, title_justify="left")
     table.add_column("structure")
     for head in (
