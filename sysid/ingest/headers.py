@@ -9,6 +9,8 @@ from sysid.units import Reference, plain_unit
 
 # "p [1]" is a pure number, "p[1]" an element of p.
 _INDEX = re.compile(r"^.*?(?:\S\[\s*\d*\s*\]|\[\s*(?!1\s*\])\d*\s*\])\s*$", re.DOTALL)
+# "y[k-1]" and "u(k)" are samples, and "y(t)" is a signal: no unit stands so near to a short name.
+_ARGUMENT = re.compile(r"^(?:.*\S[\[(]\s*[kn]\s*(?:[+-]\s*\d+\s*)?[\])]|[^\W\d]\w{0,2}[\[(]t[\])])\s*$", re.DOTALL)
 _BRACKETS = re.compile(r"^(?P<name>.*?\S)\s*\[(?P<unit>[^\[\]]*)\]\s*$", re.DOTALL)
 _PARENTHESES = re.compile(r"^(?P<name>.*?\S)\s*\((?P<unit>[^()]*(?:\([ag]\))?)\)\s*$", re.DOTALL)
 _SPOKEN = re.compile(r"^(?P<name>.*?\S)(?:\s+(?P<mark>/|in)|,)\s+(?P<unit>\S+)$", re.DOTALL)
@@ -112,11 +114,15 @@ def parse_header(text: str) -> Header:
     Example:
         >>> parse_header("Druck / bar").unit, parse_header("Valve, open").unit
         ('bar', None)
+        >>> [parse_header(text).unit for text in ("u(k-1)", "y[k]", "m(t)", "Masse (t)")]
+        [None, None, None, 't']
         >>> parse_header("BP [psi gauge]")
         Header(name='BP', unit='psi', reference=<Reference.GAUGE: 'gauge'>)
         >>> parse_header("Test (1)")
         Header(name='Test (1)', unit=None, reference=None)
     """
+    if _ARGUMENT.match(text):
+        return Header(name=text.strip())
     match = _BRACKETS.match(text)
     if match and not _INDEX.match(text):
         unit, reference = split_reference(match["unit"])

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sysid.ingest.headers import is_unit, parse_header, split_reference
+from sysid.ingest.headers import Header, is_unit, parse_header, split_reference
 from sysid.traces import Channel
 from sysid.units import Reference
 
@@ -68,3 +68,16 @@ def test_what_would_keep_the_unit_parser_busy_is_no_unit(text: str) -> None:
 @pytest.mark.parametrize("text", ["kg", "gauge", "ag", "deg"])
 def test_a_g_at_the_end_is_not_gauge(text: str) -> None:
     assert split_reference(text) == (text, None)
+
+
+@pytest.mark.parametrize("text", ["y[k]", "u[k-1]", "x1(k + 2)", "y(n)", "u(t)", "y2[t]"])
+def test_a_sample_or_a_signal_has_no_unit(text: str) -> None:
+    """They were in units of Boltzmann's constant, and in tonnes."""
+    assert parse_header(text) == Header(name=text)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("T[K]", "K"), ("y [k]", "k"), ("mass(t)", "t"), ("m [t]", "t"), ("v(km)", "km")]
+)
+def test_a_unit_that_looks_like_one_is_one(text: str, unit: str) -> None:
+    assert parse_header(text).unit == unit

@@ -42,6 +42,10 @@ class Reader:
     is_mine: Callable[[bytes], bool] | None = None
 
 
+_PACKED = (b"\x1f\x8b", b"PK\x03\x04", b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf", b"\x28\xb5\x2f\xfd")
+"""How files of gzip, zip, bzip2, xz, 7-Zip and Zstandard begin."""
+
+
 def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None) -> Reader:
     """The reader for a file.
 
@@ -84,7 +88,9 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
         where=path,
         expected=f"a name that ends in {', '.join(suffix for reader in readers for suffix in reader.suffixes)}",
         got=path.suffix or "a name without an ending",
-        remedy="export the traces to one of these"
+        remedy="unpack it first: it is compressed"
+        if head.startswith(_PACKED)
+        else "export the traces to one of these"
         + ("" if b"\0" in head else ", or, as it is text, name the reader (reader: csv)"),
     )
 
