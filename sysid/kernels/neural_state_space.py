@@ -39,6 +39,8 @@ from sysid.kernels.arrays import copy_numbers, copy_rows
 from sysid.kernels.neurons.neuron import FAST
 from sysid.kernels.neurons.table import activate_with_slopes
 
+ONE, TWO = np.uintp(1), np.uintp(2)
+
 
 @njit(cache=True, nogil=True, fastmath=FAST)
 def _activate(weights_columns, z, kind, h, slope):
@@ -115,109 +117,102 @@ def free_run(u, x, theta, k, q, kind, rectified, bound, low, high, y):
             x[i] = _clip(new, -bound, bound)
 
 
+# What is called for every sample calls nothing itself, and takes flat arrays with the place where something begins in
+# them: numba counts who holds an array that is handed on, or that is a piece of another, which took a quarter of the
+# time. Places are unsigned: of others it looks at the sign, each time.
+
+
 @njit(cache=True, nogil=True, fastmath=FAST)
-def _mixed(factors, S, out):
-    """A weighted sum of rows, four at a time: each number of the sum is read and written once for four of them.
+def _mixed(factors, first, S, n, m, out, place):
+    """Write a weighted sum of ``n`` rows of length ``m``, four at a time: each number is then read and written once.
 
     Args:
-        factors: Shape ``(n_states,)``.
-        S: Shape ``(n_states, n)``.
-        out: Shape ``(n,)``, written.
+        factors: Flat.
+        first: Where the rows' begin.
+        S: The rows, one after the other.
+        n: How many.
+        m: How long they are.
+        out: Flat, written.
+        place: Where from.
     """
-    n, m = S.shape
-    if n == 0:
-        out[:m] = 0.0
-    elif n < 4:
-        a, first = factors[0], S[0]
+    for p in range(m):
+        out[place + p] = 0.0
+    at, fours = np.uintp(0), n // np.uintp(4)
+    for _ in range(fours):
+        a, b, c, d = factors[first], factors[first + ONE], factors[first + TWO], factors[first + TWO + ONE]
+        second, third, fourth = at + m, at + TWO * m, at + (TWO + ONE) * m
         for p in range(m):
-            out[p] = a * first[p]
-    else:
-        a, b, c, d = factors[0], factors[1], factors[2], factors[3]
-        first, second, third, fourth = S[0], S[1], S[2], S[3]
+            out[place + p] += a * S[at + p] + b * S[second + p] + c * S[third + p] + d * S[fourth + p]
+        at, first = at + TWO * TWO * m, first + TWO * TWO
+    for _ in range(n - TWO * TWO * fours):
+        a = factors[first]
         for p in range(m):
-            out[p] = a * first[p] + b * second[p] + c * third[p] + d * fourth[p]
-    at = min(n, 1) if n < 4 else 4
-    while at + 3 < n:
-        a, b, c, d = factors[at], factors[at + 1], factors[at + 2], factors[at + 3]
-        first, second, third, fourth = S[at], S[at + 1], S[at + 2], S[at + 3]
-        for p in range(m):
-            out[p] += a * first[p] + b * second[p] + c * third[p] + d * fourth[p]
-        at += 4
-    while at + 1 < n:
-        a, b = factors[at], factors[at + 1]
-        first, second = S[at], S[at + 1]
-        for p in range(m):
-            out[p] += a * first[p] + b * second[p]
-        at += 2
-    if at < n:
-        a, first = factors[at], S[at]
-        for p in range(m):
-            out[p] += a * first[p]
+            out[place + p] += a * S[at + p]
+        at, first = at + m, first + ONE
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
-def _output_row(row, S, z, o, sign, L, v, Wy, hy, slope, G):
-    """Derivative of output ``o``, which nothing clips: through the state, and through the output's own parameters.
+def _output_slopes(o, sign, L, v, Wy, slope, G):
+    """Derivative of output ``o`` by the state, written to ``G``; the rest as in :func:`_output_row`."""
+    for i in range(len(G)):
+        G[i] = sign * L[o, i]
+        for j in range(v.shape[1]):
+            G[i] += sign * v[o, j] * slope[j] * Wy[j, i]
+
+
+@njit(cache=True, nogil=True, fastmath=FAST)
+def _output_row(J, place, z, o, sign, v, hy, slope):
+    """Derivative of output ``o``, which nothing clips, by the output's own parameters.
 
     Args:
-        row: Shape ``(n_dynamic + n_states + n_output,)``, written.
-        S: Derivative of the state, shape ``(n_states, n_dynamic + n_states)``.
+        J: Flat.
+        place: Where these parameters begin, shape ``(n_output,)``, written.
         z: State, inputs and 1, shape ``(n_row,)``.
         o: Which output.
         sign: -1 where a rectified output was negative, else 1.
-        L: Linear output weights, shape ``(n_outputs, n_row)``.
         v: Readout of the output's neurons, shape ``(n_outputs, n_output_neurons)``.
-        Wy: Their weights, shape ``(n_output_neurons, n_row)``.
         hy: Their activations.
         slope: Derivatives of the activations.
-        G: Room for the derivative by the state, shape ``(n_states,)``, written.
     """
-    n, n_S = S.shape
     r, n_y, q = len(z), len(v), v.shape[1]
-    for i in range(n):
-        G[i] = sign * L[o, i]
-        for j in range(q):
-            G[i] += sign * v[o, j] * slope[j] * Wy[j, i]
-    _mixed(G, S, row)
     if n_y > 1:  # of the other outputs' weights it is no function
-        row[n_S:] = 0.0
+        for i in range(n_y * (r + q) + q * r):
+            J[place + np.uintp(i)] = 0.0
+    weights, readout = place + np.uintp(o * r), place + np.uintp((n_y + q) * r + o * q)
     for i in range(r):
-        row[n_S + o * r + i] = sign * z[i]
-    hidden, readout = n_S + n_y * r, n_S + (n_y + q) * r + o * q
+        J[weights + np.uintp(i)] = sign * z[i]
     for j in range(q):
         factor = sign * v[o, j] * slope[j]
-        place = hidden + j * r
+        hidden = place + np.uintp((n_y + j) * r)
         for i in range(r):
-            row[place + i] = factor * z[i]
-        row[readout + j] = sign * hy[j]
+            J[hidden + np.uintp(i)] = factor * z[i]
+        J[readout + np.uintp(j)] = sign * hy[j]
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
-def _state_row(after, S, z, i, F, spread, slope_z, h):
-    """Derivative of the next state ``i``, which nothing bounds.
+def _state_row(after, place, n, z, i, spread, slope_z, h):
+    """Add the derivative of the next state ``i``, which nothing bounds, by the parameters of the state equation.
 
     Args:
-        after: Shape ``(n_dynamic + n_states,)``, written.
-        S: As in :func:`_output_row`.
+        after: Flat.
+        place: Where the row begins.
+        n: Number of states.
         z: As in :func:`_output_row`.
         i: The state.
-        F: Derivative of the next states by the states, row by row, shape ``(n_states ** 2,)``.
         spread: Readout of the neurons, each repeated for the entries of ``z``, shape ``(n_states, n_neurons * n_row)``.
         slope_z: Derivatives of the activations by their weights, shape ``(n_neurons * n_row,)``.
         h: Activations.
     """
-    n, r, k = len(S), len(z), len(h)
-    at_W, at_V = n * r, (n + k) * r
-    _mixed(F[i * n : (i + 1) * n], S, after)
-    own = after[i * r : (i + 1) * r]
+    r, k = len(z), len(h)
+    own, weights, readout = (
+        place + np.uintp(i * r), place + np.uintp(n * r), place + np.uintp((n + k) * r + i * k),
+    )  # fmt: skip
     for j in range(r):
-        own[j] += z[j]
-    weights, factors = after[at_W:at_V], spread[i]
+        after[own + np.uintp(j)] += z[j]
     for j in range(k * r):
-        weights[j] += factors[j] * slope_z[j]
-    readout = after[at_V + i * k : at_V + (i + 1) * k]
+        after[weights + np.uintp(j)] += spread[i, j] * slope_z[j]
     for o in range(k):
-        readout[o] += h[o]
+        after[readout + np.uintp(o)] += h[o]
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)
@@ -276,7 +271,8 @@ def sensitivities(u, x, S, theta, k, q, kind, rectified, bound, low, high, y, J)
     plain_Wy = theta[at : at + q * r].reshape(q, r)
     Wy = np.ascontiguousarray(plain_Wy.T)
     v = theta[at + q * r : at + q * r + n_y * q].reshape(n_y, q)
-    following = np.empty_like(S)
+    following, columns, width = np.empty_like(S), np.uintp(S.shape[1]), J.shape[2]
+    after, flat_S, flat_J = following.reshape(-1), S.reshape(-1), J.reshape(-1)
     G = np.empty(n)
     z = np.ones(r)
     h, slope = np.empty(k), np.empty(k)
@@ -301,20 +297,23 @@ def sensitivities(u, x, S, theta, k, q, kind, rectified, bound, low, high, y, J)
             total *= sign
             bounded = _clip(total, low, high)
             y[t, o] = bounded
-            row = J[t, o]
+            row = np.uintp((t * n_y + o) * width)
             if bounded != total:
-                row[:] = 0.0
+                for p in range(width):
+                    flat_J[row + np.uintp(p)] = 0.0
             else:
-                _output_row(row, S, z, o, sign, L, v, plain_Wy, hy, slope_y, G)
+                _output_slopes(o, sign, L, v, plain_Wy, slope_y, G)
+                _mixed(G, np.uintp(0), flat_S, np.uintp(n), columns, flat_J, row)
+                _output_row(flat_J, row + columns, z, o, sign, v, hy, slope_y)
         # the state
         _activate(W, z, kind, h, slope)
         for i in range(n):
             for j in range(n):
                 F[i * n + j] = M[i, j]
         for o in range(k):
-            factor, row = slope[o], joined[o]
+            factor = slope[o]
             for j in range(n * n):
-                F[j] += factor * row[j]
+                F[j] += factor * joined[o, j]
             place = o * r
             for j in range(r):
                 slope_z[place + j] = factor * z[j]
@@ -325,10 +324,12 @@ def sensitivities(u, x, S, theta, k, q, kind, rectified, bound, low, high, y, J)
             for j in range(k):
                 new += V[i, j] * h[j]
             new_x[i] = _clip(new, -bound, bound)
-            after = following[i]
+            row = np.uintp(i) * columns
             if new_x[i] != new:
-                after[:] = 0.0
+                for p in range(columns):
+                    after[row + p] = 0.0
                 continue
-            _state_row(after, S, z, i, F, spread, slope_z, h)
+            _mixed(F, np.uintp(i * n), flat_S, np.uintp(n), columns, after, row)
+            _state_row(after, row, n, z, i, spread, slope_z, h)
         copy_rows(following, S)
         copy_numbers(new_x, x)
