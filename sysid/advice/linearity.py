@@ -168,7 +168,7 @@ def _curvature(record: Record) -> Finding:
         return Finding(
             topic=Topic.LINEARITY, code="linearity.exact", verdict=Verdict.FINE, figures={"left": rest / total}
         )
-    features = [_features(one, found) for one in records]
+    features = _moving([_features(one, found) for one in records])
     plain = _explained(features, [one.left for one in records], np.ones(1))
     whiten = whitener([one.left - one.left.mean() for one in records], min(8, rows // 40))
     share, p = _tested(features, [one.left for one in records], whiten)
@@ -198,9 +198,15 @@ def _features(one: Residual, found: ImpulseResponse) -> NDArray[np.float64]:
         g = np.zeros(deepest + 1)
         g[found.lags] = found.values[j]
         size = float(np.sqrt(g @ g)) or 1.0
-        curved = [z - z.mean() for z in (x**2, x**3 - 3 * x) if np.ptp(z) > 1e-9]
+        curved = [z - z.mean() for z in (x**2, x**3 - 3 * x)]
         columns += [scipy.signal.lfilter(g / size, [1.0], z)[deepest:] for z in curved]
     return np.column_stack(columns)
+
+
+def _moving(features: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """Those that move in some record: of two levels a square says nothing, and of an input that stands nothing does."""
+    moves = np.any([np.ptp(X, axis=0) > 1e-9 for X in features], axis=0)
+    return [X[:, moves] for X in features]
 
 
 def _tested(

@@ -173,7 +173,7 @@ SAID: Final[dict[str, Words]] = {
     ),
     "noise.loud": Words(
         "A linear response explains only {explained:.1%} of the output.",
-        "Noise, inputs that are missing, or a system that is not linear: see below which. More samples help against"
+        "Noise, inputs that are missing, or a system that integrates or is not linear: see below. More samples help against"
         " noise alone.",
     ),
     "noise.coloured": Words(

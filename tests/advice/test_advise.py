@@ -327,3 +327,12 @@ def test_many_short_records_are_as_exciting_as_one() -> None:
     """Steps that begin with their records: with as many lags as samples the last two were always the same."""
     found = look(*(trace(u := steps(12, k, 4), plant(u), name=f"r{k}") for k in range(100)))
     assert finding(found, "excitation.rich").figures["looked_for"] == 6
+
+
+def test_an_input_that_stands_in_one_of_several_records_is_no_fault() -> None:
+    """Squares of it were left out there and not elsewhere: arrays of different widths, and a trace."""
+    rng = np.random.default_rng(0)
+    u = np.repeat([*rng.uniform(-1.0, 1.0, 30), *([0.4] * 15)], 20)
+    y = lfilter([0.0, 0.1], [1.0, -0.9], u) + 0.005 * rng.standard_normal(len(u))
+    traces = sysid.data([(u[:600], y[:600]), (u[600:], y[600:])], sample_time=0.1)
+    assert "linearity.none_seen" in [one.code for one in sysid.advise(traces, "u -> y").findings]
