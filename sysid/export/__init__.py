@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sysid.export.layout import DelayLine, StateLayout
     from sysid.export.parity import Parity, ParityCase, check_parity, parity_cases, random_cases
     from sysid.export.reading import read_bundle
+    from sysid.export.renewing import renew_bundle
     from sysid.export.simulation import Simulation, simulate_bundle
     from sysid.export.stage import Port, Stage
     from sysid.export.surrogate import Surrogate
@@ -50,6 +51,7 @@ __all__ = [
     "random_cases",
     "read_bundle",
     "read_command",
+    "renew_bundle",
     "simulate_bundle",
     "zip_bundle",
 ]
@@ -64,6 +66,7 @@ _WHERE = {
     "sysid.export.layout": ("DelayLine", "StateLayout"),
     "sysid.export.parity": ("Parity", "ParityCase", "check_parity", "parity_cases", "random_cases"),
     "sysid.export.reading": ("read_bundle",),
+    "sysid.export.renewing": ("renew_bundle",),
     "sysid.export.simulation": ("Simulation", "simulate_bundle"),
     "sysid.export.stage": ("Port", "Stage"),
     "sysid.export.surrogate": ("Surrogate",),

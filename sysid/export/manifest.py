@@ -109,7 +109,7 @@ def describe(
         "fit": stages[0]["fit"] if single else None,
         "cases_start": {"kind": start.kind.value, "n_measured": start.n_measured},
         "metrics": None if metrics is None else _metrics(metrics),
-        "provenance": {**provenance, "data": _data(recorded or traces), "software": _software()},
+        "provenance": {**provenance, "data": _data(recorded or traces), "software": software()},
     }
     return {name: _json(value) for name, value in manifest.items()}
 
@@ -360,7 +360,12 @@ def _data(traces: TraceSet) -> dict[str, Any]:
     }
 
 
-def _software() -> dict[str, str]:
+def software() -> dict[str, str]:
+    """Versions of what writes and checks a bundle.
+
+    Returns:
+        By name.
+    """
     packages = {name: metadata.version(name) for name in PACKAGES if has(name)}
     return {"sysid-workbench": sysid.__version__, "python": platform.python_version(), **packages}
 

@@ -37,10 +37,11 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     u, nothing = known_inputs(nodes, given)
     scaled, rows = scaled_inputs(nodes, form, u, (given, nothing))
     x = _terms(nodes, form, scaled, rows, state) if form.inputs else u
-    memory = nodes.rows(state, form.memory, surrogate.state_length(dtype), "memory")
     moves = not form.exact or surrogate.state_length(dtype) > GATHERED
 
     def core(part: Nodes, plan: WideForm) -> Step:
+        # Each form takes its own: the runtime warns of a slice that a branch reads too.
+        memory = part.rows(state, form.memory, surrogate.state_length(dtype), "memory")
         laid = _laid(part, plan, scaled, rows, state)
         return step_core(part, plan, x, memory, moves=moves, laid=laid, moved=_moved(part, plan, state))
 

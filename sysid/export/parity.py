@@ -147,7 +147,7 @@ def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[
     """
     model = surrogate.source.single
     if model is None:
-        return tuple(_from_rest(surrogate, trace.name, surrogate.inputs_of(trace)) for trace in traces)
+        return tuple(case_from_rest(surrogate, trace.name, surrogate.inputs_of(trace)) for trace in traces)
     return tuple(_from_history(surrogate, model, trace, start) for trace in traces)
 
 
@@ -169,9 +169,20 @@ def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, star
     )
 
 
-def _from_rest(
+def case_from_rest(
     surrogate: Surrogate, name: str, inputs: NDArray[np.float64], begun: NDArray[np.float64] | None = None
 ) -> ParityCase:
+    """The free run over some inputs, from rest.
+
+    Args:
+        surrogate: What is exported.
+        name: Of the case.
+        inputs: In their units, shape ``(n_samples, n_inputs)``.
+        begun: What is computed before the first sample, shape ``(n_computed,)``; at rest by default.
+
+    Returns:
+        The case.
+    """
     change, rest = _disturbances(surrogate), surrogate.rest(inputs[0]) if begun is None else begun
     computed = surrogate.compute(inputs, rest)
     disturbed = surrogate.compute(inputs, rest + change)
@@ -237,7 +248,7 @@ def random_cases(
         inputs = np.clip(drawn, least, most).astype(np.float64)
         # What nothing goes into differs by where it begins.
         begun = None if not surrogate.ticks else _somewhere(rng, surrogate)
-        cases.append(_from_rest(surrogate, f"random {number + 1}", inputs, begun))
+        cases.append(case_from_rest(surrogate, f"random {number + 1}", inputs, begun))
     return tuple(cases)
 
 

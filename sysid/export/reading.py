@@ -38,7 +38,7 @@ def read_bundle(folder: Path) -> Bundle:
         BundleError: If a file is missing, changed or newer than this version can read.
     """
     folder = find_bundle(Path(folder))
-    content: _AbstractContent = _Zipped(path=folder) if folder.is_file() else _Folder(path=folder)
+    content = _content(folder)
     manifest = _read_manifest(content)
     try:
         files = bundle_files(manifest)
@@ -56,6 +56,31 @@ def read_bundle(folder: Path) -> Bundle:
     for name, expected in hashes.items():
         _check_file(content, name, expected, hashes)
     return Bundle(folder=folder, model=model, metadata=manifest, files=files)
+
+
+def read_attachment(bundle: Bundle, name: str) -> bytes | None:
+    """A file of a bundle that was read.
+
+    Args:
+        bundle: The bundle.
+        name: Of a file within it.
+
+    Returns:
+        Its bytes; ``None`` if ``model.json`` lists no such file.
+
+    Raises:
+        BundleError: If it is missing, or was changed.
+    """
+    listed = {entry["name"]: entry["sha256"] for entry in bundle.metadata["attachments"]}
+    if name not in listed:
+        return None
+    content = _content(bundle.folder)
+    _check_file(content, name, listed[name], listed)
+    return content.read(name)
+
+
+def _content(folder: Path) -> _AbstractContent:
+    return _Zipped(path=folder) if folder.is_file() else _Folder(path=folder)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as Dict
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,13 +37,16 @@ from sysid.export.manifest import (
     seal,
     sha256,
 )
-from sysid.export.parity import Allowed, check_parity, parity_cases, random_cases
+from sysid.export.parity import Allowed, ParityCase, check_parity, parity_cases, random_cases
 from sysid.export.stability import WORST, check_free_run, state_stability, state_unbounded
 from sysid.export.surrogate import Surrogate
 from sysid.export.verification import write_verification
 from sysid.models import AbstractModel, Cascade, Start
 from sysid.models.wiring import Member, Wiring
 from sysid.traces import TraceSet
+
+EXTRA = {WORST: "the random sequence on which the free run did worst"}
+"""What a bundle may hold beside what is made from its model, and what each is."""
 
 
 def export_bundle(
@@ -101,7 +104,7 @@ def export_bundle(
         ChannelError: If a trace lacks a channel of the mapping.
         ParityError: If a file differs from the model by more than the tolerance; nothing is published then.
     """
-    writers = [exporter(name) for name in usual_formats(formats)]
+    formats = usual_formats(formats)
     recorded = traces
     if isinstance(fit, FitResult):
         fit, traces = with_case_inputs(fit, traces, start or Start())
@@ -111,10 +114,87 @@ def export_bundle(
     surrogate = _surrogate(source, traces, outputs)
     cases, sequences = parity_cases(surrogate, traces, start), random_cases(surrogate)
     stability = None if source.single is None else check_free_run(source.single, traces)
+    manifest = describe(
+        surrogate, known, traces, start=start, metrics=metrics, provenance=provenance or {}, recorded=recorded
+    )
+    manifest["amplification"] = amplification(cases, sequences, surrogate.sample_time)
+    manifest["stability"] = None
+    extra = {}
+    if stability is not None:
+        state_stability(manifest, stability)
+        extra[WORST] = stability.worst_csv().encode()
+    state_unbounded(manifest, sequences)
+    if manifest["fit"] is not None:
+        manifest["stages"][0]["fit"] = manifest["fit"]
+    content = Content(
+        surrogate=surrogate,
+        formats=formats,
+        cases=cases,
+        sequences=sequences,
+        allowed=allowed_of(cases, tolerance, tolerance_float32),
+        extra=extra,
+    )
+    return publish_bundle(Path(folder), source, manifest, content)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Content:
+    """What a bundle is made of, beside what it says about itself.
+
+    Args:
+        surrogate: What is exported.
+        formats: Names of exporters.
+        cases: The cases that each file is run on.
+        sequences: The random sequences that it is run on too.
+        allowed: How far it may be from the model, by number type.
+        extra: Files that are neither exported nor made from the model, by name.
+    """
+
+    surrogate: Surrogate
+    formats: Sequence[str]
+    cases: tuple[ParityCase, ...]
+    sequences: tuple[ParityCase, ...]
+    allowed: Dict[str, Allowed]
+    extra: Dict[str, bytes]
+
+
+def allowed_of(
+    cases: Sequence[ParityCase], tolerance: float | None = None, tolerance_float32: float | None = None
+) -> dict[str, Allowed]:
+    """How far files may be from the model.
+
+    Args:
+        cases: The model's runs, whose outputs' sizes count.
+        tolerance: What was given in the outputs' unit.
+        tolerance_float32: The same for files that compute in float32.
+
+    Returns:
+        By number type; float32 is never held to less than float64.
+    """
     allowed = {"float64": Allowed.of(cases, "float64", tolerance)}
     coarse = Allowed.of(cases, "float32", tolerance_float32)
-    allowed["float32"] = replace(coarse, each=np.maximum(coarse.each, allowed["float64"].each))
-    with _published(Path(folder)) as draft:
+    return allowed | {"float32": replace(coarse, each=np.maximum(coarse.each, allowed["float64"].each))}
+
+
+def publish_bundle(folder: Path, source: AbstractModel | Cascade, manifest: dict[str, Any], content: Content) -> Bundle:
+    """Write the files, run each against the model, and publish all of them with what is said about them.
+
+    Args:
+        folder: Where the bundle goes.
+        source: The model or cascade.
+        manifest: What ``model.json`` says but for its files; they are added.
+        content: What is written.
+
+    Returns:
+        The bundle.
+
+    Raises:
+        ConfigError: If the folder holds something that is not a bundle.
+        ParityError: If a file differs from the model by more than the tolerance; nothing is published then.
+    """
+    surrogate, cases, sequences, allowed = content.surrogate, content.cases, content.sequences, content.allowed
+    writers = [exporter(name) for name in content.formats]
+    with _published(folder) as draft:
         written = [file for writer in writers for file in writer.write(surrogate, draft)]
         checked = [
             check_parity(file, draft, cases, sequences, allowed=allowed[file.dtype], outputs=surrogate.outputs)
@@ -123,27 +203,17 @@ def export_bundle(
         purposes = {name: f"needed by {file.name}" for file in written for name in file.companions}
         drawn = next((case for case in sequences if np.isfinite(case.output).all()), sequences[0])
         purposes |= write_verification(surrogate, written, (cases[0], drawn), draft, allowed)
-        if stability is not None:
-            (draft / WORST).write_text(stability.worst_csv(), encoding="utf-8", newline="\n")
-            purposes[WORST] = "the random sequence on which the free run did worst"
+        for name, data in content.extra.items():
+            (draft / name).write_bytes(data)
+            purposes[name] = EXTRA[name]
         (draft / SCHEMA).write_text(schema_text(), encoding="utf-8", newline="\n")
         purposes[SCHEMA] = f"JSON schema of {MANIFEST}"
-        manifest = describe(
-            surrogate, known, traces, start=start, metrics=metrics, provenance=provenance or {}, recorded=recorded
-        )
-        manifest["amplification"] = amplification(cases, sequences, surrogate.sample_time)
-        manifest["stability"] = None
-        if stability is not None:
-            state_stability(manifest, stability)
-        state_unbounded(manifest, sequences)
-        if manifest["fit"] is not None:
-            manifest["stages"][0]["fit"] = manifest["fit"]
         manifest["files"] = [file_entry(file, parity, draft) for file, parity in zip(written, checked, strict=True)]
         manifest["attachments"] = attachments(purposes, draft)
         (draft / CARD).write_text(model_card(manifest), encoding="utf-8", newline="\n")
         manifest["card"] = {"name": CARD, "sha256": sha256(draft / CARD)}
         (draft / MANIFEST).write_text(seal(manifest), encoding="utf-8", newline="\n")
-    return Bundle(folder=Path(folder), model=source, metadata=manifest, files=bundle_files(manifest))
+    return Bundle(folder=folder, model=source, metadata=manifest, files=bundle_files(manifest))
 
 
 def zip_bundle(folder: Path, path: Path | None = None) -> Path:

@@ -1,5 +1,5 @@
 /* STP -> BP, ER, AR, BC: 103 models with 4437 parameters
- * See stp_to_bp_er_ar_bc.h. Written by sysid-workbench 0.1.0; do not edit.
+ * See stp_to_bp_er_ar_bc.h. Written by sysid-workbench 0.2.0; do not edit.
  */
 #include "stp_to_bp_er_ar_bc.h"
 
@@ -12,11 +12,20 @@ typedef stp_to_bp_er_ar_bc_real real;
 /* A number of the file as the number type that was chosen. */
 #define R(x) ((real)(x))
 
+/* Every sum is computed in the number's own type and in the order in which it stands. Method 16 is that of processors
+ * with arithmetic in half precision, which it alone widens. */
+#if !defined(__FAST_MATH__) && !defined(_M_FP_FAST) && defined(FLT_EVAL_METHOD)
+#if FLT_EVAL_METHOD + 0 == 0 || FLT_EVAL_METHOD + 0 == 16
+#define AS_WRITTEN
+#endif
+#endif
+
 #if defined(__GNUC__)
 /* Numbers side by side, in the vectors of GCC and Clang: at -O2 they do not make them of a loop by themselves. Not wider
- * than the registers there are: a wider one would go through memory. */
+ * than the registers there are: a wider one would go through memory. Four, and not eight, floats: layers are narrow, and
+ * one that is narrower than a register goes neuron by neuron. */
 #if defined(__AVX__)
-#define LANE_BYTES 32
+#define LANE_BYTES (4 * (int)sizeof(real))
 #else
 #define LANE_BYTES 16
 #endif
@@ -24,76 +33,91 @@ typedef stp_to_bp_er_ar_bc_real real;
 typedef real lanes __attribute__((vector_size(LANE_BYTES)));
 #endif
 
-#if !defined(STP_TO_BP_ER_AR_BC_FLOAT) && !defined(STP_TO_BP_ER_AR_BC_LIBM_TANH) && !defined(__FAST_MATH__) && !defined(_M_FP_FAST) \
-    && defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD + 0 == 0 && DBL_MANT_DIG == 53
+#if !defined(STP_TO_BP_ER_AR_BC_LIBM_TANH) && defined(AS_WRITTEN) && DBL_MANT_DIG == 53 && FLT_MANT_DIG == 24
 #include <stdint.h>
+
+#if defined(STP_TO_BP_ER_AR_BC_FLOAT)
+typedef uint32_t real_bits;
+#define SHIFT R(12582912.0) /* 1.5 * 2^23: the sum with it has no digits after the point */
+#define LN2_HIGH R(0.693359375)
+#define LN2_LOW R(-2.12194440e-4)
+#define BIAS 127u
+#define DIGITS 23
+#else
+typedef uint64_t real_bits;
+#define SHIFT R(6755399441055744.0) /* 1.5 * 2^52 */
+#define LN2_HIGH R(6.93147180369123816490e-01)
+#define LN2_LOW R(1.90821492927058770002e-10)
+#define BIAS 1023u
+#define DIGITS 52
+#endif
 
 /* tanh as e / (e + 2) with e = exp(2 x) - 1, without a branch, so that several run side by side: faster than libm's in
  * a network, and at most 5 units in the last place from the true value. Where the compiler may
- * reorder sums or computes in more than double, rounding to a whole number by adding a large one would not work, and
- * libm's is used. |x| is at most 20 here. */
+ * reorder sums or computes in more than the number's type, rounding to a whole number by adding a large one would not
+ * work, and libm's is used. |x| is at most 20 here. First the Taylor coefficients of exp from 1/2! on, as many as the
+ * number type can tell where |r| is at most ln(2) / 2. */
+#if defined(STP_TO_BP_ER_AR_BC_FLOAT)
+#define EXP_TERMS(p, r) \
+    p = r * R(1.0 / 40320.0) + R(1.0 / 5040.0)
+#else
+#define EXP_TERMS(p, r) \
+    p = r * R(1.0 / 6227020800.0) + R(1.0 / 479001600.0); \
+    p = p * r + R(1.0 / 39916800.0); \
+    p = p * r + R(1.0 / 3628800.0); \
+    p = p * r + R(1.0 / 362880.0); \
+    p = p * r + R(1.0 / 40320.0); \
+    p = p * r + R(1.0 / 5040.0)
+#endif
+/* ln 2 is in two parts, the first with zeros at its end, so that its product with n is exact; the last bits of the sum
+ * are n, and 2^n is a number with these bits for an exponent. */
+#define TANH_OF(x, sum, n, r, p, e, power, bits) \
+    x += x; \
+    sum = x * R(1.4426950408889634) + SHIFT; /* 2 x / ln 2 */ \
+    n = sum - SHIFT; \
+    r = (x - n * LN2_HIGH) - n * LN2_LOW; \
+    EXP_TERMS(p, r); \
+    p = p * r + R(1.0 / 720.0); \
+    p = p * r + R(1.0 / 120.0); \
+    p = p * r + R(1.0 / 24.0); \
+    p = p * r + R(1.0 / 6.0); \
+    p = p * r + R(0.5); \
+    e = r + r * r * p; \
+    memcpy(&bits, &sum, sizeof bits); \
+    bits = (bits + BIAS) << DIGITS; \
+    memcpy(&power, &bits, sizeof power); \
+    e = power * e + (power - R(1.0)); \
+    e = e / (e + R(2.0))
+
 static real tanh_near(real x)
 {
-    const real shift = 6755399441055744.0; /* 1.5 * 2^52: the sum with it has no digits after the point */
-    const real z = x + x;
-    const real sum = z * 1.4426950408889634 + shift; /* z / ln 2 */
-    const real n = sum - shift;
-    /* ln 2 in two parts, the first with zeros at its end, so that its product with n is exact */
-    const real r = (z - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
-    real p = 1.0 / 6227020800.0, e, power; /* Taylor coefficients 1/13! to 1/2!; |r| is at most ln(2) / 2 */
-    uint64_t bits;
+    real sum, n, r, p, e, power;
+    real_bits bits;
 
-    p = p * r + 1.0 / 479001600.0;
-    p = p * r + 1.0 / 39916800.0;
-    p = p * r + 1.0 / 3628800.0;
-    p = p * r + 1.0 / 362880.0;
-    p = p * r + 1.0 / 40320.0;
-    p = p * r + 1.0 / 5040.0;
-    p = p * r + 1.0 / 720.0;
-    p = p * r + 1.0 / 120.0;
-    p = p * r + 1.0 / 24.0;
-    p = p * r + 1.0 / 6.0;
-    p = p * r + 0.5;
-    e = r + r * r * p;
-    memcpy(&bits, &sum, sizeof bits); /* its last bits are n */
-    bits = (bits + 1023u) << 52;
-    memcpy(&power, &bits, sizeof power); /* 2^n */
-    e = power * e + (power - 1.0);
-    return e / (e + 2.0);
+    TANH_OF(x, sum, n, r, p, e, power, bits);
+    return e;
 }
 #define TANH(x) tanh_near(x)
 #if defined(__GNUC__)
 #define TANH_LANES
-typedef uint64_t lanes_bits __attribute__((vector_size(LANE_BYTES)));
+typedef real_bits lanes_bits __attribute__((vector_size(LANE_BYTES)));
 
-static void tanh_lanes(real *a)
+static void tanh_lanes(real *a, const real *sums)
 {
-    const real shift = 6755399441055744.0;
-    lanes x, sum, n, r, p, e, power;
-    lanes_bits bits;
+    const lanes zero = {R(0.0)}, limit = zero + R(400.0), one = zero + R(1.0);
+    const lanes_bits none = {0u}, sign = ~(~none >> 1);
+    lanes x, square, sum, n, r, p, e, power;
+    lanes_bits bits, beyond, ends;
 
-    memcpy(&x, a, sizeof x);
-    x += x;
-    sum = x * 1.4426950408889634 + shift;
-    n = sum - shift;
-    r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
-    p = r * (1.0 / 6227020800.0) + 1.0 / 479001600.0;
-    p = p * r + 1.0 / 39916800.0;
-    p = p * r + 1.0 / 3628800.0;
-    p = p * r + 1.0 / 362880.0;
-    p = p * r + 1.0 / 40320.0;
-    p = p * r + 1.0 / 5040.0;
-    p = p * r + 1.0 / 720.0;
-    p = p * r + 1.0 / 120.0;
-    p = p * r + 1.0 / 24.0;
-    p = p * r + 1.0 / 6.0;
-    p = p * r + 0.5;
-    e = r + r * r * p;
-    memcpy(&bits, &sum, sizeof bits);
-    bits = (bits + 1023u) << 52;
-    memcpy(&power, &bits, sizeof power);
-    e = power * e + (power - 1.0);
-    e = e / (e + 2.0);
+    /* Beyond 20 it is 1 or -1, the tanh of a double, put in place of that of 0. As masks: a loop over the numbers, in
+     * whatever width a compiler makes of it, would wait for sums that were stored in another. */
+    memcpy(&x, sums, sizeof x);
+    square = x * x;
+    beyond = (lanes_bits)(square > limit);
+    ends = beyond & (((lanes_bits)x & sign) | (lanes_bits)one);
+    x = (lanes)((lanes_bits)x & ~beyond);
+    TANH_OF(x, sum, n, r, p, e, power, bits);
+    e = (lanes)((lanes_bits)e | ends);
     memcpy(a, &e, sizeof e);
 }
 #endif
@@ -103,12 +127,13 @@ static void tanh_lanes(real *a)
 #define TANH(x) tanh(x)
 #endif
 
-/* Constants and weighted sums of regressors, of each neuron one; weights by regressor, then by neuron. */
+/* Constants and weighted sums of regressors, of each neuron one; weights by regressor, then by neuron. Neurons that do
+ * not fill a register share the last one with those before them, which are computed twice. */
 static void weigh(real *sums, const real *constants, const real *weights, int n, const real *x, int n_x)
 {
     int i, k = 0;
 
-#if defined(__GNUC__)
+#if defined(LANES)
     for (; k + 2 * LANES <= n; k += 2 * LANES) {
         const real *row = weights + k;
         lanes low, high, w;
@@ -124,6 +149,18 @@ static void weigh(real *sums, const real *constants, const real *weights, int n,
         memcpy(sums + k, &low, sizeof low);
         memcpy(sums + k + LANES, &high, sizeof high);
     }
+    for (; n >= LANES && k < n; k += LANES) {
+        const int first = k + LANES <= n ? k : n - LANES;
+        const real *row = weights + first;
+        lanes sum, w;
+
+        memcpy(&sum, constants + first, sizeof sum);
+        for (i = 0; i < n_x; i++, row += n) {
+            memcpy(&w, row, sizeof w);
+            sum += w * x[i];
+        }
+        memcpy(sums + first, &sum, sizeof sum);
+    }
 #endif
     for (; k < n; k++) {
         const real *own = weights + k;
@@ -137,22 +174,21 @@ static void weigh(real *sums, const real *constants, const real *weights, int n,
 }
 
 /* Neurons of a layer. Beyond 20 the tanh of a double is 1; not a number stays as it is. */
-static void activate(real *a, int n)
+static void activate(real *a, const real *sums, int n)
 {
     int i = 0;
 
-    for (i = 0; i < n; i++) {
-        a[i] = a[i] > R(20.0) ? R(20.0) : a[i];
-        a[i] = a[i] < R(-20.0) ? R(-20.0) : a[i];
-    }
-    i = 0;
 #if defined(TANH_LANES)
-    for (; i + LANES <= n; i += LANES) {
-        tanh_lanes(a + i);
+    for (; n >= LANES && i < n; i += LANES) {
+        const int first = i + LANES <= n ? i : n - LANES;
+
+        tanh_lanes(a + first, sums + first);
     }
 #endif
     for (; i < n; i++) {
-        a[i] = TANH(a[i]);
+        const real below = sums[i] > R(20.0) ? R(20.0) : sums[i];
+
+        a[i] = TANH(below < R(-20.0) ? R(-20.0) : below);
     }
 }
 
@@ -175,11 +211,17 @@ static real dot(const real *a, const real *b, int n)
 }
 
 /* A number of the state and its change. In float, what rounding takes from the sum is kept for the next step: most of
- * the change of a slow output is lost without. volatile, because it must be rounded before it is taken away again. */
+ * the change of a slow output is lost without. volatile, where the compiler would not round it otherwise before it is
+ * taken away again. */
 #if defined(STP_TO_BP_ER_AR_BC_FLOAT)
+#if defined(AS_WRITTEN)
+#define ROUNDED
+#else
+#define ROUNDED volatile
+#endif
 static real added(real last, real change, real *lost)
 {
-    volatile real sum;
+    ROUNDED real sum;
 
     change += *lost;
     sum = last + change;
@@ -195,7 +237,7 @@ static real added(real last, real change, real *lost)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage0(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[0]; /* STP [psi] */
     real y[1];
@@ -228,7 +270,7 @@ static unsigned int stage0(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage1(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[1]; /* HE [1] */
     real y[1];
@@ -267,7 +309,7 @@ static unsigned int stage1(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage2(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][17] = {
         {
@@ -325,7 +367,7 @@ static unsigned int stage2(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage3(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[3]; /* SE [1] */
     real y[1];
@@ -359,7 +401,7 @@ static unsigned int stage3(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage4(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][31] = {
         {
@@ -767,7 +809,7 @@ static unsigned int stage4(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[16];
-    real a[16];
+    real a[16], sums[16];
     const real u0 = (known[0] - R(45.0)) / R(45.0); /* STP [psi] */
     real y[1];
     real *const past = state->past + 24;
@@ -806,8 +848,8 @@ static unsigned int stage4(stp_to_bp_er_ar_bc_state *state, real *known)
     x[28] = past[38] - past[46];
     x[29] = past[46] - past[62];
     x[30] = past[62] - past[94];
-    weigh(a, b, W[0], 16, x, 31);
-    activate(a, 16);
+    weigh(sums, b, W[0], 16, x, 31);
+    activate(a, sums, 16);
     weigh(g, v[0], G[0], 16, x, 31);
     y[0] = R(-0.0042320305036819385) + dot(w[0], x, 31) + dot(g, a, 16);
     y[0] = ADDED(past[31], y[0], 4);
@@ -866,7 +908,7 @@ static unsigned int stage4(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage5(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     real y[1];
@@ -900,7 +942,7 @@ static unsigned int stage5(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage6(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[3]; /* SE [1] */
     real y[1];
@@ -934,7 +976,7 @@ static unsigned int stage6(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage7(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][37] = {
         {
@@ -1416,7 +1458,7 @@ static unsigned int stage7(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[16];
-    real a[16];
+    real a[16], sums[16];
     const real u0 = (known[5] - R(44.999999999999964)) / R(44.999999999999964); /* BP [psi] */
     real y[1];
     real *const past = state->past + 123;
@@ -1461,8 +1503,8 @@ static unsigned int stage7(stp_to_bp_er_ar_bc_state *state, real *known)
     x[34] = past[561] - past[593];
     x[35] = past[593] - past[657];
     x[36] = past[657] - past[785];
-    weigh(a, b, W[0], 16, x, 37);
-    activate(a, 16);
+    weigh(sums, b, W[0], 16, x, 37);
+    activate(a, sums, 16);
     weigh(g, v[0], G[0], 16, x, 37);
     y[0] = R(0.0005069259196752364) + dot(w[0], x, 37) + dot(g, a, 16);
     y[0] = ADDED(past[530], y[0], 7);
@@ -1510,7 +1552,7 @@ static unsigned int stage7(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage8(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     real y[1];
@@ -1544,7 +1586,7 @@ static unsigned int stage8(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage9(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     real y[1];
@@ -1578,7 +1620,7 @@ static unsigned int stage9(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage10(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     real y[1];
@@ -1612,7 +1654,7 @@ static unsigned int stage10(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage11(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     real y[1];
@@ -1646,7 +1688,7 @@ static unsigned int stage11(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage12(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     real y[1];
@@ -1680,7 +1722,7 @@ static unsigned int stage12(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage13(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[10]; /* SH [psi] */
     real y[1];
@@ -1714,7 +1756,7 @@ static unsigned int stage13(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage14(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[11]; /* SH10 [psi] */
     real y[1];
@@ -1748,7 +1790,7 @@ static unsigned int stage14(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage15(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[12]; /* SD [psi] */
     real y[1];
@@ -1782,7 +1824,7 @@ static unsigned int stage15(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage16(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][3] = {
         {
@@ -1831,7 +1873,7 @@ static unsigned int stage16(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[8];
-    real a[8];
+    real a[8], sums[8];
     const real u0 = (known[5] - R(44.999999999999964)) / R(44.999999999999964); /* BP [psi] */
     real y[1];
     real *const past = state->past + 925;
@@ -1842,8 +1884,8 @@ static unsigned int stage16(stp_to_bp_er_ar_bc_state *state, real *known)
     x[0] = u0;
     x[1] = u0 - past[0];
     x[2] = past[1];
-    weigh(a, b, W[0], 8, x, 3);
-    activate(a, 8);
+    weigh(sums, b, W[0], 8, x, 3);
+    activate(a, sums, 8);
     weigh(g, v[0], G[0], 8, x, 3);
     y[0] = R(-0.00033008743272266994) + dot(w[0], x, 3) + dot(g, a, 8);
     y[0] = ADDED(past[1], y[0], 16);
@@ -1886,7 +1928,7 @@ static unsigned int stage16(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage17(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[17]; /* PS [psi] */
@@ -1925,7 +1967,7 @@ static unsigned int stage17(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage18(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[17]; /* PS [psi] */
@@ -1964,7 +2006,7 @@ static unsigned int stage18(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage19(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[17]; /* PS [psi] */
@@ -2000,7 +2042,7 @@ static unsigned int stage19(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage20(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[19]; /* EM [1] */
     const real u1 = known[20]; /* EC [1] */
@@ -2035,7 +2077,7 @@ static unsigned int stage20(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage21(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[20]; /* EC [1] */
     const real u1 = known[6]; /* RL [1] */
@@ -2070,7 +2112,7 @@ static unsigned int stage21(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage22(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[17]; /* PS [psi] */
@@ -2109,7 +2151,7 @@ static unsigned int stage22(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage23(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[13]; /* SD10 [psi] */
     real y[1];
@@ -2143,7 +2185,7 @@ static unsigned int stage23(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage24(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][3] = {
         {
@@ -2192,7 +2234,7 @@ static unsigned int stage24(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[8];
-    real a[8];
+    real a[8], sums[8];
     const real u0 = (known[8] - R(44.999999999999964)) / R(44.999999999999964); /* BP10 [psi] */
     real y[1];
     real *const past = state->past + 940;
@@ -2203,8 +2245,8 @@ static unsigned int stage24(stp_to_bp_er_ar_bc_state *state, real *known)
     x[0] = u0;
     x[1] = u0 - past[0];
     x[2] = past[1];
-    weigh(a, b, W[0], 8, x, 3);
-    activate(a, 8);
+    weigh(sums, b, W[0], 8, x, 3);
+    activate(a, sums, 8);
     weigh(g, v[0], G[0], 8, x, 3);
     y[0] = R(-0.00033008743272266994) + dot(w[0], x, 3) + dot(g, a, 8);
     y[0] = ADDED(past[1], y[0], 24);
@@ -2247,7 +2289,7 @@ static unsigned int stage24(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage25(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u1 = known[25]; /* PS10 [psi] */
@@ -2286,7 +2328,7 @@ static unsigned int stage25(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage26(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u1 = known[25]; /* PS10 [psi] */
@@ -2325,7 +2367,7 @@ static unsigned int stage26(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage27(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u1 = known[25]; /* PS10 [psi] */
@@ -2361,7 +2403,7 @@ static unsigned int stage27(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage28(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[27]; /* EM10 [1] */
     const real u1 = known[28]; /* EC10 [1] */
@@ -2396,7 +2438,7 @@ static unsigned int stage28(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage29(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[28]; /* EC10 [1] */
     const real u1 = known[9]; /* RL10 [1] */
@@ -2431,7 +2473,7 @@ static unsigned int stage29(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage30(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u1 = known[25]; /* PS10 [psi] */
@@ -2470,7 +2512,7 @@ static unsigned int stage30(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage31(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u2 = known[6]; /* RL [1] */
@@ -2507,7 +2549,7 @@ static unsigned int stage31(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage32(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u2 = known[9]; /* RL10 [1] */
@@ -2544,7 +2586,7 @@ static unsigned int stage32(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage33(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u2 = known[20]; /* EC [1] */
     real y[1];
@@ -2581,7 +2623,7 @@ static unsigned int stage33(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage34(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u2 = known[28]; /* EC10 [1] */
     real y[1];
@@ -2618,7 +2660,7 @@ static unsigned int stage34(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage35(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[32]; /* LR [psi] */
     const real u2 = known[34]; /* XE [psi] */
@@ -2654,7 +2696,7 @@ static unsigned int stage35(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage36(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[33]; /* LR10 [psi] */
     const real u2 = known[35]; /* XE10 [psi] */
@@ -2690,7 +2732,7 @@ static unsigned int stage36(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage37(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u2 = known[6]; /* RL [1] */
@@ -2727,7 +2769,7 @@ static unsigned int stage37(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage38(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u2 = known[9]; /* RL10 [1] */
@@ -2764,7 +2806,7 @@ static unsigned int stage38(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage39(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u2 = known[23]; /* BW [1] */
     real y[1];
@@ -2800,7 +2842,7 @@ static unsigned int stage39(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage40(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u2 = known[31]; /* BW10 [1] */
     real y[1];
@@ -2836,7 +2878,7 @@ static unsigned int stage40(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage41(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[38]; /* XP [psi] */
     const real u1 = known[40]; /* XS [psi] */
@@ -2871,7 +2913,7 @@ static unsigned int stage41(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage42(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[39]; /* XP10 [psi] */
     const real u1 = known[41]; /* XS10 [psi] */
@@ -2906,7 +2948,7 @@ static unsigned int stage42(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage43(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[38]; /* XP [psi] */
     const real u2 = known[42]; /* XM [psi] */
@@ -2942,7 +2984,7 @@ static unsigned int stage43(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage44(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[39]; /* XP10 [psi] */
     const real u2 = known[43]; /* XM10 [psi] */
@@ -2978,7 +3020,7 @@ static unsigned int stage44(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage45(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u2 = known[22]; /* TR [1] */
     const real u3 = known[23]; /* BW [1] */
@@ -3017,7 +3059,7 @@ static unsigned int stage45(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage46(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][9] = {
         {
@@ -3156,7 +3198,7 @@ static unsigned int stage46(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[16];
-    real a[16];
+    real a[16], sums[16];
     const real u0 = (known[32] - R(9.346986478837053)) / R(9.346986478837053); /* LR [psi] */
     const real u2 = (known[46] - R(39.39376299800938)) / R(39.39376299800938); /* XA [psi] */
     const real u3 = (known[34] - R(45.5)) / R(45.5); /* XE [psi] */
@@ -3176,8 +3218,8 @@ static unsigned int stage46(stp_to_bp_er_ar_bc_state *state, real *known)
     x[6] = past[3];
     x[7] = past[3] - past[4];
     x[8] = past[5];
-    weigh(a, b, W[0], 16, x, 9);
-    activate(a, 16);
+    weigh(sums, b, W[0], 16, x, 9);
+    activate(a, sums, 16);
     weigh(g, v[0], G[0], 16, x, 9);
     y[0] = R(0.0006572957261553047) + dot(w[0], x, 9) + dot(g, a, 16);
     y[0] = ADDED(past[5], y[0], 46);
@@ -3223,7 +3265,7 @@ static unsigned int stage46(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage47(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[47]; /* AR [psi] */
@@ -3258,7 +3300,7 @@ static unsigned int stage47(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage48(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u2 = known[30]; /* TR10 [1] */
     const real u3 = known[31]; /* BW10 [1] */
@@ -3297,7 +3339,7 @@ static unsigned int stage48(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage49(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][9] = {
         {
@@ -3436,7 +3478,7 @@ static unsigned int stage49(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[16];
-    real a[16];
+    real a[16], sums[16];
     const real u0 = (known[33] - R(9.346986478837053)) / R(9.346986478837053); /* LR10 [psi] */
     const real u2 = (known[49] - R(39.39376299800938)) / R(39.39376299800938); /* XA10 [psi] */
     const real u3 = (known[35] - R(45.5)) / R(45.5); /* XE10 [psi] */
@@ -3456,8 +3498,8 @@ static unsigned int stage49(stp_to_bp_er_ar_bc_state *state, real *known)
     x[6] = past[3];
     x[7] = past[3] - past[4];
     x[8] = past[5];
-    weigh(a, b, W[0], 16, x, 9);
-    activate(a, 16);
+    weigh(sums, b, W[0], 16, x, 9);
+    activate(a, sums, 16);
     weigh(g, v[0], G[0], 16, x, 9);
     y[0] = R(0.0006549742404472481) + dot(w[0], x, 9) + dot(g, a, 16);
     y[0] = ADDED(past[5], y[0], 49);
@@ -3503,7 +3545,7 @@ static unsigned int stage49(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage50(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u1 = known[50]; /* AR10 [psi] */
@@ -3538,7 +3580,7 @@ static unsigned int stage50(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage51(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[47]; /* AR [psi] */
@@ -3573,7 +3615,7 @@ static unsigned int stage51(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage52(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u1 = known[50]; /* AR10 [psi] */
@@ -3608,7 +3650,7 @@ static unsigned int stage52(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage53(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[47]; /* AR [psi] */
     const real u2 = known[6]; /* RL [1] */
@@ -3644,7 +3686,7 @@ static unsigned int stage53(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage54(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[50]; /* AR10 [psi] */
     const real u2 = known[9]; /* RL10 [1] */
@@ -3680,7 +3722,7 @@ static unsigned int stage54(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage55(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u2 = known[52]; /* RX [1] */
@@ -3716,7 +3758,7 @@ static unsigned int stage55(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage56(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u2 = known[53]; /* RX10 [1] */
@@ -3752,7 +3794,7 @@ static unsigned int stage56(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage57(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[54]; /* FX [psi] */
     real y[1];
@@ -3786,7 +3828,7 @@ static unsigned int stage57(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage58(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[55]; /* FX10 [psi] */
     real y[1];
@@ -3820,7 +3862,7 @@ static unsigned int stage58(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage59(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[56]; /* FR [psi] */
     const real u2 = known[34]; /* XE [psi] */
@@ -3856,7 +3898,7 @@ static unsigned int stage59(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage60(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][9] = {
         {
@@ -3955,7 +3997,7 @@ static unsigned int stage60(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[8];
-    real a[8];
+    real a[8], sums[8];
     const real u0 = (known[56] - R(12.017456777561783)) / R(12.017456777561783); /* FR [psi] */
     const real u1 = (known[54] - R(1.3146598454339298)) / R(1.3146598454339298); /* FX [psi] */
     const real u3 = (known[34] - R(45.5)) / R(45.5); /* XE [psi] */
@@ -3974,8 +4016,8 @@ static unsigned int stage60(stp_to_bp_er_ar_bc_state *state, real *known)
     x[6] = u3;
     x[7] = u3 - past[4];
     x[8] = past[5];
-    weigh(a, b, W[0], 8, x, 9);
-    activate(a, 8);
+    weigh(sums, b, W[0], 8, x, 9);
+    activate(a, sums, 8);
     weigh(g, v[0], G[0], 8, x, 9);
     y[0] = R(-0.006612598267026537) + dot(w[0], x, 9) + dot(g, a, 8);
     y[0] = ADDED(past[5], y[0], 60);
@@ -4021,7 +4063,7 @@ static unsigned int stage60(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage61(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[61]; /* ER [psi] */
@@ -4056,7 +4098,7 @@ static unsigned int stage61(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage62(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[57]; /* FR10 [psi] */
     const real u2 = known[35]; /* XE10 [psi] */
@@ -4092,7 +4134,7 @@ static unsigned int stage62(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage63(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][9] = {
         {
@@ -4191,7 +4233,7 @@ static unsigned int stage63(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[8];
-    real a[8];
+    real a[8], sums[8];
     const real u0 = (known[57] - R(12.017456777561783)) / R(12.017456777561783); /* FR10 [psi] */
     const real u1 = (known[55] - R(1.3146598454339298)) / R(1.3146598454339298); /* FX10 [psi] */
     const real u3 = (known[35] - R(45.5)) / R(45.5); /* XE10 [psi] */
@@ -4210,8 +4252,8 @@ static unsigned int stage63(stp_to_bp_er_ar_bc_state *state, real *known)
     x[6] = u3;
     x[7] = u3 - past[4];
     x[8] = past[5];
-    weigh(a, b, W[0], 8, x, 9);
-    activate(a, 8);
+    weigh(sums, b, W[0], 8, x, 9);
+    activate(a, sums, 8);
     weigh(g, v[0], G[0], 8, x, 9);
     y[0] = R(-0.006592155191227189) + dot(w[0], x, 9) + dot(g, a, 8);
     y[0] = ADDED(past[5], y[0], 63);
@@ -4257,7 +4299,7 @@ static unsigned int stage63(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage64(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u1 = known[64]; /* ER10 [psi] */
@@ -4292,7 +4334,7 @@ static unsigned int stage64(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage65(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[47]; /* AR [psi] */
     const real u1 = known[61]; /* ER [psi] */
@@ -4333,7 +4375,7 @@ static unsigned int stage65(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage66(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[50]; /* AR10 [psi] */
     const real u1 = known[64]; /* ER10 [psi] */
@@ -4374,7 +4416,7 @@ static unsigned int stage66(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage67(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[66]; /* GA [psi] */
     real y[1];
@@ -4408,7 +4450,7 @@ static unsigned int stage67(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage68(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[67]; /* GA10 [psi] */
     real y[1];
@@ -4442,7 +4484,7 @@ static unsigned int stage68(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage69(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 1057;
@@ -4474,7 +4516,7 @@ static unsigned int stage69(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage70(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 1059;
@@ -4506,7 +4548,7 @@ static unsigned int stage70(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage71(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[68]; /* QA [psi] */
     const real u1 = known[70]; /* QB [psi] */
@@ -4541,7 +4583,7 @@ static unsigned int stage71(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage72(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[69]; /* QA10 [psi] */
     const real u1 = known[71]; /* QB10 [psi] */
@@ -4576,7 +4618,7 @@ static unsigned int stage72(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage73(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[66]; /* GA [psi] */
     real y[1];
@@ -4610,7 +4652,7 @@ static unsigned int stage73(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage74(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[67]; /* GA10 [psi] */
     real y[1];
@@ -4644,7 +4686,7 @@ static unsigned int stage74(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage75(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 1067;
@@ -4676,7 +4718,7 @@ static unsigned int stage75(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage76(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 1069;
@@ -4708,7 +4750,7 @@ static unsigned int stage76(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage77(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[74]; /* QC [psi] */
     const real u1 = known[76]; /* QD [psi] */
@@ -4743,7 +4785,7 @@ static unsigned int stage77(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage78(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[75]; /* QC10 [psi] */
     const real u1 = known[77]; /* QD10 [psi] */
@@ -4778,7 +4820,7 @@ static unsigned int stage78(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage79(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 1073;
@@ -4810,7 +4852,7 @@ static unsigned int stage79(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage80(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 1075;
@@ -4842,7 +4884,7 @@ static unsigned int stage80(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage81(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 1077;
@@ -4874,7 +4916,7 @@ static unsigned int stage81(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage82(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 1079;
@@ -4906,7 +4948,7 @@ static unsigned int stage82(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage83(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[66]; /* GA [psi] */
     const real u2 = known[72]; /* GC [psi] */
@@ -4944,7 +4986,7 @@ static unsigned int stage83(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage84(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[67]; /* GA10 [psi] */
     const real u2 = known[73]; /* GC10 [psi] */
@@ -4982,7 +5024,7 @@ static unsigned int stage84(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage85(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u2 = known[23]; /* BW [1] */
@@ -5018,7 +5060,7 @@ static unsigned int stage85(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage86(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u2 = known[31]; /* BW10 [1] */
@@ -5054,7 +5096,7 @@ static unsigned int stage86(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage87(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[66]; /* GA [psi] */
     const real u2 = known[72]; /* GC [psi] */
@@ -5098,7 +5140,7 @@ static unsigned int stage87(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage88(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[67]; /* GA10 [psi] */
     const real u2 = known[73]; /* GC10 [psi] */
@@ -5142,7 +5184,7 @@ static unsigned int stage88(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage89(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[23]; /* BW [1] */
@@ -5177,7 +5219,7 @@ static unsigned int stage89(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage90(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][10] = {
         {
@@ -5306,7 +5348,7 @@ static unsigned int stage90(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[12];
-    real a[12];
+    real a[12], sums[12];
     const real u0 = (known[66] - R(0.5802108024111021)) / R(0.5802108024111021); /* GA [psi] */
     const real u1 = (known[72] - R(0.5742191975887749)) / R(0.5742191975887749); /* GC [psi] */
     const real u2 = (known[78] - R(0.33191324534277555)) / R(0.33191324534277555); /* GE [psi] */
@@ -5330,8 +5372,8 @@ static unsigned int stage90(stp_to_bp_er_ar_bc_state *state, real *known)
     x[7] = u6;
     x[8] = u6 - past[1];
     x[9] = past[2];
-    weigh(a, b, W[0], 12, x, 10);
-    activate(a, 12);
+    weigh(sums, b, W[0], 12, x, 10);
+    activate(a, sums, 12);
     weigh(g, v[0], G[0], 12, x, 10);
     y[0] = R(0.0008760443197205481) + dot(w[0], x, 10) + dot(g, a, 12);
     y[0] = ADDED(past[2], y[0], 90);
@@ -5375,7 +5417,7 @@ static unsigned int stage90(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage91(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[91]; /* BC [psi] */
     const real u1 = known[6]; /* RL [1] */
@@ -5412,7 +5454,7 @@ static unsigned int stage91(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage92(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     const real u1 = known[31]; /* BW10 [1] */
@@ -5447,7 +5489,7 @@ static unsigned int stage92(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage93(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][10] = {
         {
@@ -5576,7 +5618,7 @@ static unsigned int stage93(stp_to_bp_er_ar_bc_state *state, real *known)
         }
     };
     real g[12];
-    real a[12];
+    real a[12], sums[12];
     const real u0 = (known[67] - R(0.5802108024111021)) / R(0.5802108024111021); /* GA10 [psi] */
     const real u1 = (known[73] - R(0.5742191975887749)) / R(0.5742191975887749); /* GC10 [psi] */
     const real u2 = (known[79] - R(0.33191324534277555)) / R(0.33191324534277555); /* GE10 [psi] */
@@ -5600,8 +5642,8 @@ static unsigned int stage93(stp_to_bp_er_ar_bc_state *state, real *known)
     x[7] = u6;
     x[8] = u6 - past[1];
     x[9] = past[2];
-    weigh(a, b, W[0], 12, x, 10);
-    activate(a, 12);
+    weigh(sums, b, W[0], 12, x, 10);
+    activate(a, sums, 12);
     weigh(g, v[0], G[0], 12, x, 10);
     y[0] = R(0.0008770879380325947) + dot(w[0], x, 10) + dot(g, a, 12);
     y[0] = ADDED(past[2], y[0], 93);
@@ -5645,7 +5687,7 @@ static unsigned int stage93(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage94(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[94]; /* BC10 [psi] */
     const real u1 = known[9]; /* RL10 [1] */
@@ -5682,7 +5724,7 @@ static unsigned int stage94(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage95(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[0]; /* STP [psi] */
     const real u2 = known[1]; /* HE [1] */
@@ -5718,7 +5760,7 @@ static unsigned int stage95(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage96(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[0]; /* STP [psi] */
     const real u1 = known[96]; /* XQ [psi] */
@@ -5753,7 +5795,7 @@ static unsigned int stage96(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage97(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[97]; /* EQ [psi] */
@@ -5788,7 +5830,7 @@ static unsigned int stage97(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage98(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[5]; /* BP [psi] */
     const real u1 = known[97]; /* EQ [psi] */
@@ -5823,7 +5865,7 @@ static unsigned int stage98(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage99(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     real y[1];
@@ -5856,7 +5898,7 @@ static unsigned int stage99(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage100(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     real y[1];
@@ -5889,7 +5931,7 @@ static unsigned int stage100(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage101(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[8]; /* BP10 [psi] */
     real y[1];
@@ -5922,7 +5964,7 @@ static unsigned int stage101(stp_to_bp_er_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage102(stp_to_bp_er_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[29]; /* VO10 [1] */
     real y[1];
@@ -6060,6 +6102,9 @@ void stp_to_bp_er_ar_bc_init(stp_to_bp_er_ar_bc_state *state, const real *inputs
     known[101] = R(90.0); /* LB */
     known[102] = R(90.0); /* LC */
     known[103] = R(0.0); /* LV */
+    for (i = 0; i < 104; i++) {
+        known[i] += R(0.0) * known[i]; /* what is infinite is read as not a number */
+    }
     for (i = 0; i < 1; i++) { /* HE [1] */
         state->past[i] = known[1];
     }
@@ -6816,6 +6861,9 @@ unsigned int stp_to_bp_er_ar_bc_step(stp_to_bp_er_ar_bc_state *state, const real
     }
     if (known[STP_TO_BP_ER_AR_BC_INPUT_STP] < R(0.0) || known[STP_TO_BP_ER_AR_BC_INPUT_STP] > R(90.0)) {
         flags |= STP_TO_BP_ER_AR_BC_OUTSIDE_RANGE;
+    }
+    for (i = 0; i < STP_TO_BP_ER_AR_BC_N_INPUTS; i++) {
+        known[i] += R(0.0) * known[i]; /* what is infinite is read as not a number */
     }
     flags |= stage0(state, known);
     flags |= stage1(state, known);

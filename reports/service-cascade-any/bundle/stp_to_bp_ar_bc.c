@@ -12,11 +12,20 @@ typedef stp_to_bp_ar_bc_real real;
 /* A number of the file as the number type that was chosen. */
 #define R(x) ((real)(x))
 
+/* Every sum is computed in the number's own type and in the order in which it stands. Method 16 is that of processors
+ * with arithmetic in half precision, which it alone widens. */
+#if !defined(__FAST_MATH__) && !defined(_M_FP_FAST) && defined(FLT_EVAL_METHOD)
+#if FLT_EVAL_METHOD + 0 == 0 || FLT_EVAL_METHOD + 0 == 16
+#define AS_WRITTEN
+#endif
+#endif
+
 #if defined(__GNUC__)
 /* Numbers side by side, in the vectors of GCC and Clang: at -O2 they do not make them of a loop by themselves. Not wider
- * than the registers there are: a wider one would go through memory. */
+ * than the registers there are: a wider one would go through memory. Four, and not eight, floats: layers are narrow, and
+ * one that is narrower than a register goes neuron by neuron. */
 #if defined(__AVX__)
-#define LANE_BYTES 32
+#define LANE_BYTES (4 * (int)sizeof(real))
 #else
 #define LANE_BYTES 16
 #endif
@@ -24,8 +33,7 @@ typedef stp_to_bp_ar_bc_real real;
 typedef real lanes __attribute__((vector_size(LANE_BYTES)));
 #endif
 
-#if !defined(STP_TO_BP_AR_BC_LIBM_TANH) && !defined(__FAST_MATH__) && !defined(_M_FP_FAST) && defined(FLT_EVAL_METHOD) \
-    && FLT_EVAL_METHOD + 0 == 0 && DBL_MANT_DIG == 53 && FLT_MANT_DIG == 24
+#if !defined(STP_TO_BP_AR_BC_LIBM_TANH) && defined(AS_WRITTEN) && DBL_MANT_DIG == 53 && FLT_MANT_DIG == 24
 #include <stdint.h>
 
 #if defined(STP_TO_BP_AR_BC_FLOAT)
@@ -94,13 +102,22 @@ static real tanh_near(real x)
 #define TANH_LANES
 typedef real_bits lanes_bits __attribute__((vector_size(LANE_BYTES)));
 
-static void tanh_lanes(real *a)
+static void tanh_lanes(real *a, const real *sums)
 {
-    lanes x, sum, n, r, p, e, power;
-    lanes_bits bits;
+    const lanes zero = {R(0.0)}, limit = zero + R(400.0), one = zero + R(1.0);
+    const lanes_bits none = {0u}, sign = ~(~none >> 1);
+    lanes x, square, sum, n, r, p, e, power;
+    lanes_bits bits, beyond, ends;
 
-    memcpy(&x, a, sizeof x);
+    /* Beyond 20 it is 1 or -1, the tanh of a double, put in place of that of 0. As masks: a loop over the numbers, in
+     * whatever width a compiler makes of it, would wait for sums that were stored in another. */
+    memcpy(&x, sums, sizeof x);
+    square = x * x;
+    beyond = (lanes_bits)(square > limit);
+    ends = beyond & (((lanes_bits)x & sign) | (lanes_bits)one);
+    x = (lanes)((lanes_bits)x & ~beyond);
     TANH_OF(x, sum, n, r, p, e, power, bits);
+    e = (lanes)((lanes_bits)e | ends);
     memcpy(a, &e, sizeof e);
 }
 #endif
@@ -110,12 +127,13 @@ static void tanh_lanes(real *a)
 #define TANH(x) tanh(x)
 #endif
 
-/* Constants and weighted sums of regressors, of each neuron one; weights by regressor, then by neuron. */
+/* Constants and weighted sums of regressors, of each neuron one; weights by regressor, then by neuron. Neurons that do
+ * not fill a register share the last one with those before them, which are computed twice. */
 static void weigh(real *sums, const real *constants, const real *weights, int n, const real *x, int n_x)
 {
     int i, k = 0;
 
-#if defined(__GNUC__)
+#if defined(LANES)
     for (; k + 2 * LANES <= n; k += 2 * LANES) {
         const real *row = weights + k;
         lanes low, high, w;
@@ -131,6 +149,18 @@ static void weigh(real *sums, const real *constants, const real *weights, int n,
         memcpy(sums + k, &low, sizeof low);
         memcpy(sums + k + LANES, &high, sizeof high);
     }
+    for (; n >= LANES && k < n; k += LANES) {
+        const int first = k + LANES <= n ? k : n - LANES;
+        const real *row = weights + first;
+        lanes sum, w;
+
+        memcpy(&sum, constants + first, sizeof sum);
+        for (i = 0; i < n_x; i++, row += n) {
+            memcpy(&w, row, sizeof w);
+            sum += w * x[i];
+        }
+        memcpy(sums + first, &sum, sizeof sum);
+    }
 #endif
     for (; k < n; k++) {
         const real *own = weights + k;
@@ -144,22 +174,21 @@ static void weigh(real *sums, const real *constants, const real *weights, int n,
 }
 
 /* Neurons of a layer. Beyond 20 the tanh of a double is 1; not a number stays as it is. */
-static void activate(real *a, int n)
+static void activate(real *a, const real *sums, int n)
 {
     int i = 0;
 
-    for (i = 0; i < n; i++) {
-        a[i] = a[i] > R(20.0) ? R(20.0) : a[i];
-        a[i] = a[i] < R(-20.0) ? R(-20.0) : a[i];
-    }
-    i = 0;
 #if defined(TANH_LANES)
-    for (; i + LANES <= n; i += LANES) {
-        tanh_lanes(a + i);
+    for (; n >= LANES && i < n; i += LANES) {
+        const int first = i + LANES <= n ? i : n - LANES;
+
+        tanh_lanes(a + first, sums + first);
     }
 #endif
     for (; i < n; i++) {
-        a[i] = TANH(a[i]);
+        const real below = sums[i] > R(20.0) ? R(20.0) : sums[i];
+
+        a[i] = TANH(below < R(-20.0) ? R(-20.0) : below);
     }
 }
 
@@ -185,7 +214,7 @@ static real dot(const real *a, const real *b, int n)
  * the change of a slow output is lost without. volatile, where the compiler would not round it otherwise before it is
  * taken away again. */
 #if defined(STP_TO_BP_AR_BC_FLOAT)
-#if !defined(__FAST_MATH__) && !defined(_M_FP_FAST) && defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD + 0 == 0
+#if defined(AS_WRITTEN)
 #define ROUNDED
 #else
 #define ROUNDED volatile
@@ -419,7 +448,7 @@ static unsigned int stage0(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[12];
-    real a[12];
+    real a[12], sums[12];
     const real u0 = (known[0] - R(77.1)) / R(12.899999999999999); /* STP [psi] */
     real y[1];
     real *const past = state->past + 0;
@@ -445,8 +474,8 @@ static unsigned int stage0(stp_to_bp_ar_bc_state *state, real *known)
     x[15] = past[21] - past[22];
     x[16] = past[22] - past[24];
     x[17] = past[24] - past[28];
-    weigh(a, b, W[0], 12, x, 18);
-    activate(a, 12);
+    weigh(sums, b, W[0], 12, x, 18);
+    activate(a, sums, 12);
     weigh(g, v[0], G[0], 12, x, 18);
     y[0] = R(0.004293260131382814) + dot(w[0], x, 18) + dot(g, a, 12);
     y[0] = ADDED(past[21], y[0], 0);
@@ -808,7 +837,7 @@ static unsigned int stage1(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[14];
-    real a[14];
+    real a[14], sums[14];
     const real u0 = (known[1] - R(77.10074838861541)) / R(12.899251611384514); /* BP [psi] */
     real y[1];
     real *const past = state->past + 29;
@@ -838,8 +867,8 @@ static unsigned int stage1(stp_to_bp_ar_bc_state *state, real *known)
     x[19] = past[520] - past[524];
     x[20] = past[524] - past[532];
     x[21] = past[532] - past[548];
-    weigh(a, b, W[0], 14, x, 22);
-    activate(a, 14);
+    weigh(sums, b, W[0], 14, x, 22);
+    activate(a, sums, 14);
     weigh(g, v[0], G[0], 14, x, 22);
     y[0] = R(-0.008877408185492085) + dot(w[0], x, 22) + dot(g, a, 14);
     y[0] = ADDED(past[517], y[0], 1);
@@ -1386,7 +1415,7 @@ static unsigned int stage14(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[12];
-    real a[12];
+    real a[12], sums[12];
     const real u0 = (known[1] - R(77.10074838861541)) / R(12.899251611384514); /* BP [psi] */
     const real u1 = (known[3] - R(0.5)) / R(0.5); /* RL [1] */
     real y[1];
@@ -1401,8 +1430,8 @@ static unsigned int stage14(stp_to_bp_ar_bc_state *state, real *known)
     x[3] = past[1] - past[2];
     x[4] = past[3];
     x[5] = past[3] - past[4];
-    weigh(a, b, W[0], 12, x, 6);
-    activate(a, 12);
+    weigh(sums, b, W[0], 12, x, 6);
+    activate(a, sums, 12);
     weigh(g, v[0], G[0], 12, x, 6);
     y[0] = R(0.001709171778741522) + dot(w[0], x, 6) + dot(g, a, 12);
     y[0] = ADDED(past[3], y[0], 14);
@@ -1612,7 +1641,7 @@ static unsigned int stage16(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[16];
-    real a[16];
+    real a[16], sums[16];
     const real u0 = (known[1] - R(77.10074838861541)) / R(12.899251611384514); /* BP [psi] */
     const real u1 = (known[15] - R(77.10078363184411)) / R(12.899216372399025); /* AR [psi] */
     const real u2 = (known[3] - R(0.5)) / R(0.5); /* RL [1] */
@@ -1630,8 +1659,8 @@ static unsigned int stage16(stp_to_bp_ar_bc_state *state, real *known)
     x[5] = u2 - past[2];
     x[6] = past[3];
     x[7] = past[3] - past[4];
-    weigh(a, b, W[0], 16, x, 8);
-    activate(a, 16);
+    weigh(sums, b, W[0], 16, x, 8);
+    activate(a, sums, 16);
     weigh(g, v[0], G[0], 16, x, 8);
     y[0] = R(-0.0028801933028151216) + dot(w[0], x, 8) + dot(g, a, 16);
     y[0] = ADDED(past[3], y[0], 16);
@@ -1880,7 +1909,7 @@ static unsigned int stage20(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[10];
-    real a[10];
+    real a[10], sums[10];
     const real u0 = (known[1] - R(77.10074838861541)) / R(12.899251611384514); /* BP [psi] */
     const real u1 = (known[15] - R(77.10078363184411)) / R(12.899216372399025); /* AR [psi] */
     const real u2 = (known[3] - R(0.5)) / R(0.5); /* RL [1] */
@@ -1897,8 +1926,8 @@ static unsigned int stage20(stp_to_bp_ar_bc_state *state, real *known)
     x[4] = u2;
     x[5] = u2 - past[2];
     x[6] = past[3];
-    weigh(a, b, W[0], 10, x, 7);
-    activate(a, 10);
+    weigh(sums, b, W[0], 10, x, 7);
+    activate(a, sums, 10);
     weigh(g, v[0], G[0], 10, x, 7);
     y[0] = R(-0.0005350564684823977) + dot(w[0], x, 7) + dot(g, a, 10);
     y[0] = ADDED(past[3], y[0], 20);
@@ -2065,7 +2094,7 @@ static unsigned int stage22(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[12];
-    real a[12];
+    real a[12], sums[12];
     const real u0 = (known[2] - R(77.10074838861541)) / R(12.899251611384514); /* BP10 [psi] */
     const real u1 = (known[4] - R(0.5)) / R(0.5); /* RL10 [1] */
     real y[1];
@@ -2080,8 +2109,8 @@ static unsigned int stage22(stp_to_bp_ar_bc_state *state, real *known)
     x[3] = past[1] - past[2];
     x[4] = past[3];
     x[5] = past[3] - past[4];
-    weigh(a, b, W[0], 12, x, 6);
-    activate(a, 12);
+    weigh(sums, b, W[0], 12, x, 6);
+    activate(a, sums, 12);
     weigh(g, v[0], G[0], 12, x, 6);
     y[0] = R(0.00176889420538532) + dot(w[0], x, 6) + dot(g, a, 12);
     y[0] = ADDED(past[3], y[0], 22);
@@ -2330,7 +2359,7 @@ static unsigned int stage26(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[10];
-    real a[10];
+    real a[10], sums[10];
     const real u0 = (known[2] - R(77.10074838861541)) / R(12.899251611384514); /* BP10 [psi] */
     const real u1 = (known[23] - R(77.10078363184411)) / R(12.899216372399025); /* AR10 [psi] */
     const real u2 = (known[4] - R(0.5)) / R(0.5); /* RL10 [1] */
@@ -2347,8 +2376,8 @@ static unsigned int stage26(stp_to_bp_ar_bc_state *state, real *known)
     x[4] = u2;
     x[5] = u2 - past[2];
     x[6] = past[3];
-    weigh(a, b, W[0], 10, x, 7);
-    activate(a, 10);
+    weigh(sums, b, W[0], 10, x, 7);
+    activate(a, sums, 10);
     weigh(g, v[0], G[0], 10, x, 7);
     y[0] = R(-0.0003585282757339048) + dot(w[0], x, 7) + dot(g, a, 10);
     y[0] = ADDED(past[3], y[0], 26);

@@ -1,5 +1,5 @@
 /* STP -> BP, AR, BC: 19 models with 2013 parameters
- * See stp_to_bp_ar_bc.h. Written by sysid-workbench 0.1.0; do not edit.
+ * See stp_to_bp_ar_bc.h. Written by sysid-workbench 0.2.0; do not edit.
  */
 #include "stp_to_bp_ar_bc.h"
 
@@ -12,11 +12,20 @@ typedef stp_to_bp_ar_bc_real real;
 /* A number of the file as the number type that was chosen. */
 #define R(x) ((real)(x))
 
+/* Every sum is computed in the number's own type and in the order in which it stands. Method 16 is that of processors
+ * with arithmetic in half precision, which it alone widens. */
+#if !defined(__FAST_MATH__) && !defined(_M_FP_FAST) && defined(FLT_EVAL_METHOD)
+#if FLT_EVAL_METHOD + 0 == 0 || FLT_EVAL_METHOD + 0 == 16
+#define AS_WRITTEN
+#endif
+#endif
+
 #if defined(__GNUC__)
 /* Numbers side by side, in the vectors of GCC and Clang: at -O2 they do not make them of a loop by themselves. Not wider
- * than the registers there are: a wider one would go through memory. */
+ * than the registers there are: a wider one would go through memory. Four, and not eight, floats: layers are narrow, and
+ * one that is narrower than a register goes neuron by neuron. */
 #if defined(__AVX__)
-#define LANE_BYTES 32
+#define LANE_BYTES (4 * (int)sizeof(real))
 #else
 #define LANE_BYTES 16
 #endif
@@ -24,76 +33,91 @@ typedef stp_to_bp_ar_bc_real real;
 typedef real lanes __attribute__((vector_size(LANE_BYTES)));
 #endif
 
-#if !defined(STP_TO_BP_AR_BC_FLOAT) && !defined(STP_TO_BP_AR_BC_LIBM_TANH) && !defined(__FAST_MATH__) && !defined(_M_FP_FAST) \
-    && defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD + 0 == 0 && DBL_MANT_DIG == 53
+#if !defined(STP_TO_BP_AR_BC_LIBM_TANH) && defined(AS_WRITTEN) && DBL_MANT_DIG == 53 && FLT_MANT_DIG == 24
 #include <stdint.h>
+
+#if defined(STP_TO_BP_AR_BC_FLOAT)
+typedef uint32_t real_bits;
+#define SHIFT R(12582912.0) /* 1.5 * 2^23: the sum with it has no digits after the point */
+#define LN2_HIGH R(0.693359375)
+#define LN2_LOW R(-2.12194440e-4)
+#define BIAS 127u
+#define DIGITS 23
+#else
+typedef uint64_t real_bits;
+#define SHIFT R(6755399441055744.0) /* 1.5 * 2^52 */
+#define LN2_HIGH R(6.93147180369123816490e-01)
+#define LN2_LOW R(1.90821492927058770002e-10)
+#define BIAS 1023u
+#define DIGITS 52
+#endif
 
 /* tanh as e / (e + 2) with e = exp(2 x) - 1, without a branch, so that several run side by side: faster than libm's in
  * a network, and at most 5 units in the last place from the true value. Where the compiler may
- * reorder sums or computes in more than double, rounding to a whole number by adding a large one would not work, and
- * libm's is used. |x| is at most 20 here. */
+ * reorder sums or computes in more than the number's type, rounding to a whole number by adding a large one would not
+ * work, and libm's is used. |x| is at most 20 here. First the Taylor coefficients of exp from 1/2! on, as many as the
+ * number type can tell where |r| is at most ln(2) / 2. */
+#if defined(STP_TO_BP_AR_BC_FLOAT)
+#define EXP_TERMS(p, r) \
+    p = r * R(1.0 / 40320.0) + R(1.0 / 5040.0)
+#else
+#define EXP_TERMS(p, r) \
+    p = r * R(1.0 / 6227020800.0) + R(1.0 / 479001600.0); \
+    p = p * r + R(1.0 / 39916800.0); \
+    p = p * r + R(1.0 / 3628800.0); \
+    p = p * r + R(1.0 / 362880.0); \
+    p = p * r + R(1.0 / 40320.0); \
+    p = p * r + R(1.0 / 5040.0)
+#endif
+/* ln 2 is in two parts, the first with zeros at its end, so that its product with n is exact; the last bits of the sum
+ * are n, and 2^n is a number with these bits for an exponent. */
+#define TANH_OF(x, sum, n, r, p, e, power, bits) \
+    x += x; \
+    sum = x * R(1.4426950408889634) + SHIFT; /* 2 x / ln 2 */ \
+    n = sum - SHIFT; \
+    r = (x - n * LN2_HIGH) - n * LN2_LOW; \
+    EXP_TERMS(p, r); \
+    p = p * r + R(1.0 / 720.0); \
+    p = p * r + R(1.0 / 120.0); \
+    p = p * r + R(1.0 / 24.0); \
+    p = p * r + R(1.0 / 6.0); \
+    p = p * r + R(0.5); \
+    e = r + r * r * p; \
+    memcpy(&bits, &sum, sizeof bits); \
+    bits = (bits + BIAS) << DIGITS; \
+    memcpy(&power, &bits, sizeof power); \
+    e = power * e + (power - R(1.0)); \
+    e = e / (e + R(2.0))
+
 static real tanh_near(real x)
 {
-    const real shift = 6755399441055744.0; /* 1.5 * 2^52: the sum with it has no digits after the point */
-    const real z = x + x;
-    const real sum = z * 1.4426950408889634 + shift; /* z / ln 2 */
-    const real n = sum - shift;
-    /* ln 2 in two parts, the first with zeros at its end, so that its product with n is exact */
-    const real r = (z - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
-    real p = 1.0 / 6227020800.0, e, power; /* Taylor coefficients 1/13! to 1/2!; |r| is at most ln(2) / 2 */
-    uint64_t bits;
+    real sum, n, r, p, e, power;
+    real_bits bits;
 
-    p = p * r + 1.0 / 479001600.0;
-    p = p * r + 1.0 / 39916800.0;
-    p = p * r + 1.0 / 3628800.0;
-    p = p * r + 1.0 / 362880.0;
-    p = p * r + 1.0 / 40320.0;
-    p = p * r + 1.0 / 5040.0;
-    p = p * r + 1.0 / 720.0;
-    p = p * r + 1.0 / 120.0;
-    p = p * r + 1.0 / 24.0;
-    p = p * r + 1.0 / 6.0;
-    p = p * r + 0.5;
-    e = r + r * r * p;
-    memcpy(&bits, &sum, sizeof bits); /* its last bits are n */
-    bits = (bits + 1023u) << 52;
-    memcpy(&power, &bits, sizeof power); /* 2^n */
-    e = power * e + (power - 1.0);
-    return e / (e + 2.0);
+    TANH_OF(x, sum, n, r, p, e, power, bits);
+    return e;
 }
 #define TANH(x) tanh_near(x)
 #if defined(__GNUC__)
 #define TANH_LANES
-typedef uint64_t lanes_bits __attribute__((vector_size(LANE_BYTES)));
+typedef real_bits lanes_bits __attribute__((vector_size(LANE_BYTES)));
 
-static void tanh_lanes(real *a)
+static void tanh_lanes(real *a, const real *sums)
 {
-    const real shift = 6755399441055744.0;
-    lanes x, sum, n, r, p, e, power;
-    lanes_bits bits;
+    const lanes zero = {R(0.0)}, limit = zero + R(400.0), one = zero + R(1.0);
+    const lanes_bits none = {0u}, sign = ~(~none >> 1);
+    lanes x, square, sum, n, r, p, e, power;
+    lanes_bits bits, beyond, ends;
 
-    memcpy(&x, a, sizeof x);
-    x += x;
-    sum = x * 1.4426950408889634 + shift;
-    n = sum - shift;
-    r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
-    p = r * (1.0 / 6227020800.0) + 1.0 / 479001600.0;
-    p = p * r + 1.0 / 39916800.0;
-    p = p * r + 1.0 / 3628800.0;
-    p = p * r + 1.0 / 362880.0;
-    p = p * r + 1.0 / 40320.0;
-    p = p * r + 1.0 / 5040.0;
-    p = p * r + 1.0 / 720.0;
-    p = p * r + 1.0 / 120.0;
-    p = p * r + 1.0 / 24.0;
-    p = p * r + 1.0 / 6.0;
-    p = p * r + 0.5;
-    e = r + r * r * p;
-    memcpy(&bits, &sum, sizeof bits);
-    bits = (bits + 1023u) << 52;
-    memcpy(&power, &bits, sizeof power);
-    e = power * e + (power - 1.0);
-    e = e / (e + 2.0);
+    /* Beyond 20 it is 1 or -1, the tanh of a double, put in place of that of 0. As masks: a loop over the numbers, in
+     * whatever width a compiler makes of it, would wait for sums that were stored in another. */
+    memcpy(&x, sums, sizeof x);
+    square = x * x;
+    beyond = (lanes_bits)(square > limit);
+    ends = beyond & (((lanes_bits)x & sign) | (lanes_bits)one);
+    x = (lanes)((lanes_bits)x & ~beyond);
+    TANH_OF(x, sum, n, r, p, e, power, bits);
+    e = (lanes)((lanes_bits)e | ends);
     memcpy(a, &e, sizeof e);
 }
 #endif
@@ -103,12 +127,13 @@ static void tanh_lanes(real *a)
 #define TANH(x) tanh(x)
 #endif
 
-/* Constants and weighted sums of regressors, of each neuron one; weights by regressor, then by neuron. */
+/* Constants and weighted sums of regressors, of each neuron one; weights by regressor, then by neuron. Neurons that do
+ * not fill a register share the last one with those before them, which are computed twice. */
 static void weigh(real *sums, const real *constants, const real *weights, int n, const real *x, int n_x)
 {
     int i, k = 0;
 
-#if defined(__GNUC__)
+#if defined(LANES)
     for (; k + 2 * LANES <= n; k += 2 * LANES) {
         const real *row = weights + k;
         lanes low, high, w;
@@ -124,6 +149,18 @@ static void weigh(real *sums, const real *constants, const real *weights, int n,
         memcpy(sums + k, &low, sizeof low);
         memcpy(sums + k + LANES, &high, sizeof high);
     }
+    for (; n >= LANES && k < n; k += LANES) {
+        const int first = k + LANES <= n ? k : n - LANES;
+        const real *row = weights + first;
+        lanes sum, w;
+
+        memcpy(&sum, constants + first, sizeof sum);
+        for (i = 0; i < n_x; i++, row += n) {
+            memcpy(&w, row, sizeof w);
+            sum += w * x[i];
+        }
+        memcpy(sums + first, &sum, sizeof sum);
+    }
 #endif
     for (; k < n; k++) {
         const real *own = weights + k;
@@ -137,22 +174,21 @@ static void weigh(real *sums, const real *constants, const real *weights, int n,
 }
 
 /* Neurons of a layer. Beyond 20 the tanh of a double is 1; not a number stays as it is. */
-static void activate(real *a, int n)
+static void activate(real *a, const real *sums, int n)
 {
     int i = 0;
 
-    for (i = 0; i < n; i++) {
-        a[i] = a[i] > R(20.0) ? R(20.0) : a[i];
-        a[i] = a[i] < R(-20.0) ? R(-20.0) : a[i];
-    }
-    i = 0;
 #if defined(TANH_LANES)
-    for (; i + LANES <= n; i += LANES) {
-        tanh_lanes(a + i);
+    for (; n >= LANES && i < n; i += LANES) {
+        const int first = i + LANES <= n ? i : n - LANES;
+
+        tanh_lanes(a + first, sums + first);
     }
 #endif
     for (; i < n; i++) {
-        a[i] = TANH(a[i]);
+        const real below = sums[i] > R(20.0) ? R(20.0) : sums[i];
+
+        a[i] = TANH(below < R(-20.0) ? R(-20.0) : below);
     }
 }
 
@@ -175,11 +211,17 @@ static real dot(const real *a, const real *b, int n)
 }
 
 /* A number of the state and its change. In float, what rounding takes from the sum is kept for the next step: most of
- * the change of a slow output is lost without. volatile, because it must be rounded before it is taken away again. */
+ * the change of a slow output is lost without. volatile, where the compiler would not round it otherwise before it is
+ * taken away again. */
 #if defined(STP_TO_BP_AR_BC_FLOAT)
+#if defined(AS_WRITTEN)
+#define ROUNDED
+#else
+#define ROUNDED volatile
+#endif
 static real added(real last, real change, real *lost)
 {
-    volatile real sum;
+    ROUNDED real sum;
 
     change += *lost;
     sum = last + change;
@@ -195,7 +237,7 @@ static real added(real last, real change, real *lost)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage0(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][15] = {
         {
@@ -375,7 +417,7 @@ static unsigned int stage0(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[12];
-    real a[12];
+    real a[12], sums[12];
     const real u0 = (known[0] - R(77.1)) / R(12.899999999999999); /* STP [psi] */
     real y[1];
     real *const past = state->past + 0;
@@ -398,8 +440,8 @@ static unsigned int stage0(stp_to_bp_ar_bc_state *state, real *known)
     x[12] = past[18] - past[19];
     x[13] = past[19] - past[21];
     x[14] = past[21] - past[25];
-    weigh(a, b, W[0], 12, x, 15);
-    activate(a, 12);
+    weigh(sums, b, W[0], 12, x, 15);
+    activate(a, sums, 12);
     weigh(g, v[0], G[0], 12, x, 15);
     y[0] = R(0.0012716059761195427) + dot(w[0], x, 15) + dot(g, a, 12);
     y[0] = ADDED(past[18], y[0], 0);
@@ -463,7 +505,7 @@ static unsigned int stage0(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage1(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][19] = {
         {
@@ -724,7 +766,7 @@ static unsigned int stage1(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[14];
-    real a[14];
+    real a[14], sums[14];
     const real u0 = (known[1] - R(77.10074838861541)) / R(12.899251611384514); /* BP [psi] */
     real y[1];
     real *const past = state->past + 26;
@@ -751,8 +793,8 @@ static unsigned int stage1(stp_to_bp_ar_bc_state *state, real *known)
     x[16] = past[517] - past[521];
     x[17] = past[521] - past[529];
     x[18] = past[529] - past[545];
-    weigh(a, b, W[0], 14, x, 19);
-    activate(a, 14);
+    weigh(sums, b, W[0], 14, x, 19);
+    activate(a, sums, 14);
     weigh(g, v[0], G[0], 14, x, 19);
     y[0] = R(0.0002689681492948955) + dot(w[0], x, 19) + dot(g, a, 14);
     y[0] = ADDED(past[514], y[0], 1);
@@ -797,7 +839,7 @@ static unsigned int stage1(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage2(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 572;
@@ -830,7 +872,7 @@ static unsigned int stage2(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage3(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 575;
@@ -863,7 +905,7 @@ static unsigned int stage3(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage4(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 578;
@@ -896,7 +938,7 @@ static unsigned int stage4(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage5(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][6] = {
         {
@@ -984,7 +1026,7 @@ static unsigned int stage5(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[12];
-    real a[12];
+    real a[12], sums[12];
     const real u0 = (known[1] - R(77.10074838861541)) / R(12.899251611384514); /* BP [psi] */
     real y[1];
     real *const past = state->past + 581;
@@ -998,8 +1040,8 @@ static unsigned int stage5(stp_to_bp_ar_bc_state *state, real *known)
     x[3] = past[1] - past[2];
     x[4] = past[3];
     x[5] = past[3] - past[4];
-    weigh(a, b, W[0], 12, x, 6);
-    activate(a, 12);
+    weigh(sums, b, W[0], 12, x, 6);
+    activate(a, sums, 12);
     weigh(g, v[0], G[0], 12, x, 6);
     y[0] = R(0.00176889420538532) + dot(w[0], x, 6) + dot(g, a, 12);
     y[0] = ADDED(past[3], y[0], 5);
@@ -1044,7 +1086,7 @@ static unsigned int stage5(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage6(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[1]; /* BP [psi] */
     const real u1 = known[6]; /* AR [psi] */
@@ -1079,7 +1121,7 @@ static unsigned int stage6(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage7(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     real y[1];
     real *const past = state->past + 587;
@@ -1112,7 +1154,7 @@ static unsigned int stage7(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage8(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][6] = {
         {
@@ -1200,7 +1242,7 @@ static unsigned int stage8(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[12];
-    real a[12];
+    real a[12], sums[12];
     const real u0 = (known[2] - R(77.10074838861541)) / R(12.899251611384514); /* BP10 [psi] */
     real y[1];
     real *const past = state->past + 590;
@@ -1214,8 +1256,8 @@ static unsigned int stage8(stp_to_bp_ar_bc_state *state, real *known)
     x[3] = past[1] - past[2];
     x[4] = past[3];
     x[5] = past[3] - past[4];
-    weigh(a, b, W[0], 12, x, 6);
-    activate(a, 12);
+    weigh(sums, b, W[0], 12, x, 6);
+    activate(a, sums, 12);
     weigh(g, v[0], G[0], 12, x, 6);
     y[0] = R(0.00176889420538532) + dot(w[0], x, 6) + dot(g, a, 12);
     y[0] = ADDED(past[3], y[0], 8);
@@ -1260,7 +1302,7 @@ static unsigned int stage8(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage9(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[2]; /* BP10 [psi] */
     const real u1 = known[9]; /* AR10 [psi] */
@@ -1295,7 +1337,7 @@ static unsigned int stage9(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage10(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[7]; /* RL [1] */
     real y[1];
@@ -1330,7 +1372,7 @@ static unsigned int stage10(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage11(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[10]; /* RL10 [1] */
     real y[1];
@@ -1365,7 +1407,7 @@ static unsigned int stage11(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage12(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[7]; /* RL [1] */
     real y[1];
@@ -1400,7 +1442,7 @@ static unsigned int stage12(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage13(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][7] = {
         {
@@ -1498,7 +1540,7 @@ static unsigned int stage13(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[10];
-    real a[10];
+    real a[10], sums[10];
     const real u0 = (known[1] - R(77.10074838861541)) / R(12.899251611384514); /* BP [psi] */
     const real u1 = (known[6] - R(77.10078363184411)) / R(12.899216372399025); /* AR [psi] */
     const real u2 = (known[7] - R(0.5)) / R(0.5); /* RL [1] */
@@ -1515,8 +1557,8 @@ static unsigned int stage13(stp_to_bp_ar_bc_state *state, real *known)
     x[4] = u2;
     x[5] = u2 - past[2];
     x[6] = past[3];
-    weigh(a, b, W[0], 10, x, 7);
-    activate(a, 10);
+    weigh(sums, b, W[0], 10, x, 7);
+    activate(a, sums, 10);
     weigh(g, v[0], G[0], 10, x, 7);
     y[0] = R(-0.0003585282757339048) + dot(w[0], x, 7) + dot(g, a, 10);
     y[0] = ADDED(past[3], y[0], 13);
@@ -1561,7 +1603,7 @@ static unsigned int stage13(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage14(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[10]; /* RL10 [1] */
     real y[1];
@@ -1596,7 +1638,7 @@ static unsigned int stage14(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage15(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][7] = {
         {
@@ -1694,7 +1736,7 @@ static unsigned int stage15(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[10];
-    real a[10];
+    real a[10], sums[10];
     const real u0 = (known[2] - R(77.10074838861541)) / R(12.899251611384514); /* BP10 [psi] */
     const real u1 = (known[9] - R(77.10078363184411)) / R(12.899216372399025); /* AR10 [psi] */
     const real u2 = (known[10] - R(0.5)) / R(0.5); /* RL10 [1] */
@@ -1711,8 +1753,8 @@ static unsigned int stage15(stp_to_bp_ar_bc_state *state, real *known)
     x[4] = u2;
     x[5] = u2 - past[2];
     x[6] = past[3];
-    weigh(a, b, W[0], 10, x, 7);
-    activate(a, 10);
+    weigh(sums, b, W[0], 10, x, 7);
+    activate(a, sums, 10);
     weigh(g, v[0], G[0], 10, x, 7);
     y[0] = R(-0.0003585282757339048) + dot(w[0], x, 7) + dot(g, a, 10);
     y[0] = ADDED(past[3], y[0], 15);
@@ -1757,7 +1799,7 @@ static unsigned int stage15(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage16(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u0 = known[6]; /* AR [psi] */
     const real u2 = known[7]; /* RL [1] */
@@ -1795,7 +1837,7 @@ static unsigned int stage16(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage17(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     const real u1 = known[7]; /* RL [1] */
     real y[1];
@@ -1829,7 +1871,7 @@ static unsigned int stage17(stp_to_bp_ar_bc_state *state, real *known)
  * known: inputs of the whole, then what is computed, in that order. */
 static unsigned int stage18(stp_to_bp_ar_bc_state *state, real *known)
 {
-    /* Regressors are levels and rates, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
+    /* Regressors are in incremental (delta) form, x(t - 1) and x(t - 1) - x(t - 2), because short numbers can hold their weights;
      * what is summed up is the change of the last output. By output, then by regressor. */
     static const real w[1][8] = {
         {
@@ -1955,7 +1997,7 @@ static unsigned int stage18(stp_to_bp_ar_bc_state *state, real *known)
         }
     };
     real g[16];
-    real a[16];
+    real a[16], sums[16];
     const real u0 = (known[1] - R(77.10074838861541)) / R(12.899251611384514); /* BP [psi] */
     const real u1 = (known[6] - R(77.10078363184411)) / R(12.899216372399025); /* AR [psi] */
     const real u2 = (known[7] - R(0.5)) / R(0.5); /* RL [1] */
@@ -1973,8 +2015,8 @@ static unsigned int stage18(stp_to_bp_ar_bc_state *state, real *known)
     x[5] = u2 - past[2];
     x[6] = past[3];
     x[7] = past[3] - past[4];
-    weigh(a, b, W[0], 16, x, 8);
-    activate(a, 16);
+    weigh(sums, b, W[0], 16, x, 8);
+    activate(a, sums, 16);
     weigh(g, v[0], G[0], 16, x, 8);
     y[0] = R(-0.002763223602378402) + dot(w[0], x, 8) + dot(g, a, 16);
     y[0] = ADDED(past[3], y[0], 18);
@@ -2041,6 +2083,9 @@ void stp_to_bp_ar_bc_init(stp_to_bp_ar_bc_state *state, const real *inputs, cons
     known[17] = R(91.0); /* CH */
     known[18] = R(0.0); /* CL */
     known[19] = outputs ? outputs[2] : R(0.0); /* BC */
+    for (i = 0; i < 20; i++) {
+        known[i] += R(0.0) * known[i]; /* what is infinite is read as not a number */
+    }
     for (i = 0; i < 8; i++) { /* STP [psi] */
         state->past[i] = (known[0] - R(77.1)) / R(12.899999999999999);
     }
@@ -2233,6 +2278,9 @@ unsigned int stp_to_bp_ar_bc_step(stp_to_bp_ar_bc_state *state, const real *inpu
     }
     if (known[STP_TO_BP_AR_BC_INPUT_STP] < R(64.2) || known[STP_TO_BP_AR_BC_INPUT_STP] > R(90.0)) {
         flags |= STP_TO_BP_AR_BC_OUTSIDE_RANGE;
+    }
+    for (i = 0; i < STP_TO_BP_AR_BC_N_INPUTS; i++) {
+        known[i] += R(0.0) * known[i]; /* what is infinite is read as not a number */
     }
     flags |= stage0(state, known);
     flags |= stage1(state, known);

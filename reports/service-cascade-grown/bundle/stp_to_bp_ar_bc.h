@@ -12,7 +12,7 @@
  *
  * Compile with -DSTP_TO_BP_AR_BC_FLOAT for float in place of double, in every file that includes this one; how far float
  * is from the model stands in the bundle's model.json if the format c-float32 was exported, and nowhere if it was not.
- * Written by sysid-workbench 0.1.0; do not edit.
+ * Written by sysid-workbench 0.2.0; do not edit.
  */
 #ifndef STP_TO_BP_AR_BC_H
 #define STP_TO_BP_AR_BC_H
@@ -50,8 +50,9 @@ enum {
 enum {
     STP_TO_BP_AR_BC_OUTSIDE_RANGE = 1, /* an input is outside its declared range; the accuracy is unknown */
     STP_TO_BP_AR_BC_AT_BOUND = 2, /* an output is held at one of its bounds; it is wrong */
-    STP_TO_BP_AR_BC_NOT_A_NUMBER = 4, /* an input or an output is not a number; set the state anew */
-    STP_TO_BP_AR_BC_AT_LIMIT = 8 /* an output is held at a limit that was declared for it */
+    STP_TO_BP_AR_BC_NOT_A_NUMBER = 4, /* an input is infinite or not a number, or an output is none; set the state anew */
+    STP_TO_BP_AR_BC_AT_LIMIT = 8, /* an output is held at one of its limits, declared or found in the records */
+    STP_TO_BP_AR_BC_IN_DOUBT = 16 /* the models of the committee disagree; the answer may be wrong */
 };
 
 /* Past samples, newest first, channel after channel, as (value - offset) / scale; plain numbers, so that a state can

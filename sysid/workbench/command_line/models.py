@@ -96,19 +96,31 @@ def worst(
 
 @commands.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')
 def export(
-    pipeline: Annotated[str, typer.Argument(help="Name of a pipeline that has been run, or its YAML file.")],
-    fit: Annotated[
+    pipeline: Annotated[
         str,
-        typer.Option(help="Name of the fit; in an assembly of a member, of a round, or assembly: the whole."),
+        typer.Argument(help="Name of a pipeline that has been run, or its YAML file; or a bundle, written again."),
     ],
-    out: Annotated[Path | None, typer.Option(help="Folder of the bundle; in the run folder by default.")] = None,
+    fit: Annotated[
+        str | None,
+        typer.Option(help="Name of the fit; in an assembly of a member, of a round, or assembly: the whole."),
+    ] = None,
+    *,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the bundle; in the run folder by default, of a bundle itself.")
+    ] = None,
+    formats: Annotated[
+        str | None, typer.Option(help="Of a bundle, formats to write, with commas; those that it has by default.")
+    ] = None,
     run_folder: Annotated[Path | None, typer.Option(help="The run folder; runs/<pipeline> by default.")] = None,
     pack: Annotated[bool, typer.Option("--zip", help="Pack the bundle into one file beside it.")] = False,
 ) -> None:
-    """Export a fit, a member or a whole of a finished run as files that run elsewhere, checked against the model."""
+    """Export a fit, a member or a whole of a finished run as files that run elsewhere, checked against the model.
+
+    Of a bundle, its files are written again by this version, without training.
+    """
     from sysid.workbench.commands.export import export_command
 
-    export_command(pipeline, fit=fit, out=out, run_folder=run_folder, pack=pack)
+    export_command(pipeline, fit=fit, out=out, run_folder=run_folder, formats=formats, pack=pack)
 
 
 @commands.command(epilog="Example: sysid promote bp-ar-to-bc")

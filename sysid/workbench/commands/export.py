@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sysid.errors import ConfigError
+from sysid.export.bundle import Bundle
+from sysid.export.manifest import MANIFEST
 from sysid.export.writing import zip_bundle
 from sysid.names import slug
 from sysid.workbench.fits.config import find_pipeline
@@ -18,20 +20,34 @@ from sysid.workbench.runner.program import look
 from sysid.workbench.runner.store import RunFolder
 
 
-def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Path | None, pack: bool) -> None:
-    """Export a result that is stored.
+def export_command(
+    pipeline: str, *, fit: str | None, out: Path | None, run_folder: Path | None, formats: str | None, pack: bool
+) -> None:
+    """Export a result that is stored, in a run or in a bundle.
 
     Args:
-        pipeline: Name or file of the pipeline.
+        pipeline: Name or file of the pipeline, or a bundle's folder or zip.
         fit: Name of the fit, the member or the whole.
         out: Folder of the bundle.
         run_folder: The run folder.
+        formats: Of a bundle what is written, with commas.
         pack: Whether to write the bundle as one zip too.
 
     Raises:
         ConfigError: If there is no such result, or it has not been run as the pipeline now stands.
         ParityError: If a file differs from the model by more than the tolerance.
     """
+    if fit is None and _is_bundle(Path(pipeline)):
+        _tell(_renewed(Path(pipeline), out, formats), pack=pack)
+        return
+    if fit is None or formats is not None:
+        raise ConfigError(
+            "a fit of a run is exported by its name, in the formats of its pipeline",
+            where=pipeline,
+            expected="--fit NAME and no --formats, or a bundle",
+            got="no --fit" if fit is None else "--formats",
+            remedy="name the fit, or give the bundle's folder or zip",
+        )
     path = find_pipeline(pipeline)
     program = kinds()[kind_of(path)].load_program()(RunRequest(path=path, typed=pipeline))
     store = RunFolder(path=(run_folder or Path("runs") / program.name).resolve())
@@ -51,12 +67,30 @@ def export_command(pipeline: str, *, fit: str, out: Path | None, run_folder: Pat
     folder = out or store.path / f"bundle-{slug(called)}"
     command = shlex.join(["sysid", "export", pipeline, "--fit", fit])
     bundle = done.step.export(done.value, folder, {"pipeline": program.name, "fit": called, "command": command})
+    _tell(bundle, pack=pack)
+
+
+def _is_bundle(path: Path) -> bool:
+    """Whether a path is a bundle's folder or zip; a pipeline is a name or a YAML."""
+    return (path / MANIFEST).is_file() or (path.is_file() and path.suffix == ".zip")
+
+
+def _renewed(path: Path, out: Path | None, formats: str | None) -> Bundle:
+    from sysid.export.renewing import renew_bundle
+
+    asked = None if formats is None else [name.strip() for name in formats.split(",") if name.strip()]
+    if out is None and path.is_file():
+        out = path.with_suffix("")
+    return renew_bundle(path, out or path, formats=asked)
+
+
+def _tell(bundle: Bundle, *, pack: bool) -> None:
     target = console()
     for entry in bundle.files:
         target.print(f"{entry.name}: at most {entry.largest_difference:.1e} from the model")
-    target.print(f"Bundle: {folder}", soft_wrap=True)
+    target.print(f"Bundle: {bundle.folder}", soft_wrap=True)
     if pack:
-        target.print(f"Packed: {zip_bundle(folder)}", soft_wrap=True)
+        target.print(f"Packed: {zip_bundle(bundle.folder)}", soft_wrap=True)
 
 
 def _called(name: str, known: Sequence[str], path: Path) -> str:

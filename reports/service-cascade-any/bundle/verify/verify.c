@@ -10,6 +10,7 @@ static int verify(const char *path)
 {
     stp_to_bp_ar_bc_state state;
     stp_to_bp_ar_bc_real in[STP_TO_BP_AR_BC_N_INPUTS], out[STP_TO_BP_AR_BC_N_OUTPUTS];
+    static const double allowed[] = {2e-05, 2e-05, 2e-05}, allowed_float32[] = {0.0009073468936893399, 0.0009000000000000001, 0.0006070623070328316};
     double time, value, worst = 0.0;
     unsigned int expected, faults = 0, samples = 0;
     int i, c;
@@ -33,14 +34,18 @@ static int verify(const char *path)
         expected = stp_to_bp_ar_bc_step(&state, in, out);
         for (i = 0; i < STP_TO_BP_AR_BC_N_OUTPUTS; i++) {
             faults += fscanf(file, ",%lf", &value) != 1;
-            if (!(value != value && out[i] != out[i]) && !(fabs((double)out[i] - value) <= worst)) {
+            if (value != value && out[i] != out[i]) {
+                continue;
+            }
+            if (!(fabs((double)out[i] - value) <= worst)) {
                 worst = fabs((double)out[i] - value);
             }
+            faults += !(fabs((double)out[i] - value) <= (sizeof *in == sizeof(float) ? allowed_float32 : allowed)[i]);
         }
         faults += fscanf(file, ",%lf", &value) != 1 || (unsigned int)value != expected;
     }
     fclose(file);
-    faults += samples == 0 || !(worst <= (sizeof *in == sizeof(float) ? 0.001 : 2e-05));
+    faults += samples == 0;
     printf("%s: %s, largest difference %.1e\n", path, faults ? "NOT as recorded" : "as recorded", worst);
     return faults != 0;
 }
