@@ -6,8 +6,10 @@ from rich.table import Table
 from rich.text import Text
 
 from sysid.estimation.result import Status
+from sysid.reporting.fit_tables import scored_cases
 from sysid.reporting.results import FitRecord, Results, SystemRecord
 from sysid.units import squared
+from sysid.validation.metrics import mean_fit, percent
 
 
 def table_of_fits(results: Results) -> Table:
@@ -34,18 +36,36 @@ def table_of_fits(results: Results) -> Table:
     cases = list(results.data.cases)
     for case in cases:
         table.add_column(Text.assemble(f"{case}\n", (results.data.cases[case].role.value, "dim")), justify="right")
-    if results.selection:
-        table.add_column("selection", justify="right")
-    table.add_column("training", justify="right")
+    # One trace that chooses, and is a case too, has its figure already.
+    selection = results.selection is not None and not (
+        len(results.selection.cases) == 1 and {*results.selection.cases} <= {*cases}
+    )
+    if selection:
+        table.add_column("selection\nmean", justify="right")
     whole_after = {list(one.fits.values())[-1]: one for one in results.systems}
+    if not results.systems:
+        table.add_column(f"fit\n{_judged(results)}", justify="right")
+    table.add_column("training", justify="right")
     for fit in results.fits:
         best = results.chosen(fit)
-        table.add_row(*_row(fit, cases, selection=bool(results.selection)), style="bold" if best else None)
+        fitted = [] if results.systems else [_mean_fit(fit)]
+        row = _row(fit, cases, fitted, selection=selection)
+        table.add_row(*row, style="bold" if best else None)
         whole = whole_after.get(fit.name)
         if whole is not None:
-            row = _whole(whole, fit, cases, selection=bool(results.selection))
+            row = _whole(whole, fit, cases, selection=selection)
             table.add_row(*row, style="bold" if best else None, end_section=True)
     return table
+
+
+def _judged(results: Results) -> str:
+    """What the fit in percent is of: cases that neither were fitted nor chose, or else all."""
+    return "unseen" if any(scored_cases(fit) for fit in results.fits) else "all"
+
+
+def _mean_fit(fit: FitRecord) -> str:
+    judged = scored_cases(fit) or fit.cases
+    return f"{percent(mean_fit(case.free_run.nrmse_fit for case in judged.values()))} %"
 
 
 def told_of_fits(results: Results) -> list[str]:
@@ -55,15 +75,16 @@ def told_of_fits(results: Results) -> list[str]:
         results: What the run found.
 
     Returns:
-        A line for each fit of which there is something to say; the report has the rest.
+        A line for each thing to say, of one fit or of several alike; the report has the rest.
     """
-    lines = []
+    alike = dict[str, list[str]]()
     for fit in results.fits:
         ended = Status[fit.status]
         told = [*([ended.value] if not ended.usable else []), *fit.warnings]
         more = f" ({len(told) - 1} more in the report)" if len(told) > 1 else ""
-        lines += [f"Look at {fit.name}: {one}{more}" for one in told[:1]]
-    return lines
+        for one in told[:1]:
+            alike.setdefault(f"{one}{more}", []).append(fit.name)
+    return [f"Look at {'; '.join(names)}: {one}" for one, names in alike.items()]
 
 
 def _whole(whole: SystemRecord, last: FitRecord, cases: list[str], *, selection: bool) -> list[str]:
@@ -72,7 +93,7 @@ def _whole(whole: SystemRecord, last: FitRecord, cases: list[str], *, selection:
     return [whole.name, whole.label, last.loop.value, *figures, *chosen, f"{whole.train_time_s:.1f} s"]
 
 
-def _row(fit: FitRecord, cases: list[str], *, selection: bool) -> list[str]:
+def _row(fit: FitRecord, cases: list[str], fitted: list[str], *, selection: bool) -> list[str]:
     figures = [f"{fit.cases[case].free_run.mse:.3e}" for case in cases]
     chosen = [f"{fit.selection_mse:.3e}"] if selection else []
-    return [fit.name, fit.label, fit.loop.value, *figures, *chosen, f"{fit.train_time_s:.1f} s"]
+    return [fit.name, fit.label, fit.loop.value, *figures, *chosen, *fitted, f"{fit.train_time_s:.1f} s"]
