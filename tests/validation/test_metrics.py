@@ -85,6 +85,8 @@ def test_a_comparison_prints_a_dash_for_a_constant_output() -> None:
         name="s", traces=(record, still), roles={record.name: Role.ESTIMATION, "off": Role.VALIDATION}, source=""
     )
     found = sysid.compare(traces, sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=(1,), nk=(1,))))
-    assert str(found).splitlines()[-1].split()[-1] == "-"
+    _, row, *told = str(found).splitlines()
+    assert row.split()[-1] == "-"
+    assert "In off no input moves" in told[0]
     (evaluation,) = found.evaluations.values()
     assert 0.0 <= evaluation.cases["off"].free_run.mse <= 0.09
