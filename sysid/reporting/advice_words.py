@@ -173,8 +173,8 @@ SAID: Final[dict[str, Words]] = {
     ),
     "noise.loud": Words(
         "A linear response explains only {explained:.1%} of the output.",
-        "Noise, inputs that are missing, or a system that integrates or is not linear: see below. More samples help against"
-        " noise alone.",
+        "Noise, inputs that are missing, or a system that integrates or is not linear: see below. More samples help"
+        " against noise alone.",
     ),
     "noise.coloured": Words(
         "What is left is coloured: an autoregression of order {order:.0f}.",
