@@ -28,6 +28,8 @@ OF_CURVES, LEVELS = 4, 3
 """Order that an input must excite for a curve, which one sine does not; and levels that are too few for one."""
 HARDLY_OWN = 0.01
 """Part of an input's movement that others do not explain, below which its effect is told by hardly anything."""
+DIVERGED = 1e12
+"""Mean squared error, over the output's variance, of a run that is lost: a million times the output's movements."""
 WORSE, HARDLY = 1.1, 0.9
 """Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt; and
 above which it does as well, all but a twentieth of the output's movement."""
@@ -197,7 +199,8 @@ def _beside_a_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[st
         with np.errstate(over="ignore", invalid="ignore"):
             ratio = float(np.mean((simulated[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
         if not ratio <= HARDLY:
-            fit = f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %" if np.isfinite(ratio) else "it diverges"
+            lost = not ratio < DIVERGED
+            fit = "it diverges" if lost else f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %"
             how = "hardly better" if ratio <= WORSE else "worse"
             told.append(
                 f"Over the records that were fitted the free run of {name} is {how} "

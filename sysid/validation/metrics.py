@@ -188,16 +188,18 @@ def percent(fit: float) -> str:
         fit: In percent.
 
     Returns:
-        Two digits after the point; ``-`` where the target does not vary, and ``diverged`` for a run that is lost.
+        Two digits after the point; ``-`` where the target does not vary, ``< -10000`` where a run is elsewhere, as at
+        another level, and ``diverged`` where it is lost.
 
     Example:
-        >>> percent(99.987), percent(float("nan")), percent(-np.inf)
-        ('99.99', '-', 'diverged')
+        >>> percent(99.987), percent(float("nan")), percent(-2e4), percent(-np.inf)
+        ('99.99', '-', '< -10000', 'diverged')
     """
     if np.isnan(fit):
         return "-"
-    return f"{fit:.2f}" if fit > _LOST else "diverged"
+    return f"{fit:.2f}" if fit > _AWAY else f"< {_AWAY:.0f}" if fit > _LOST else "diverged"
 
 
-_LOST = -1e4
-"""Percent below which a number says no more than that the run left its target by a hundred times its range."""
+_AWAY, _LOST = -1e4, -1e8
+"""Percent below which a number says no more than that the run left its target by a hundred times its range, which a
+stable model may do that is at another level than a record in which little happens; and by a million times."""

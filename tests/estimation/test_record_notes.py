@@ -357,3 +357,14 @@ def test_records_at_other_levels_are_told_as_that(structure: object) -> None:
 def test_an_input_without_coefficients_is_not_asked_how_it_moves():
     fit = _fit(_u(), _y(_u(), 1), sysid.ARX(na=1, nb=0, nk=1))
     assert not any("too few ways" in note for note in fit.notes)
+
+
+def test_a_run_that_is_lost_diverges_and_has_no_percent() -> None:
+    """It had a fit of minus 10 to the 40th percent, digit by digit."""
+    rng = np.random.default_rng(0)
+    u, y = np.zeros(900), np.zeros(900)
+    for k in range(1, 900):
+        y[k] = 1.1 * y[k - 1] + 0.5 * u[k - 1] + 0.01 * rng.standard_normal()
+        u[k] = rng.uniform(-1.0, 1.0) - 0.8 * y[k]
+    fit = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.ARX(na=1, nb=1, nk=1))
+    assert [note for note in fit.notes if "worse than a constant (it diverges)" in note]
