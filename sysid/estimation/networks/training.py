@@ -63,7 +63,8 @@ class Training(TypedFields):
         loop: ``closed`` minimises the error of the free run, ``open`` that of the one-step prediction.
         max_iterations: Levenberg-Marquardt iterations of a start that is never dropped.
         max_time_s: Wall time of the whole fit in seconds, shared out among the starts. A fit that it ends cannot be
-            repeated exactly; leave it out where that matters.
+            repeated exactly; leave it out where that matters. The check of its free run comes after it, and takes up to
+            a minute more (``StabilityOptions``).
         tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
         patience: Iterations over which improvement is judged.
         starts: Starts; successive halving: half of them dropped at each of four checkpoints. By default as many as the
