@@ -24,6 +24,7 @@ from sysid.estimation.grey_box.by_case import for_case
 from sysid.estimation.grey_box.profile import Profile
 from sysid.ingest.arrays import inputs_of, level_of
 from sysid.ingest.frames import as_array
+from sysid.ingest.run_records import before_a_run
 from sysid.models import Cascade, History, Start
 from sysid.models.curve_values import curve_values
 from sysid.models.form import unheeded
@@ -64,13 +65,15 @@ class Fit(FitResult):
 
         Args:
             u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the mapping's order, a frame
-                or dict with columns by name, or a trace; for a model without input the number of samples.
+                or dict with columns by name, or a trace; for a model without input the number of samples. Measured
+                outputs beside them are not read: :func:`sysid.compare` begins by them, and scores.
             initial: What stands before the first sample: nothing for the system at rest; a number, the output that it
                 has stood at, or numbers by name of several outputs; a pair ``(u, y)`` of the samples before, oldest
                 first; or a history.
 
         Returns:
             The output, shape ``(n_samples,)``, in its unit; of a model of several outputs ``(n_samples, n_outputs)``.
+            An array, of a frame too, where a bundle's ``simulate`` gives a frame.
 
         Raises:
             ChannelError: If an input is missing, or ``initial`` names no output.
@@ -185,9 +188,20 @@ class Fit(FitResult):
         curves = curve_values(self.model, [(run.inputs, run.history) for run in runs])
         return curves_figure([curve.drawn() for curve in curves])
 
-    def save(self, folder: str | Path, *, formats: tuple[str, ...] | None = None) -> Bundle:
-        """Write it as files that run elsewhere; see :func:`sysid.save`."""
-        return save(self, self.traces, folder, formats=formats, start=self.start)
+    def save(
+        self, folder: str | Path, traces: TracesLike | None = None, *, formats: tuple[str, ...] | None = None
+    ) -> Bundle:
+        """Write it as files that run elsewhere, with its figures on the records of the fit; see :func:`sysid.save`.
+
+        Args:
+            folder: Where the bundle goes.
+            traces: Further records to check the files and to score the model on.
+            formats: As for :func:`sysid.save`.
+
+        Returns:
+            The bundle.
+        """
+        return save(self, traces or self.traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
         """What was fitted, how it ended, its parameters as far as there is an uncertainty of them, and its fit."""
@@ -231,16 +245,8 @@ class Fit(FitResult):
         if initial is None or isinstance(initial, History):
             return initial
         if isinstance(initial, tuple):
-            before = self._outputs(initial[1])
-            if not np.isfinite(before).all():
-                raise TraceError(
-                    "a sample before the first is missing",
-                    where="initial",
-                    expected="finite numbers: a run goes on from them",
-                    got="nan or infinity",
-                    remedy="give the samples after the last one that is missing, or one number",
-                )
-            return History(inputs=inputs_of(initial[0], model.mapping.inputs), output=before)
+            before, output = before_a_run(initial, model.mapping.inputs, model.mapping.outputs)
+            return History(inputs=before, output=output if model.structure.several_outputs else output[:, 0])
         if not model.structure.several_outputs and not isinstance(initial, Dict):
             return History.at_rest(inputs=inputs[0], output=level_of(initial))
         names = model.mapping.outputs
@@ -324,9 +330,11 @@ class SystemFit:
         """The free run of each output over its measurement, case by case."""
         return compare(traces or self.traces, self, start=self.start).plot()
 
-    def save(self, folder: str | Path, *, formats: tuple[str, ...] | None = None) -> Bundle:
-        """Write it as files of several outputs that run elsewhere; see :func:`sysid.save`."""
-        return save(self, self.traces, folder, formats=formats)
+    def save(
+        self, folder: str | Path, traces: TracesLike | None = None, *, formats: tuple[str, ...] | None = None
+    ) -> Bundle:
+        """Write it as files of several outputs that run elsewhere; see :meth:`Fit.save`."""
+        return save(self, traces or self.traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
         """The summaries of its fits."""

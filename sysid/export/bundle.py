@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Collection
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError
+from sysid.export.measured_run import Initial, check_able, check_one_start, run_measured, run_with
 from sysid.export.surrogate import Surrogate
-from sysid.ingest.arrays import inputs_of, level_of
-from sysid.models import AbstractModel, Cascade
-from sysid.traces import Trace
+from sysid.ingest.arrays import inputs_of
+from sysid.ingest.frames import columns_by_name
+from sysid.ingest.headers import parse_header
+from sysid.ingest.run_records import record_of
+from sysid.models import AbstractModel, Cascade, Start, StartKind, StartLike
+from sysid.traces import Channel, Trace, check_units
+from sysid.units import Reference
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,25 +78,32 @@ class Bundle:
         """The same of each output; before version 3 there was one."""
         return tuple(self.metadata.get("outputs") or [self.metadata["output"]])
 
-    def simulate(self, u: Any, *, initial: float | Dict[str, float] | None = None, warn: bool = True) -> Any:
+    def simulate(self, u: Any, *, initial: Initial = None, start: StartLike | None = None, warn: bool = True) -> Any:
         """Free run of the model over inputs that are in memory.
 
         Args:
             u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the bundle's order, a frame or
                 dict with columns by name, in the bundle's units, or a trace; for a model without input the number of
                 samples.
-            initial: Output before the first sample, in its unit, or one for each output by name; the declared levels
+            initial: What stands before the first sample, as for the fit that was saved: the output in its unit, or one
+                for each output by name; or a pair ``(u, y)`` of the samples before, oldest first. The declared levels
                 where nothing is said.
-            warn: Whether inputs beyond their declared ranges are told, by an :class:`OutsideRangeWarning`.
+            start: How the run begins by outputs that were measured, which stand beside the inputs in a frame, dict or
+                trace: ``"estimated"``, ``"first-sample"`` or ``{"measured": 50}``, as for :func:`sysid.fit`. They are
+                not read where nothing is said, or ``"rest"``. (``sysid simulate`` and :func:`simulate_bundle` begin by
+                them unless told otherwise, and score the run.)
+            warn: Whether inputs beyond their declared ranges are told, by an :class:`OutsideRangeWarning`, and measured
+                outputs that nothing is said of, by an :class:`UnreadOutputWarning`.
 
         Returns:
-            For a pandas frame a frame of the outputs with the same index; else an array of shape ``(n_samples,)``, or
-            ``(n_samples, n_outputs)`` where there are several.
+            For a pandas frame a frame of the outputs with the same index, where a fit's own ``simulate`` gives an
+            array; else an array of shape ``(n_samples,)``, or ``(n_samples, n_outputs)`` where there are several.
 
         Raises:
             ChannelError: If an input is missing, or ``initial`` names no output.
             ConfigError: If an array has another number of columns, its samples are at another distance, a trace is in
-                other units, or ``initial`` is no finite number or says nothing to the model.
+                other units, ``initial`` is no finite number or says nothing to the model, or the run cannot begin as
+                ``start`` says.
         """
         names = tuple(str(entry["name"]) for entry in self.outputs)
         surrogate = Surrogate.of(self.model, {}, outputs=names)
@@ -103,14 +115,41 @@ class Bundle:
             told = self._outside(inputs) if warn else ""
             if told:
                 warnings.warn(told, OutsideRangeWarning, stacklevel=2)
-        given = dict(initial) if isinstance(initial, Dict) else {} if initial is None else dict.fromkeys(names, initial)
-        strangers = [name for name in given if name not in names]
-        if strangers:
-            raise ChannelError(strangers, names, where="initial")
-        found = surrogate.chosen(surrogate.run_from(inputs, {name: level_of(level) for name, level in given.items()}))
+        begin = None if start is None else Start.of(start)
+        unread = self._measured(u) if warn and begin is None and initial is None else ()
+        if unread:
+            told = f'what was measured of {", ".join(unread)} is not read: start="estimated" begins by it, and '
+            warnings.warn(f'{told}start="rest" at rest', UnreadOutputWarning, stacklevel=2)
+        if begin is None or begin.kind is StartKind.REST:
+            found = surrogate.chosen(run_with(surrogate, inputs, initial))
+        else:
+            found = surrogate.chosen(self._from_measured(surrogate, u, inputs, initial, begin))
         if hasattr(u, "columns") and hasattr(u, "index") and not isinstance(u, Trace):
             return type(u)(found, index=u.index, columns=list(names))
         return found[:, 0] if len(names) == 1 else found
+
+    def _measured(self, u: Any) -> tuple[str, ...]:
+        """The outputs that stand beside the inputs."""
+        if isinstance(u, Trace):
+            there: Collection[str] = u.channel_names
+        else:
+            named = None if isinstance(u, int) else columns_by_name(u)
+            single = hasattr(u, "to_frame")  # a series is the input, whatever it is called
+            there = () if named is None or single else [parse_header(key).name for key in named]
+        return tuple(str(entry["name"]) for entry in self.outputs if entry["name"] in there)
+
+    def _from_measured(
+        self, surrogate: Surrogate, u: Any, inputs: NDArray[np.float64], initial: Initial, start: Start
+    ) -> NDArray[np.float64]:
+        """Everything that is computed in a run that begins by what was measured."""
+        check_one_start(initial, start)
+        measured = self._measured(u)
+        check_able(self.model, measured, start, where="the record")
+        inputs_, outputs = (tuple(map(channel_of, entries)) for entries in (self.inputs, self.outputs))
+        record = record_of(u, () if surrogate.ticks else inputs_, outputs, sample_time=self.model.sample_time)
+        check_units({channel.name: channel.unit for channel in outputs}, record)
+        columns = {name: record[name] for name in measured}
+        return run_measured(surrogate, inputs, columns, start, record.usable_samples).computed
 
     def _outside(self, inputs: NDArray[np.float64]) -> str:
         """A sentence on the inputs that are beyond their declared ranges; empty where none is."""
@@ -128,6 +167,10 @@ class Bundle:
 
 class OutsideRangeWarning(UserWarning):
     """Inputs that are beyond what a bundle was made from, so that nobody knows how accurate its answer is."""
+
+
+class UnreadOutputWarning(UserWarning):
+    """Outputs that were measured stand beside the inputs of a run that begins at rest, and nothing was said of them."""
 
 
 def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
@@ -154,3 +197,9 @@ def bundle_files(manifest: Dict[str, Any]) -> tuple[BundleFile, ...]:
         )
         for entry in manifest["files"]
     )
+
+
+def channel_of(entry: Dict[str, object]) -> Channel:
+    """A channel as a bundle describes it."""
+    reference = Reference(entry.get("reference", "none"))
+    return Channel(name=str(entry["name"]), unit=str(entry["unit"]), reference=reference)

@@ -10,10 +10,9 @@ import numpy as np
 
 from sysid.content import nearest_name
 from sysid.errors import ChannelError, ConfigError
-from sysid.export.bundle import Bundle
+from sysid.export.bundle import Bundle, channel_of
 from sysid.ingest import FileOptions, GridOptions, RawTable, RepairOptions, Wanted, assemble, read_table
 from sysid.traces import Channel, Trace
-from sysid.units import Reference
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +23,7 @@ class InputOptions:
 
     Args:
         constants: Inputs that are a number and no column, by name, in the bundle's unit.
-        measured: Whether the measured output is read where the file has it.
+        measured: Whether measured outputs are read where the file has them.
         files: How the file is read.
         grid: How its samples come onto the grid.
         repairs: Which repairs may be made.
@@ -37,12 +36,6 @@ class InputOptions:
     repairs: RepairOptions = field(default_factory=RepairOptions)
 
 
-def channel_of(entry: Dict[str, object]) -> Channel:
-    """A channel as a bundle describes it."""
-    reference = Reference(entry.get("reference", "none"))
-    return Channel(name=str(entry["name"]), unit=str(entry["unit"]), reference=reference)
-
-
 def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None) -> Trace:
     """Read a file of samples as inputs of a bundle; units are converted to the bundle's.
 
@@ -52,8 +45,8 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
         options: How; a constant column is an input by default.
 
     Returns:
-        The inputs, and behind them the measured output where it is asked for and in the file. Samples at which the
-        output is missing are masked.
+        The inputs, and behind them the measured outputs where they are asked for and in the file. Samples at which one
+        of these is missing are masked.
 
     Raises:
         ChannelError: If an input is missing.
@@ -61,6 +54,7 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
         TraceError: If something is wrong with the samples and its repair was not asked for.
     """
     options = options or InputOptions()
+    options = replace(options, constants=ticking(bundle, options.constants))
     channels = tuple(channel_of(entry) for entry in bundle.inputs)
     check_constants(options.constants, channels)
     table = read_table(path, files=options.files, repairs=options.repairs)
@@ -72,22 +66,22 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
             remedy=f"leave --constant {there[0]}=... out, or the column",
         )  # fmt: skip
     _check_there(table, wanted, options, path)
-    output = _measured(bundle, table, options)
-    if not wanted and output is None:
+    outputs = _measured(bundle, table, options)
+    if not wanted and not outputs:
         raise ConfigError(
             "every input is a number, and nothing says for how long", where=str(path),
             expected="a file with an input or the measured output", got=", ".join(table.names),
             remedy="give --command with two rows in place of the file: the first at 0, the second at the end",
         )  # fmt: skip
     repairs, files = options.repairs, options.files
-    if output is not None:
+    if outputs:
         nan = {c.name: repairs.nan for c in wanted} if isinstance(repairs.nan, str) else dict(repairs.nan or {})
-        repairs = repairs.model_copy(update={"nan": {output.name: "mask", **nan}})
+        repairs = repairs.model_copy(update={"nan": {**dict.fromkeys((c.name for c in outputs), "mask"), **nan}})
     trace = assemble(
         table,
         Wanted(
             name=path.stem,
-            channels=(*wanted, *([] if output is None else [output])),
+            channels=(*wanted, *outputs),
             sample_time=bundle.model.sample_time,
             fixed=True,
         ),
@@ -123,6 +117,12 @@ def with_constants(trace: Trace, channels: tuple[Channel, ...], constants: Dict[
         values=np.column_stack(columns),
         provenance=(*trace.provenance, *told),
     )
+
+
+def ticking(bundle: Bundle, constants: Dict[str, float]) -> dict[str, float]:
+    """Inputs that are numbers, with that of a model without inputs among them: nobody reads it."""
+    names = () if bundle.model.inputs else (str(entry["name"]) for entry in bundle.inputs)
+    return {**dict.fromkeys(names, 0.0), **constants}
 
 
 def check_constants(constants: Dict[str, float], channels: tuple[Channel, ...]) -> None:
@@ -168,13 +168,12 @@ def _check_there(table: RawTable, wanted: list[Channel], options: InputOptions, 
     )
 
 
-def _measured(bundle: Bundle, table: RawTable, options: InputOptions) -> Channel | None:
-    """The output, where the file has values of it and one model alone is run."""
-    if not options.measured or bundle.model.single is None:
-        return None
-    output = channel_of(bundle.outputs[0])
-    given = options.files.columns.get(output.name)
-    name = given.column if given else output.name
-    if name not in table.names or not np.isfinite(table.find(name).values).any():
-        return None
-    return output
+def _measured(bundle: Bundle, table: RawTable, options: InputOptions) -> tuple[Channel, ...]:
+    """The outputs of which the file has values."""
+    found = []
+    for output in map(channel_of, bundle.outputs) if options.measured else ():
+        given = options.files.columns.get(output.name)
+        name = given.column if given else output.name
+        if name in table.names and np.isfinite(table.find(name).values).any():
+            found.append(output)
+    return tuple(found)

@@ -67,7 +67,7 @@ def describe(
     fits: Dict[str, FitResult],
     traces: TraceSet,
     *,
-    start: Start,
+    start: Start | None,
     metrics: Metrics | CascadeMetrics | None,
     provenance: Dict[str, Any],
     recorded: TraceSet | None = None,
@@ -78,7 +78,7 @@ def describe(
         surrogate: What is exported.
         fits: The fits that its models come from, by mapping; models without one are told without.
         traces: The cases, and the estimation traces that declare the range of the inputs.
-        start: How the free runs began.
+        start: How the free runs began; at rest where nobody said.
         metrics: The figures, if there are any.
         provenance: Where the fit comes from.
         recorded: The cases as they were recorded, where channels were added since.
@@ -107,11 +107,17 @@ def describe(
         "state": surrogate.state_text(),
         "initialisation": _initialisation(surrogate, _example(traces)),
         "fit": stages[0]["fit"] if single else None,
-        "cases_start": {"kind": start.kind.value, "n_measured": start.n_measured},
+        "cases_start": _begun(start, several=not single),
         "metrics": None if metrics is None else _metrics(metrics),
         "provenance": {**provenance, "data": _data(recorded or traces), "software": software()},
     }
     return {name: _json(value) for name, value in manifest.items()}
+
+
+def _begun(start: Start | None, *, several: bool) -> dict[str, Any]:
+    """How the free runs began; of several models with whether somebody said so."""
+    begun = start or Start()
+    return {"kind": begun.kind.value, "n_measured": begun.n_measured} | ({"said": start is not None} if several else {})
 
 
 def _stage(stage: Stage, fit: FitResult | None) -> dict[str, Any]:
@@ -156,7 +162,7 @@ def _metrics(metrics: Metrics | CascadeMetrics) -> dict[str, Any]:
             figures = case.to_dict()
             whole = {key: figures.get(key) for key in ("role", "n_samples", "run_time_s")}
             entry = found.setdefault(name, whole | {"outputs": {}})
-            entry["outputs"][output] = {key: figures[key] for key in ("free_run", "one_step")}
+            entry["outputs"][output] = {key: figures[key] for key in ("free_run", "one_step", "begins_at")}
     return found
 
 

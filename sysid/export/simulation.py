@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError
-from sysid.export.bundle import Bundle
+from sysid.errors import ConfigError
+from sysid.export.bundle import Bundle, channel_of
 from sysid.export.command_table import CommandTable, read_command
 from sysid.export.flags import MEANING, Flag, Held, expected_flags, limits_reached
-from sysid.export.inputs import channel_of, check_constants, with_constants
+from sysid.export.inputs import check_constants, ticking, with_constants
+from sysid.export.measured_run import Initial, able, check_able, check_one_start, obstacle, run_measured, run_with
 from sysid.export.reading import read_bundle
 from sysid.export.surrogate import Surrogate
-from sysid.models import Start, StartKind, beginning
+from sysid.ingest.run_records import record_of
+from sysid.models import Start, StartKind, StartLike
 from sysid.models.ends import check_record
 from sysid.traces import Channel, Trace
 from sysid.validation.metrics import Figures, figures
@@ -33,9 +36,11 @@ class Simulation:
         flags: Of every sample, bits of :class:`sysid.export.Flag`.
         held: Which declared limits held which outputs, and for how much of the run.
         start: How the run begins.
-        first: Samples at its beginning that were measured, and say how it goes on; they are not scored.
-        initial: The output before the first sample, where somebody gave it.
-        scored: By output that was measured: figures of the run on the samples after :attr:`first`.
+        firsts: By output that begins by its measured samples: how many at the beginning say how it goes on; they are
+            not scored. What is not among them begins at rest.
+        initial: What somebody gave that stands before the first sample.
+        note: Why measured outputs say nothing of how the run begins; empty where they do, or there are none.
+        scored: By output that was measured: figures of the run on the samples after :attr:`firsts`.
     """
 
     trace: Trace
@@ -44,26 +49,44 @@ class Simulation:
     flags: NDArray[np.int32]
     held: tuple[Held, ...] = ()
     start: Start = field(default_factory=Start)
-    first: int = 0
-    initial: float | None = None
+    firsts: Dict[str, int] = field(default_factory=dict)
+    initial: Initial = None
+    note: str = ""
     scored: Dict[str, Figures] = field(default_factory=dict)
+
+    @property
+    def first(self) -> int:
+        """Samples at the beginning of which some output was measured to say how it goes on."""
+        return max(self.firsts.values(), default=0)
 
     @property
     def begins(self) -> str:
         """How the run begins, as a sentence."""
-        if self.first:
+        alike: dict[int | None, list[str]] = {}
+        for name in self.outputs:
+            alike.setdefault(self.firsts.get(name), []).append(name)
+        told = [(", ".join(names), self._begins(first, len(names))) for first, names in alike.items()]
+        text = told[0][1] if len(told) == 1 else "; ".join(f"{names}: {how}" for names, how in told)
+        return f"{text}; {self.note}" if self.note else text
+
+    def _begins(self, first: int | None, count: int) -> str:
+        if first:
             what = {
                 StartKind.ESTIMATED: "its initial state is estimated on",
                 StartKind.MEASURED: "it goes on from",
             }[self.start.kind]
-            time = self.trace.time
+            time, output = self.trace.time, "output" if count == 1 else "outputs"
             return (
-                f"{what} the first {self.first} samples of the measured output "
-                f"({time[0]:.6g} to {time[self.first - 1]:.6g} s), which are not scored"
+                f"{what} the first {first} samples of the measured {output} "
+                f"({time[0]:.6g} to {time[first - 1]:.6g} s), which are not scored"
             )
+        if isinstance(self.initial, tuple):
+            return "it goes on from the samples before it"
         if self.initial is not None:
-            return f"it begins where the output has stood at {self.initial:g}"
-        if self.start.kind is StartKind.REST:
+            levels = self.initial if isinstance(self.initial, Dict) else {"the output": self.initial}
+            stood = ", ".join(f"{name} has stood at {level:g}" for name, level in levels.items())
+            return f"it begins where {stood}"
+        if first is None:
             return "it begins at rest, with its inputs at their first sample"
         return "it begins where its channels have stood at their first sample"
 
@@ -81,25 +104,28 @@ class Simulation:
 
 def simulate_bundle(
     bundle: Bundle | str | Path,
-    inputs: Trace | CommandTable | str | Path,
+    inputs: Trace | CommandTable | str | Path | Any,
     *,
     time_unit: str | None = None,
     unit: str | None = None,
-    initial: float | None = None,
-    start: Start | None = None,
+    initial: Initial = None,
+    start: StartLike | None = None,
     constants: Dict[str, float] | None = None,
 ) -> Simulation:
     """Run a bundle's model or cascade on nothing but its inputs.
 
     Args:
         bundle: The bundle, its folder or its zip, or the folder of the run that exported it.
-        inputs: A trace with the inputs; a command table; or a file with one, as :func:`read_command` reads it. A file
-            of samples is read with :func:`sysid.export.inputs.read_inputs` first.
+        inputs: A trace with the inputs; a frame or dict with columns by name, or an array of the inputs; a command
+            table; or a file with one, as :func:`read_command` reads it. A file of samples is read with
+            :func:`sysid.export.inputs.read_inputs` first.
         time_unit: Unit of a command file's times, where it does not say.
         unit: Unit of a command file's values, likewise.
-        initial: The output before the first sample, in its unit; the declared level by default. One output only.
+        initial: The output before the first sample, in its unit; of several outputs a dict by name; or the pair
+            ``(u, y)`` of the samples before, oldest first. The declared levels by default.
         start: How the run begins. By default as the bundle's cases did, where the trace has the measured output (the
-            initial state is estimated, unless a pipeline said otherwise); at rest without it, and for several models.
+            initial state is estimated, unless a pipeline said otherwise); at rest without it. Of several models each
+            begins by its own outputs; those that read each other begin at rest.
         constants: Inputs that are a number, by name, in the bundle's unit.
 
     Returns:
@@ -111,51 +137,54 @@ def simulate_bundle(
         UserError: If the inputs cannot be read or are not the bundle's.
     """
     read = bundle if isinstance(bundle, Bundle) else read_bundle(Path(bundle))
-    channels, numbers = tuple(channel_of(entry) for entry in read.inputs), dict(constants or {})
+    channels, outputs = (tuple(map(channel_of, entries)) for entries in (read.inputs, read.outputs))
+    numbers, sample_time = ticking(read, constants or {}), read.model.sample_time
     check_constants(numbers, channels)
     others = tuple(channel for channel in channels if channel.name not in numbers)
     if isinstance(inputs, str | Path):
         inputs = read_command(inputs, others or channels, time_unit=time_unit, unit=unit)
-    sample_time = read.model.sample_time
-    given = inputs.trace(sample_time) if isinstance(inputs, CommandTable) else inputs
-    check_record({channel.name: channel.unit for channel in channels}, sample_time, given)
-    return _run(read, with_constants(given, channels, numbers), channels, initial, start)
+    if isinstance(inputs, CommandTable):
+        given = inputs.trace(sample_time)
+    else:
+        given = record_of(inputs, others, outputs, sample_time=sample_time)
+    check_record({channel.name: channel.unit for channel in (*channels, *outputs)}, sample_time, given)
+    begin = None if start is None else Start.of(start)
+    return _run(read, with_constants(given, channels, numbers), channels, initial, begin)
 
 
 def declared_start(bundle: Bundle) -> Start:
-    """How the free runs of a bundle's cases began."""
-    return Start(**bundle.metadata.get("cases_start", {"kind": StartKind.ESTIMATED.value}))
+    """How the free runs of a bundle's cases began; estimated where nobody said how those of several models do."""
+    declared = dict(bundle.metadata.get("cases_start", {"kind": StartKind.ESTIMATED.value}))
+    said = declared.pop("said", bundle.model.single is not None or bool(bundle.model.rest))
+    start = Start(**declared)
+    return Start(kind=StartKind.ESTIMATED) if start.kind is StartKind.REST and not said else start
 
 
 def _run(
-    bundle: Bundle, given: Trace, channels: tuple[Channel, ...], initial: float | None, start: Start | None
+    bundle: Bundle, given: Trace, channels: tuple[Channel, ...], initial: Initial, start: Start | None
 ) -> Simulation:
     ranges = {entry["name"]: tuple(entry["range"]) for entry in bundle.inputs if entry["range"] is not None}
     outputs = tuple(channel_of(entry) for entry in bundle.outputs)
     names, targets = tuple(channel.name for channel in channels), [channel.name for channel in outputs]
     surrogate = Surrogate.of(bundle.model, ranges, outputs=targets)
-    start = _start(bundle, given, targets, initial, start)
-    values, measured = given.columns(names), [name for name in targets if name in given.channel_names]
+    measured = [name for name in targets if name in given.channel_names]
+    start, note = _start(bundle, given, measured, initial, start)
+    values, firsts = given.columns(names), dict[str, int]()
     if start.kind is StartKind.REST:
-        computed, first = _from_level(surrogate, values, initial), 0
+        _check_level(targets, initial)
+        computed = run_with(surrogate, values, initial)
     else:
-        computed, first = _from_measured(bundle, given, values, targets[0], start)
-    found = surrogate.chosen(computed)
+        run = run_measured(surrogate, values, {name: given[name] for name in measured}, start, given.usable_samples)
+        computed, firsts = run.computed, {name: first for name, first in run.first.items() if name in targets}
     trace = Trace(
         name=given.name,
         sample_time=given.sample_time,
         start_time=given.start_time,
         channels=(*channels, *outputs),
-        values=np.column_stack([values, found]),
+        values=np.column_stack([values, surrogate.chosen(computed)]),
         usable=None if measured else given.usable,
         provenance=(*given.provenance, f"{surrogate.mapping} simulated in free run by {bundle.folder}"),
     )
-    counted = given.usable_samples[first:]
-    scored = {
-        name: figures(given[name][first:], trace[name][first:], trace.channel(name).unit, counted)
-        for name in measured
-        if counted.any()
-    }
     return Simulation(
         trace=trace,
         inputs=names,
@@ -163,59 +192,51 @@ def _run(
         flags=expected_flags(surrogate, values, computed),
         held=tuple(limits_reached(surrogate, values, computed)),
         start=start,
-        first=first,
+        firsts=firsts,
         initial=initial,
-        scored=scored,
+        note=note,
+        scored=_scored(given, trace, measured, firsts),
     )
 
 
-def _start(bundle: Bundle, given: Trace, targets: list[str], initial: float | None, start: Start | None) -> Start:
-    """How the run begins: as is said, or as there is something to begin from."""
-    if initial is not None and start is not None and start.kind is not StartKind.REST:
-        raise ConfigError(
-            "the run cannot begin in two ways", where="initial", expected="initial, or a start from measured samples",
-            got=f"initial {initial:g} and start {start.kind.value}", remedy="leave one of them out",
-        )  # fmt: skip
-    known = bundle.model.single is not None and targets[0] in given.channel_names
-    if start is None or start.kind is StartKind.REST:
-        return declared_start(bundle) if start is None and initial is None and known else Start()
-    if bundle.model.single is None:
-        raise ConfigError(
-            "several models begin at their declared levels", where="start", expected="rest", got=start.kind.value,
-            remedy="leave start out, or give rest",
-        )  # fmt: skip
-    if not known:
-        error = ChannelError(targets[:1], given.channel_names, where=given.name)
-        raise ConfigError(
-            f"a run that begins {start.kind.value} needs the measured output", where=error.where,
-            expected=f"a column {targets[0]} with the samples that were measured", got=", ".join(given.channel_names),
-            remedy="put the measured output beside the inputs, or leave start out: the run then begins at rest",
-        )  # fmt: skip
-    return start
+def _scored(given: Trace, trace: Trace, measured: list[str], firsts: Dict[str, int]) -> dict[str, Figures]:
+    """Figures of each output that was measured, on the samples that did not say how it begins."""
+    found = {}
+    for name in measured:
+        counted = slice(firsts.get(name, 0), None)
+        usable = given.usable_samples[counted]
+        if usable.any():
+            found[name] = figures(given[name][counted], trace[name][counted], trace.channel(name).unit, usable)
+    return found
 
 
-def _from_level(surrogate: Surrogate, inputs: NDArray[np.float64], initial: float | None) -> NDArray[np.float64]:
-    """A free run from rest, or from another output."""
-    if initial is not None and len(surrogate.outputs) > 1:
+def _start(
+    bundle: Bundle, given: Trace, measured: list[str], initial: Initial, start: Start | None
+) -> tuple[Start, str]:
+    """How the run begins: as is said, or as there is something to begin from; and why not by what was measured."""
+    check_one_start(initial, start)
+    if initial is not None or (start is not None and start.kind is StartKind.REST):
+        return Start(), ""
+    if start is not None:
+        check_able(bundle.model, measured, start, where=given.name)
+    start = declared_start(bundle) if start is None else start
+    if start.kind is StartKind.REST or not measured:
+        return Start(), ""
+    begun, why = able(bundle.model, measured), obstacle(bundle.model)
+    if why:
+        return Start(), f"{why}, and no initial state is estimated from what was measured"
+    waits = [name for name in measured if name not in begun]
+    told = f"what was measured of {', '.join(waits)} says too little: other outputs of the model were not measured"
+    note = told if waits else ""
+    return start if begun else Start(), note
+
+
+def _check_level(targets: list[str], initial: Initial) -> None:
+    if len(targets) > 1 and initial is not None and not isinstance(initial, Dict | tuple):
         raise ConfigError(
             "the outputs cannot all begin at one value",
-            expected="a bundle with one output",
-            got=", ".join(port.name for port in surrogate.outputs),
-            remedy="leave the value out: each begins at its declared level",
+            where="initial",
+            expected="a number for each of them",
+            got=f"one number for {', '.join(targets)}",
+            remedy=f'leave it out: each begins at its declared level; in Python, initial={{"{targets[0]}": ...}}',
         )
-    return surrogate.run_from(inputs, {} if initial is None else {surrogate.outputs[0].name: initial})
-
-
-def _from_measured(
-    bundle: Bundle, given: Trace, inputs: NDArray[np.float64], target: str, start: Start
-) -> tuple[NDArray[np.float64], int]:
-    """The run from measured samples on, behind what the model follows or was told in them; and how many they are."""
-    model = bundle.model.single
-    assert model is not None  # noqa: S101 - refused before
-    begun = beginning(model, inputs, given[target], start, given.usable_samples)
-    run = model.simulate(inputs[begun.first :], begun.history)
-    if begun.first:
-        estimated = start.kind is StartKind.ESTIMATED
-        before = model.recursion.followed(begun.history) if estimated else begun.history.output
-        run = np.concatenate([before[-begun.first :], run])
-    return run[:, np.newaxis], begun.first

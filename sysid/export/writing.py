@@ -37,6 +37,7 @@ from sysid.export.manifest import (
     seal,
     sha256,
 )
+from sysid.export.own_figures import own_figures, side_by_side
 from sysid.export.parity import Allowed, ParityCase, check_parity, parity_cases, random_cases
 from sysid.export.stability import WORST, check_free_run, state_stability, state_unbounded
 from sysid.export.surrogate import Surrogate
@@ -79,7 +80,8 @@ def export_bundle(
         traces: The cases that each file is run on; the estimation traces also declare the range of the inputs. A
             cascade's cases need its inputs alone.
         folder: Where the bundle goes. What lies there is replaced if it is a bundle, or empty.
-        start: How the free run over each case begins; at rest by default, and always for a cascade.
+        start: How the free run over each case begins; at rest by default. The files of a cascade are compared from
+            rest; for it this says how the runs of its figures began, and runs of its bundle begin.
         outputs: Which outputs of a cascade leave it, in this order; all by default. What lies between them is
             computed, and nobody is told that it is at a limit.
         formats: Names of exporters; by default ONNX and C, as far as they can be written here. What is left out is
@@ -88,7 +90,8 @@ def export_bundle(
             that each output has over the cases, which is the same whatever the unit.
         tolerance_float32: The same for files that compute in float32; by default 1e-5 of it, and never less than
             ``tolerance``.
-        metrics: The figures on the cases, as :func:`sysid.validation.evaluate` or ``evaluate_cascade`` give them.
+        metrics: The figures on the cases, as :func:`sysid.validation.evaluate` or ``evaluate_cascade`` give them; by
+            default they are computed here, without run times, as far as the cases have the outputs.
         fits: Where a cascade's models come from, by mapping.
         provenance: JSON values about where the fit comes from, kept as they are. A ``training`` among them,
             with the data sets that were ``fitted`` and that have ``chosen`` (``name`` and ``sha256`` of each) and
@@ -106,13 +109,16 @@ def export_bundle(
     """
     formats = usual_formats(formats)
     recorded = traces
+    if isinstance(fit, Cascade) and not side_by_side(fit):
+        start = None  # such models begin at rest
+    if metrics is None:
+        metrics = own_figures(fit if isinstance(fit, Cascade) else fit.model, traces, start, outputs)
     if isinstance(fit, FitResult):
         fit, traces = with_case_inputs(fit, traces, start or Start())
     source = fit if isinstance(fit, Cascade) else fit.model
     known = dict(fits or {}) if isinstance(fit, Cascade) else {str(fit.model.mapping): fit}
-    start = Start() if start is None or source.single is None else start
     surrogate = _surrogate(source, traces, outputs)
-    cases, sequences = parity_cases(surrogate, traces, start), random_cases(surrogate)
+    cases, sequences = parity_cases(surrogate, traces, start or Start()), random_cases(surrogate)
     stability = None if source.single is None else check_free_run(source.single, traces)
     manifest = describe(
         surrogate, known, traces, start=start, metrics=metrics, provenance=provenance or {}, recorded=recorded

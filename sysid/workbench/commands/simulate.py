@@ -202,11 +202,10 @@ def check_picture(plot: Path | None) -> None:
 def _tell(simulation: Simulation, out: Path) -> None:
     names = ", ".join(simulation.outputs)
     console().print(f"{len(simulation.trace)} samples of {names} written to {out}", soft_wrap=True)
-    console().print(simulation.begins, soft_wrap=True)
+    console().print(simulation.begins, soft_wrap=True, markup=False)
     for name, found in simulation.scored.items():
-        of = (
-            f"on the {len(simulation.trace) - simulation.first} samples after" if simulation.first else "on all samples"
-        )
+        first = simulation.firsts.get(name, 0)
+        of = f"on the {len(simulation.trace) - first} samples after" if first else "on all samples"
         error = f"{found.mse:.4g} {squared(found.unit)}".removesuffix(" 1")  # a pure number has no unit to name
         text = f"fit {percent(found.nrmse_fit)} %, mean squared error {error}"
         console().print(f"against the measured {name}: {text}, {of}", soft_wrap=True, markup=False)
