@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -13,10 +13,12 @@ from sysid.api.given import TracesLike, traces_of
 from sysid.api.several import Several
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
+from sysid.export.bundle import Bundle
+from sysid.export.own_figures import side_by_side
 from sysid.extras import need
-from sysid.models import Start, StartKind, StartLike
+from sysid.models import Cascade, Start, StartKind, StartLike
 from sysid.traces import Role, TraceSet
-from sysid.validation import Evaluation, evaluate_outputs
+from sysid.validation import Evaluation, evaluate_cascade, evaluate_outputs
 from sysid.validation.beyond import beyond
 from sysid.validation.metrics import percent
 from sysid.validation.repeated import repeated
@@ -25,6 +27,9 @@ from sysid.validation.still import still
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+Compared = FitResult | Several | Bundle
+"""What is compared."""
 
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
 """How a free run begins unless told otherwise: its initial state is estimated from the first samples of each record."""
@@ -114,15 +119,15 @@ class Comparison:
         return comparison_figure(list(panels.values()))
 
 
-def compare(
-    traces: TracesLike, *fits: FitResult | Several | Sequence[FitResult | Several], start: StartLike = ESTIMATED
-) -> Comparison:
+def compare(traces: TracesLike, *fits: Compared | Sequence[Compared], start: StartLike = ESTIMATED) -> Comparison:
     """Run fitted models over every case: fed with nothing but inputs and their own past output.
 
     Args:
         traces: The cases; those for validation count.
-        fits: What is compared, or lists of it; a fit of several outputs has a row for each.
-        start: How each free run begins, and from which sample on it is scored, as for :func:`~sysid.fit`.
+        fits: What is compared, or lists of it: fits, and bundles, as :func:`~sysid.read_bundle` reads them. What has
+            several outputs has a row for each.
+        start: How each free run begins, and from which sample on it is scored, as for :func:`~sysid.fit`; a bundle of
+            models that read each other begins at rest.
 
     Returns:
         The figures; printing them shows a table, ``plot()`` draws them.
@@ -134,32 +139,64 @@ def compare(
     outputs: dict[str, tuple[str, str]] = {}
     notes: dict[str, None] = {}
     traces, start = traces_of(traces, word="compare"), Start.of(start)
-    for fit in _fits(fits):
-        members = [fit] if isinstance(fit, FitResult) else list(fit.fits.values())
-        several = len(members) > 1 or len(members[0].model.mapping.outputs) > 1
-        for one in members:
-            notes |= dict.fromkeys(_beyond(one, traces))
-            units = dict(zip(one.model.mapping.outputs, one.model.ends.output_units, strict=True))
-            for output, found in evaluate_outputs(one.model, traces, start, posterior=one.posterior).items():
-                label = f"{one.model.structure.label} -> {output}" if several else one.model.structure.label
-                label = label if label not in evaluations else f"{label} ({len(evaluations) + 1})"
-                evaluations[label], outputs[label] = found, (output, units[output])
+    for one in _fits(fits):
+        for judged in _judged(one, traces, start):
+            label = judged.label if judged.label not in evaluations else f"{judged.label} ({len(evaluations) + 1})"
+            evaluations[label], outputs[label] = judged.evaluation, (judged.output, judged.unit)
+        for fit in [one] if isinstance(one, FitResult) else [*getattr(one, "fits", {}).values()]:
+            notes |= dict.fromkeys(_beyond(fit, traces))
     return Comparison(evaluations=evaluations, outputs=outputs, notes=tuple(notes))
 
 
-def _fits(given: Sequence[Any]) -> list[FitResult | Several]:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Judged:
+    """A row of the table: one output of what is compared."""
+
+    label: str
+    output: str
+    unit: str
+    evaluation: Evaluation
+
+
+def _judged(one: Compared, traces: TraceSet, start: Start) -> Iterator[_Judged]:
+    """What is compared, output by output."""
+    posterior = one.posterior if isinstance(one, FitResult) else None
+    model = one.model
+    if isinstance(model, Cascade) and not side_by_side(model):
+        yield from _judged_whole(model, traces, [str(entry["name"]) for entry in getattr(one, "outputs", ())])
+        return
+    members = list(one.fits.values()) if not isinstance(one, FitResult) and hasattr(one, "fits") else model.models
+    several = len(model.outputs) > 1
+    for part in members:
+        alone, uncertain = (part.model, part.posterior) if isinstance(part, FitResult) else (part, posterior)
+        units = dict(zip(alone.mapping.outputs, alone.ends.output_units, strict=True))
+        for output, found in evaluate_outputs(alone, traces, start, posterior=uncertain).items():
+            label = f"{alone.structure.label} -> {output}" if several else alone.structure.label
+            yield _Judged(label=label, output=output, unit=units[output], evaluation=found)
+
+
+def _judged_whole(model: Cascade, traces: TraceSet, outputs: list[str]) -> Iterator[_Judged]:
+    """Models that read each other: the free run of the whole, from rest."""
+    measured = [channel.name for channel in traces.channels]
+    there = [name for name in outputs or model.outputs if name in measured] or outputs
+    for output, found in evaluate_cascade(model, traces, outputs=there).outputs.items():
+        yield _Judged(label=f"assembly -> {output}", output=output, unit=model.units[output], evaluation=found)
+
+
+def _fits(given: Sequence[Any]) -> list[Compared]:
     """One after the other, whether they were given one by one or in lists."""
     found = [one for part in given for one in (part if isinstance(part, list | tuple) else (part,))]
     strangers = dict.fromkeys(
-        type(one).__name__ for one in found if not isinstance(one, FitResult) and not hasattr(one, "fits")
+        type(one).__name__ for one in found if not isinstance(one, FitResult | Bundle) and not hasattr(one, "fits")
     )
     if strangers or not found:
         raise ConfigError(
-            "sysid.compare takes fits",
+            "sysid.compare takes fits and bundles",
             where="fits",
-            expected="what sysid.fit gives, one or several",
+            expected="what sysid.fit or sysid.read_bundle gives, one or several",
             got=", ".join(strangers) or "none",
-            remedy="write sysid.compare(traces, fit, other); of a model, the fit that it is of",
+            remedy="write sysid.compare(traces, fit, other); of a model, the fit that it is of; of a folder, "
+            "sysid.read_bundle(folder)",
         )
     return found
 

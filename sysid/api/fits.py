@@ -297,17 +297,23 @@ class SystemFit:
             raise ChannelError([output], self.outputs, where="the outputs of a fit")
         return self.fits[output]
 
-    def simulate(self, u: Any, *, initial: Dict[str, float] | None = None) -> NDArray[np.float64]:
+    def simulate(self, u: Any, *, initial: Dict[str, float] | tuple[Any, Any] | None = None) -> NDArray[np.float64]:
         """Free run of all outputs.
 
         Args:
             u: Inputs, as for :meth:`Fit.simulate`, in the order of the first output's mapping.
-            initial: The output that the system has stood at, by name; the rest values where nothing is said.
+            initial: The output that the system has stood at, by name; or a pair ``(u, y)`` of the samples before,
+                oldest first, with a column of ``y`` for each output. The rest values where nothing is said.
 
         Returns:
             Shape ``(n_samples, n_outputs)``, in the outputs' units.
         """
-        given = dict(initial or {})
+        given: dict[str, Any] = {}
+        if isinstance(initial, tuple):
+            before, output = before_a_run(initial, self[self.outputs[0]].model.mapping.inputs, self.outputs)
+            given = {name: (before, column) for name, column in zip(self.outputs, output.T, strict=True)}
+        elif initial is not None:
+            given = dict(initial)
         check_outputs(given, self.outputs)
         return np.column_stack([fit.simulate(u, initial=given.get(name)) for name, fit in self.fits.items()])
 

@@ -40,4 +40,5 @@ def _begins(start: Dict[str, Any], metrics: Dict[str, Any]) -> str:
     many = f"{counts[0]}" if counts[0] == counts[-1] else f"{counts[0]} to {counts[-1]}"
     if start["kind"] == "measured":
         return f"Each free run goes on from the first {many} samples of its record, which are not scored."
-    return f"The initial state is estimated on the first {many} samples, which are not scored."
+    which = f"first {many}" if counts[-1] else "first"  # of several models older bundles do not say on how many
+    return f"The initial state is estimated on the {which} samples, which are not scored."

@@ -40,7 +40,7 @@ def test_an_autoregressive_model_has_the_decay_s_pole() -> None:
     ],
 )
 def test_networks_follow_a_decay(structure: object, label: str) -> None:
-    traces = sysid.data([decay(2.0), decay(-1.0)], sample_time=0.1)
+    traces = sysid.data([decay(2.0), decay(-1.0)], outputs="y", sample_time=0.1)
     fit = sysid.fit(traces, "-> y", structure, sysid.Training(max_iterations=200, seed=1), start=AFTER_ONE)
     assert fit.model.structure.label == label
     found = sysid.compare(traces, fit, start=AFTER_ONE).to_frame()
