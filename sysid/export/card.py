@@ -25,7 +25,7 @@ def model_card(manifest: Dict[str, Any]) -> str:
         "begins": _begins(manifest["cases_start"], metrics),
         "beside": [one["name"] for one in manifest["attachments"]],
     }
-    timed = any(case["run_time_s"] is not None for case in metrics.values())
+    timed = any(case.get("run_time_s") is not None for case in metrics.values())
     return render("model_card.md.j2", **manifest, **told, timed=timed, meaning=MEANING, units=units, unit=unit)
 
 
@@ -37,6 +37,7 @@ def _begins(start: Dict[str, Any], metrics: Dict[str, Any]) -> str:
         return "Each free run starts from the first measured sample."
     entries = [one for case in metrics.values() for one in case.get("outputs", {"": case}).values()]
     counts = sorted({int(one.get("begins_at", start["n_measured"])) for one in entries})
+    counts = counts or [start["n_measured"]]
     many = f"{counts[0]}" if counts[0] == counts[-1] else f"{counts[0]} to {counts[-1]}"
     if start["kind"] == "measured":
         return f"Each free run goes on from the first {many} samples of its record, which are not scored."
