@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -183,20 +184,20 @@ SAID: Final[dict[str, Words]] = {
     "noise.unknown": Words("How much is noise: {why}."),
     "linearity.exact": Words("A linear response leaves nothing to explain ({left:.1e} of the output)."),
     "linearity.none_seen": Words(
-        "Curvature explains {share:.0%} of the {left:.1%} that a linear response leaves: none that is sure. It would"
+        "Curvature explains {share:.0%} of the {left:.2%} that a linear response leaves: none that is sure. It would"
         " not show friction, play, or what two levels hide."
     ),
     "linearity.perhaps_curved": Words(
-        "Curvature may explain {share:.0%} of the {left:.1%} that a linear response leaves; the record is too short to"
+        "Curvature may explain {share:.0%} of the {left:.2%} that a linear response leaves; the record is too short to"
         " be sure (p = {p:.1g}).",
         "Try a network beside the linear model, and compare them in free run.",
     ),
     "linearity.slightly_curved": Words(
-        "Curvature explains {share:.0%} of the {left:.1%} that a linear response leaves.",
+        "Curvature explains {share:.0%} of the {left:.2%} that a linear response leaves.",
         "A linear model may do; compare it with a network in free run.",
     ),
     "linearity.curved": Words(
-        "Not linear: curvature explains {share:.0%} of the {left:.1%} that a linear response leaves.",
+        "Not linear: curvature explains {share:.0%} of the {left:.2%} that a linear response leaves.",
         "Fit a network; the linear model is its start and its yardstick.",
     ),
     "linearity.nothing_explained": Words(
@@ -292,7 +293,8 @@ def said(finding: Told, units: Mapping[str, str]) -> tuple[str, str]:
         "code": finding.code,
     }
     figures = _Figures(dict(finding.figures) | others)
-    return " ".join(words.says.format_map(figures).split()).replace(" ,", ","), words.do.format_map(figures)
+    says = re.sub(r"\b1 (sample|time)s\b", r"1 \1", words.says.format_map(figures))
+    return " ".join(says.split()).replace(" ,", ","), words.do.format_map(figures)
 
 
 class _Figures(dict[str, object]):

@@ -51,8 +51,9 @@ def accuracy_table(fits: Sequence[FitRecord], kind: str, best: Collection[str]) 
     words = {"free_run": "Free run", "one_step": "One step ahead"}[kind]
     note = {
         "free_run": "The model runs on its own past output: the figure that counts.",
-        "one_step": "Each step starts from measured output: this says little about a free run. A model whose noise is "
-        "added to its output (a transfer function, a neural state space) has no such prediction, and shows a dash.",
+        "one_step": "Every prediction begins at the measured output, one sample before. That is easy, and says little "
+        "about a free run. A model that adds its noise to the output (a transfer function, a neural state space) "
+        "predicts nothing else than its free run, and shows a dash.",
     }[kind]
     return Table(
         caption=f"{words}: mean squared error [{squared(fits[0].unit)}] by case. {fits[0].mapping}.",

@@ -119,9 +119,9 @@ def coverage_table(results: Results) -> Table | None:
         caption="How often the 95 % interval of the output holds the measured output, by case [%].",
         head=(("fit", ""), *((name, role.value) for name, role in columns.items())),
         rows=tuple(rows),
-        note="95 would be exact; more is a cautious interval, less a promise not kept. Small figures: the mean half "
-        "width, and what the interval from the estimation records alone holds, before it was widened to the errors on "
-        "the traces that choose."
+        note="A right interval holds 95 %. One that holds more is wider than it need be; one that holds less promises "
+        "too much. Small figures: the mean half width, and what the interval from the estimation records alone holds, "
+        "before it was widened to the errors on the traces that choose."
         + (f" No interval: {', '.join(without)}; why stands among their notes." if without else ""),
     )
 
@@ -293,7 +293,7 @@ def groups_table(fit: FitRecord) -> Table:
         caption=f"{fit.name}: how many of its parameters the data determine, by group of weights.",
         head=(("group", ""), ("parameters", ""), ("determined", ""), ("share", "%"), ("precision of the prior", "")),
         rows=tuple(rows),
-        note=f"{note} Hidden weights stand in the basis of training, one group a regressor.",
+        note=f"{note} Hidden weights have a group for each regressor, as they are trained.",
     )
 
 

@@ -37,7 +37,10 @@ class Amplitude(enum.Enum):
 class Answer(enum.Enum):
     """The verdict; the value is the sentence that a person reads."""
 
-    LINEAR = "A linear model is enough: at every amplitude it is good, or as good as the network."
+    LINEAR = (
+        f"A linear model may do: at every amplitude its fit is {ENOUGH:.0f} % or more, or its error is less than twice "
+        "the network's."
+    )
     NETWORK = (
         "Linear is not enough: at some amplitude the network's error is less than half that of every linear model."
     )

@@ -109,7 +109,9 @@ class Stability:
         if self.unsettled:
             return f"Unstable: the free run settles elsewhere on {self.unsettled} of {runs}, {settled}."
         if not self.judged:
-            return f"The free run stays bounded on {runs}; none has a plateau to settle on."
+            return (
+                f"The free run stays bounded on {runs}. None of them stands still, so where it settles was not judged."
+            )
         return f"The free run stays bounded on {runs} and settles {settled}."
 
     def to_dict(self) -> dict[str, Any]:

@@ -176,7 +176,7 @@ def test_records_that_never_stand_still_show_that_a_run_stays_bounded():
     trace = Trace(name="noise", sample_time=0.5, channels=CHANNELS, values=values)
     found = check_stability(model(), excursions(trace), count=20)
     assert (found.stable, found.judged) == (True, 0)
-    assert "none has a plateau" in found.sentence
+    assert "None of them stands still" in found.sentence
     assert found.to_dict()["largest_plateau_error"] is None
 
 
