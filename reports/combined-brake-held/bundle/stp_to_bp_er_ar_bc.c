@@ -176,7 +176,7 @@ static void weigh(real *sums, const real *constants, const real *weights, int n,
 /* Neurons of a layer. Beyond 20 the tanh of a double is 1; not a number stays as it is. */
 static void activate(real *a, const real *sums, int n)
 {
-    int i = 0;
+    int i = 0, k;
 
 #if defined(TANH_LANES)
     for (; n >= LANES && i < n; i += LANES) {
@@ -185,10 +185,12 @@ static void activate(real *a, const real *sums, int n)
         tanh_lanes(a + first, sums + first);
     }
 #endif
+    for (k = i; k < n; k++) {
+        a[k] = sums[k] > R(20.0) ? R(20.0) : sums[k];
+        a[k] = a[k] < R(-20.0) ? R(-20.0) : a[k];
+    }
     for (; i < n; i++) {
-        const real below = sums[i] > R(20.0) ? R(20.0) : sums[i];
-
-        a[i] = TANH(below < R(-20.0) ? R(-20.0) : below);
+        a[i] = TANH(a[i]);
     }
 }
 

@@ -57,5 +57,8 @@ int main(int argc, char **argv)
     for (i = 1; i < argc; i++) {
         faults += verify(argv[i]);
     }
+    if (argc < 2) {
+        fprintf(stderr, "name the records: %s verify/record*.csv\n", argv[0]);
+    }
     return argc < 2 || faults;
 }
