@@ -12,22 +12,11 @@ from sysid.api.given import TracesLike, check_order, path_of, traces_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
-from sysid.ingest import READERS, load_dataset, read_trace
+from sysid.ingest import load_dataset, read_trace
 from sysid.ingest.in_python import remedies_of_a_file
+from sysid.ingest.reading import is_file_of_traces
 from sysid.models import AbstractStructure, Mapping, Start, StartLike
 from sysid.traces import Role, TraceSet
-
-
-def is_file_of_traces(source: str | Path) -> bool:
-    """Whether a source is a file with traces, by its suffix, and not a data set.
-
-    Args:
-        source: A name or a path.
-
-    Returns:
-        Whether it is.
-    """
-    return Path(source).suffix.lower() in {suffix for reader in READERS for suffix in reader.suffixes}
 
 
 def load(source: str | Path) -> TraceSet:

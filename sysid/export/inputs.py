@@ -77,6 +77,8 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
     if outputs:
         nan = {c.name: repairs.nan for c in wanted} if isinstance(repairs.nan, str) else dict(repairs.nan or {})
         repairs = repairs.model_copy(update={"nan": {**dict.fromkeys((c.name for c in outputs), "mask"), **nan}})
+    # What is said of an output holds for a run that does not read it.
+    files = files.without({str(entry["name"]) for entry in bundle.outputs} - {channel.name for channel in outputs})
     trace = assemble(
         table,
         Wanted(

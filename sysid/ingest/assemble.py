@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError, UserError
 from sysid.ingest import repairs as repair
 from sysid.ingest.grid import Gridded, fill, grid_places, place, resample
-from sysid.ingest.in_units import clock_by_its_steps, in_unit, stamps_in_seconds
+from sysid.ingest.in_units import check_units_said, clock_by_its_steps, in_unit, stamps_in_seconds
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions
 from sysid.ingest.repairs import Record
 from sysid.ingest.table import RawColumn, RawTable
@@ -119,9 +119,10 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
         notes += [clock] if clock else []
     stamps = stamps_in_seconds(table, files)
     columns = []
-    for channel in wanted.channels:
-        given = files.columns.get(channel.name, ColumnOptions(column=channel.name))
-        column = table.find(given.column)
+    asked = {one.name: files.columns.get(one.name, ColumnOptions(column=one.name)) for one in wanted.channels}
+    told = [(table.find(asked[one.name].column), one, asked[one.name]) for one in wanted.channels]
+    check_units_said(told, files, table.source)
+    for column, channel, given in told:
         values, note = in_unit(column, channel, given, files, table.source)
         columns.append(values)
         notes += [note] if note else []

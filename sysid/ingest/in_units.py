@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -89,6 +89,41 @@ def stamps_in_seconds(table: RawTable, files: FileOptions) -> NDArray[np.float64
     return _converted(column.values, time_unit(unit), "s", where=f"{table.source}, column {column.name}")
 
 
+def check_units_said(
+    asked: Sequence[tuple[RawColumn, Channel, ColumnOptions]], files: FileOptions, source: Path
+) -> None:
+    """Refuse columns of which nothing says a unit, all of them at once.
+
+    A channel without a unit, in a file without units, is what it is.
+
+    Args:
+        asked: Each column, its channel, and what is declared of it.
+        files: What is declared of all columns.
+        source: The file, for the error.
+
+    Raises:
+        UnitError: If there are any.
+    """
+    missing = [
+        (column.name, channel.name, channel.unit)
+        for column, channel, given in asked
+        if not (given.unit or _for_channel(files.units, channel.name) or column.unit or channel.unit == "1")
+    ]
+    if not missing:
+        return
+    one, (header, name, unit) = len(missing) == 1, missing[0]
+    headers = ", ".join(f"'{header} [{unit}]'" for header, _, unit in missing)
+    units = ", ".join(f"{name}: {unit}" for _, name, unit in missing)
+    raise UnitError(
+        "a column has no unit" if one else f"{len(missing)} columns have no unit",
+        where=f"{source}, channel {name} (column {header})" if one else source,
+        expected="a unit in the file or in the description",
+        got="none" if one else f"none for {', '.join(name for _, name, _ in missing)}",
+        remedy=f"if {f'it is {unit}' if one else 'they are in these units'}, write {headers} as "
+        f"{'its header' if one else 'their headers'}, or files: {{units: {{{units}}}}} in a dataset.yaml",
+    )
+
+
 def in_unit(
     column: RawColumn, channel: Channel, given: ColumnOptions, files: FileOptions, source: Path
 ) -> tuple[NDArray[np.float64], str | None]:
@@ -117,18 +152,9 @@ def in_unit(
             got=f"values from {column.counted_from}",
             remedy="subtract the first value before the export, or leave the channel out",
         )
+    check_units_said([(column, channel, given)], files, source)
     declared = given.unit or _for_channel(files.units, channel.name)
-    # A channel without a unit, in a file without units, is what it is.
-    unit = declared or column.unit or ("1" if channel.unit == "1" else None)
-    if unit is None:
-        raise UnitError(
-            "a column has no unit",
-            where=where,
-            expected="a unit in the file or in the description",
-            got="none",
-            remedy=f"if it is {channel.unit}, write '{column.name} [{channel.unit}]' as its header, "
-            f"or files: {{units: {{{channel.name}: {channel.unit}}}}} in a dataset.yaml",
-        )
+    unit = declared or column.unit or "1"
     reference = given.reference or _for_channel(files.references, channel.name) or column.reference
     if channel.reference is not Reference.NONE and reference is None:
         raise UnitError(

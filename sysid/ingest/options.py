@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -216,6 +217,23 @@ class FileOptions(Options):
                 remedy="a decimal comma goes with separator: ';' or a tab",
             )
         return self
+
+    def without(self, channels: Collection[str]) -> FileOptions:
+        """The same without what is said of some channels.
+
+        Args:
+            channels: Their names.
+
+        Returns:
+            The options.
+        """
+        each = {name: getattr(self, name) for name in ("columns", "units", "references")}
+        kept = {
+            name: {channel: one for channel, one in said.items() if channel not in channels}
+            for name, said in each.items()
+            if isinstance(said, dict)
+        }
+        return self.model_copy(update=kept)
 
 
 class GridOptions(Options):

@@ -20,6 +20,18 @@ from sysid.traces import Channel, Trace
 from sysid.units import Reference
 
 
+def is_file_of_traces(source: str | Path) -> bool:
+    """Whether a source is a file with traces, by its suffix, and not a data set.
+
+    Args:
+        source: A name or a path.
+
+    Returns:
+        Whether it is.
+    """
+    return Path(source).suffix.lower() in {suffix for reader in READERS for suffix in reader.suffixes}
+
+
 def read_table(path: str | Path, *, files: FileOptions | None = None, repairs: RepairOptions | None = None) -> RawTable:
     """Read a file as columns of numbers, as they stand.
 

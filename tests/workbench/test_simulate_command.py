@@ -220,3 +220,55 @@ def test_how_a_run_cannot_begin(run, tmp_path, capsys, words, says):
     file = table(tmp_path / "w.csv", **{"u [V]": RAMP, "v [V]": RAMP})
     assert simulated(run, file, *words, out=tmp_path / "a.csv")[0] == 2
     assert says in capsys.readouterr().err
+
+
+def test_units_that_are_missing_are_asked_for_at_once(run, tmp_path, capsys):
+    file = table(tmp_path / "w.csv", u=RAMP, v=RAMP, y=DECAY)
+    assert simulated(run, file, out=tmp_path / "a.csv")[0] == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "--units u=V --units v=V --units y=m" in said and "none for u, v, y" in said
+    units = ["--units", "u=V", "--units", "v=V", "--units", "y=m"]
+    for start in ([], ["--start", "rest"], ["--initial", "5"]):
+        assert simulated(run, file, *units, *start, out=tmp_path / "a.csv")[0] == 0
+    assert simulated(run, file, *units, "--units", "w=V", out=tmp_path / "a.csv")[0] == 2
+    assert "units names w, which is not a channel" in capsys.readouterr().err
+
+
+def test_without_a_name_it_is_written_beside_what_is_simulated(run, tmp_path, capsys):
+    file = table(tmp_path / "w.csv", **{"u [V]": RAMP, "v [V]": 3.0})
+    assert run_cli(["simulate", str(run), file]) == 0
+    assert read_trace(tmp_path / "w.simulated.csv").channel_names == ("u", "v", "y")
+    assert "w.simulated.csv" in capsys.readouterr().out.replace("\n", "")
+    (tmp_path / "c.csv").write_text("time [s],u [V],v [V]\n0,1,2\n2,1,2\n")
+    assert run_cli(["simulate", str(run), "--command", str(tmp_path / "c.csv")]) == 0
+    assert {"c.simulated.csv", "c.simulated.png"} <= {one.name for one in tmp_path.iterdir()}
+
+
+DATASET = """
+name: rig
+sample_time: 0.1
+channels: [{name: u, unit: V}, {name: v, unit: V}, {name: y, unit: m}]
+source: {files: {}, repairs: {constant: accept}}
+cases:
+  EST: {role: estimation, file: ../../w.csv, rows: [1, 20]}
+  VAL: {role: validation, file: ../../w.csv, rows: [21, null]}
+"""
+
+
+def test_the_records_of_a_data_set_of_the_workspace_are_simulated(run, tmp_path, monkeypatch, capsys):
+    table(tmp_path / "w.csv", **{"u [V]": RAMP, "v [V]": 3.0, "y [m]": DECAY})
+    (tmp_path / "datasets" / "rig").mkdir(parents=True)
+    (tmp_path / "datasets" / "rig" / "dataset.yaml").write_text(DATASET)
+    monkeypatch.chdir(tmp_path)
+    assert run_cli(["simulate", str(run), "rig"]) == 0
+    for case, rows in {"EST": slice(0, 20), "VAL": slice(20, 40)}.items():
+        written = read_trace(tmp_path / f"rig.simulated.{case}.csv")
+        np.testing.assert_allclose(written["y"], DECAY[rows], atol=1e-10)
+    capsys.readouterr()
+    for words, says in (
+        (["rug"], "did you mean rig"),
+        (["rug"], "named with its ending, as inputs.csv"),
+        (["rig", "--units", "u=V"], "these options are for a file of samples"),
+    ):
+        assert run_cli(["simulate", str(run), *words]) == 2
+        assert says in " ".join(capsys.readouterr().err.split())

@@ -19,9 +19,16 @@ commands = typer.Typer()
 def simulate(
     ctx: typer.Context,
     bundle: Annotated[Path, typer.Argument(help="Folder or zip of an exported model or cascade, or a run folder.")],
-    inputs: Annotated[Path | None, typer.Argument(help="File with the input channels at every sample.")] = None,
+    inputs: Annotated[
+        Path | None, typer.Argument(help="File with the input channels at every sample, or the name of a data set.")
+    ] = None,
     *,
-    out: Annotated[Path, typer.Option(help="File to write, .csv or .parquet: time, inputs and simulated outputs.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="File to write, .csv or .parquet: time, inputs and simulated outputs; NAME.simulated.csv by default."
+        ),
+    ] = None,
     command: Annotated[
         Path | None,
         typer.Option(

@@ -146,6 +146,8 @@ def typed(text: str) -> str:
     Example:
         >>> typed("ask for repairs: {gaps: linear} or {gaps: hold}; (grid: {longest_step: ...})")
         'ask for --repairs gaps=linear or --repairs gaps=hold; (--grid longest_step=...)'
+        >>> typed("write files: {units: {u: V, y: rad/s}}")
+        'write --units u=V --units y=rad/s'
     """
     section = ""
 
@@ -157,7 +159,10 @@ def typed(text: str) -> str:
         name, value = found[2], found[3].strip()
         inner = re.fullmatch(r"\{([^:{}]+): ([^{}]*)\}", value)
         if section == "files" and inner:
-            return f"--{name}-{inner[1]} {inner[2]}" if name == "time" else f"--{name} {inner[1]}={inner[2]}"
+            if name == "time":
+                return f"--{name}-{inner[1]} {inner[2]}"
+            pairs = re.split(r", (?=[^,:]+: )", f"{inner[1]}: {inner[2]}")
+            return " ".join(f"--{name} {'='.join(pair.split(': ', 1))}" for pair in pairs)
         return f"--{name} {value}" if section == "files" else f"--{section} {name}={value}"
 
     said = re.sub(r"(?:(repairs|grid|files): )?\{(\w+): (\{[^{}]*\}|[^{}]*)\}", option, text)

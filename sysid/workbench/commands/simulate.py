@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,12 +12,15 @@ import numpy as np
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError
+from sysid.export.bundle import Bundle
 from sysid.export.flags import Flag
 from sysid.export.inputs import InputOptions, read_inputs
 from sysid.export.reading import read_bundle
 from sysid.export.simulation import Simulation, simulate_bundle
-from sysid.ingest import write_trace
+from sysid.ingest import find_dataset, load_dataset, write_trace
+from sysid.ingest.reading import is_file_of_traces
 from sysid.models import Start, StartKind
+from sysid.traces import Trace
 from sysid.units import squared
 from sysid.validation.metrics import percent
 from sysid.workbench.commands.reader_options import as_typed, reading_options
@@ -24,6 +28,8 @@ from sysid.workbench.runner.console import console
 
 PICTURES = (".png", ".svg", ".pdf")
 """What a picture may end in."""
+DESCRIPTIONS = (".yaml", ".yml")
+"""What the description of a data set ends in."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,8 +38,8 @@ class Wish:
 
     Args:
         bundle: The bundle's folder or zip, or the folder of the run that exported it.
-        out: The file to write, ``.csv`` or ``.parquet``.
-        inputs: A file with the input channels; units are converted to the bundle's.
+        out: The file to write, ``.csv`` or ``.parquet``; by default ``NAME.simulated.csv`` beside what is simulated.
+        inputs: A file with the input channels, whose units are converted to the bundle's; or a data set's name.
         initial: The output's value before the first sample; ``None`` is its declared level.
         start: How the run begins, as in a pipeline; ``None`` leaves it to the bundle and the file.
         constants: ``NAME=NUMBER`` of inputs that are held.
@@ -45,7 +51,7 @@ class Wish:
     """
 
     bundle: Path
-    out: Path
+    out: Path | None = None
     inputs: Path | None = None
     initial: float | None = None
     start: str | None = None
@@ -55,6 +61,22 @@ class Wish:
     unit: str | None = None
     plot: Path | None = None
     reading: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def written(self) -> Path:
+        """The file to write: as was said, or beside the file that is simulated; of a data set where one is."""
+        if self.out is not None:
+            return self.out
+        source = Path(str(self.inputs if self.command is None else self.command))
+        if self.command is None and not _is_record(source):
+            named = source.parent if source.suffix in DESCRIPTIONS and source.parent.name else source
+            return Path(f"{named.name}.simulated.csv")
+        return source.with_name(f"{source.stem}.simulated.csv")
+
+
+def _is_record(source: Path) -> bool:
+    """Whether something is a file of samples, and no data set; ``--reader`` reads files of any ending."""
+    return is_file_of_traces(source) or (source.is_file() and source.suffix not in DESCRIPTIONS)
 
 
 def simulate_command(wish: Wish) -> None:
@@ -69,26 +91,68 @@ def simulate_command(wish: Wish) -> None:
     """
     _check(wish)
     read, plot, start = read_bundle(wish.bundle), wish.plot, parse_start(wish.start)
-    constants = parse_constants(wish.constants)
+    constants, out = parse_constants(wish.constants), wish.written
     if wish.command is not None:
         words = {"time_unit": wish.time_unit, "unit": wish.unit}
-        simulation = simulate_bundle(
-            read, wish.command, **words, initial=wish.initial, start=start, constants=constants
-        )
-        plot = plot or wish.out.with_suffix(".png")
+        given: list[tuple[Path, Any]] = [(out, wish.command)]
+        plot = plot or out.with_suffix(".png")
     else:
-        measured = wish.initial is None and (start is None or start.kind is not StartKind.REST)
-        with as_typed():
-            options = InputOptions(constants=constants, measured=measured, **reading_options(wish.reading))
-            inputs = read_inputs(read, Path(str(wish.inputs)), options)
-        for done in inputs.provenance[1:]:  # the first is the file itself
-            console().print(done, soft_wrap=True, markup=False)
-        simulation = simulate_bundle(read, inputs, initial=wish.initial, start=start)
-    write_trace(replace(simulation.trace, name=wish.out.stem), wish.out)
-    _tell(simulation, wish.out)
-    if plot is not None:
-        _draw(simulation, plot, title=read.metadata["mapping"])
-        console().print(f"drawn in {plot}", soft_wrap=True)
+        words, given = {}, _records(wish, read, start, constants)
+    for place, record in given:
+        simulation = simulate_bundle(read, record, **words, initial=wish.initial, start=start, constants=constants)
+        write_trace(replace(simulation.trace, name=place.stem), place)
+        _tell(simulation, place)
+        if plot is not None:
+            picture = plot if len(given) == 1 else _of_case(plot, record.name)
+            _draw(simulation, picture, title=read.metadata["mapping"])
+            console().print(f"drawn in {picture}", soft_wrap=True)
+
+
+def _records(wish: Wish, read: Bundle, start: Start | None, constants: dict[str, float]) -> list[tuple[Path, Trace]]:
+    """The records to simulate, and the file to write of each: that of a file, or those of a data set."""
+    source, out = Path(str(wish.inputs)), wish.written
+    if not _is_record(source):
+        return _of_dataset(wish, source)
+    measured = wish.initial is None and (start is None or start.kind is not StartKind.REST)
+    with as_typed():
+        options = InputOptions(constants=constants, measured=measured, **reading_options(wish.reading))
+        inputs = read_inputs(read, source, options)
+    for done in inputs.provenance[1:]:  # the first is the file itself
+        console().print(done, soft_wrap=True, markup=False)
+    return [(out, inputs)]
+
+
+def _of_case(path: Path, case: str) -> Path:
+    """The file of one case among several."""
+    safe = re.sub(r"[^\w+-]+", "-", case)
+    return path.with_name(f"{path.stem}.{safe}{path.suffix}")
+
+
+def _of_dataset(wish: Wish, source: Path) -> list[tuple[Path, Trace]]:
+    """The records of a data set, which says itself how they are read."""
+    try:
+        found = find_dataset(source)
+    except ConfigError as error:
+        raise ConfigError(
+            error.what,
+            where=error.where,
+            expected=f"a file of samples, or a data set: {error.expected}",
+            got=error.got,
+            remedy=f"{error.remedy}; a file of samples is named with its ending, as inputs.csv",
+        ) from None
+    traces = load_dataset(found)
+    if wish.reading:
+        raise ConfigError(
+            "these options are for a file of samples",
+            where="sysid simulate",
+            expected="a data set alone: its description says how it is read",
+            got=", ".join(wish.reading),
+            remedy="leave them out, or name the file itself",
+        )
+    out = wish.written
+    if len(traces) == 1:
+        return [(out, traces.traces[0])]
+    return [(_of_case(out, trace.name), trace) for trace in traces]
 
 
 def parse_constants(words: Sequence[str]) -> dict[str, float]:

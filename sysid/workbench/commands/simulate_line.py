@@ -53,7 +53,7 @@ def simulate_line_command(wish: Wish, asked: str) -> None:
             remedy="give --command FILE alone",
         )
     check_picture(wish.plot)
-    out, stored, positions = wish.out, read_interpolation(wish.bundle), parse_positions(asked)
+    out, stored, positions = wish.written, read_interpolation(wish.bundle), parse_positions(asked)
     table = read_command(wish.command, stored.inputs, time_unit=wish.time_unit, unit=wish.unit)
     trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
     write_trace(replace(trace, name=out.stem), out)

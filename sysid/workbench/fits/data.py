@@ -110,8 +110,8 @@ def unmade_data(names: Iterable[str | None], *, beside: Path) -> Estimate | None
     Raises:
         ConfigError: If there is no such data set.
     """
-    from sysid.api.fitting import is_file_of_traces
     from sysid.ingest.dataset import unmade
+    from sysid.ingest.reading import is_file_of_traces
 
     found = []
     for name in dict.fromkeys(name for name in names if name is not None):
@@ -174,8 +174,9 @@ def load_named(name: str, beside: Path, *, progress: Callable[[str, int, int], N
     Returns:
         Its traces.
     """
-    from sysid.api.fitting import is_file_of_traces, load
+    from sysid.api.fitting import load
     from sysid.ingest import load_dataset
+    from sysid.ingest.reading import is_file_of_traces
 
     place, search = _place(name, beside)
     if (source := data_of_pipeline(Path(place))) is not None:
