@@ -11,7 +11,8 @@ import numpy as np
 from sysid.content import nearest_name
 from sysid.errors import ChannelError, ConfigError
 from sysid.export.bundle import Bundle, channel_of
-from sysid.ingest import FileOptions, GridOptions, RawTable, RepairOptions, Wanted, assemble, read_table
+from sysid.ingest import FileOptions, GridOptions, RawTable, RepairOptions, read_table
+from sysid.ingest.assemble import Wanted, assemble
 from sysid.traces import Channel, Trace
 
 

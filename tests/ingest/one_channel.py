@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from sysid.errors import UserError
-from sysid.ingest import FileOptions, GridOptions, RawColumn, RawTable, RepairOptions, Wanted, assemble
+from sysid.ingest import FileOptions, GridOptions, RawColumn, RawTable, RepairOptions
+from sysid.ingest.assemble import Wanted, assemble
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
 

@@ -105,7 +105,7 @@ def test_any_values_can_be_drawn(values: list[float]) -> None:
     for value, text in ticks:
         assert axis.low <= value <= axis.high
         assert axis.place(np.array(float(text))) == pytest.approx(axis.place(np.array(value)), abs=0.3)
-    assert read(record_picture(np.arange(float(len(values))), {"a": given_}, title="", description=""))
+    assert texts(read(record_picture(np.arange(float(len(values))), {"a": given_}, title="", description="")))
 
 
 @pytest.mark.parametrize(
