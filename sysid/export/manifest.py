@@ -162,7 +162,9 @@ def _metrics(metrics: Metrics | CascadeMetrics) -> dict[str, Any]:
             figures = case.to_dict()
             whole = {key: figures.get(key) for key in ("role", "n_samples", "run_time_s")}
             entry = found.setdefault(name, whole | {"outputs": {}})
-            entry["outputs"][output] = {key: figures[key] for key in ("free_run", "one_step", "begins_at")}
+            entry["outputs"][output] = {
+                key: figures[key] for key in ("free_run", "one_step", "begins_at") if key in figures
+            }
     return found
 
 

@@ -15,9 +15,10 @@ from sysid.export.bundle import OutsideRangeWarning, UnreadOutputWarning
 from sysid.export.inputs import read_inputs
 from sysid.export.measured_run import obstacle
 from sysid.ingest import write_trace
-from sysid.models import NARX, Cascade, Limit, VectorNARX
+from sysid.models import ARX, NARX, ARXModel, Cascade, Limit, Mapping, VectorNARX
 from sysid.traces import Channel, Trace
 from tests.export.cascades import build_cascade, build_circle, wired_narx, wired_transfer_function, wired_vector
+from tests.export.grey_boxes import build_grey
 
 SMALL = NARX(input_delays="0:1", output_delays=2, neurons=3)
 
@@ -32,6 +33,9 @@ SOURCES = {
         "STP -> V+W", VectorNARX(input_delays=1, output_delays=[[2], [1]], neurons=3), 4
     ),
     "side by side": beside,
+    "equations of two outputs": lambda: build_grey(
+        "dx/dt = (BP - x)/2\ndz/dt = x - z\nBC = x + 0.1*BP\nER = z", mapping="BP -> BC+ER"
+    ),
     "one behind the other": build_cascade,
     "two outputs behind another": lambda: Cascade(
         models=(
@@ -195,3 +199,26 @@ def test_a_frame_is_run_as_a_trace_is():
     frame.iloc[3, 1] = np.nan
     run = simulate_bundle(bundled(model), frame)
     np.testing.assert_allclose(run.trace["BP"][60:], record["BP"][60:], atol=1e-2)
+
+
+def test_a_model_without_inputs_begins_by_its_output(tmp_path):
+    model = ARXModel(
+        orders=ARX(na=1, nb=(), nk=()), coefficients=np.array([0.9]), intercept=0.0, mapping=Mapping.parse("-> y"),
+        sample_time=0.1, input_units=(), output_unit="psi", rest_output=0.0,
+    )  # fmt: skip
+    bundle = replace(
+        bundled(model),
+        metadata={
+            "inputs": [{"name": "tick", "unit": "1", "range": None}],
+            "outputs": [{"name": "y", "unit": "psi", "range": None}],
+        },
+    )
+    frame = pd.DataFrame({"y": 5.0 * 0.9 ** np.arange(40)})
+    frame.assign(**{"time [s]": 0.1 * np.arange(40), "y [psi]": frame["y"]}).drop(columns="y").to_csv(
+        tmp_path / "f.csv"
+    )
+    for record in (frame, read_inputs(bundle, tmp_path / "f.csv")):
+        run = simulate_bundle(bundle, record)
+        assert run.scored["y"].nrmse_fit == pytest.approx(100.0, abs=1e-6)
+    assert np.array_equal(bundle.simulate(frame, start="estimated")["y"], run.trace["y"])
+    np.testing.assert_allclose(bundle.simulate(3, initial=(np.zeros((2, 0)), [2.0, 1.0])), [0.9, 0.81, 0.729])
