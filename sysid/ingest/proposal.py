@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from sysid.errors import ReaderError
@@ -16,12 +17,14 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_/.^-]*(?: [A-Za-z0-9_/.^-]+)*")
 _WORDS = {"true", "false", "null"}
 
 
-def propose_dataset(finding: FileFinding, *, folder: Path | None = None) -> str:
+def propose_dataset(finding: FileFinding, *, folder: Path | None = None, split: Sequence[float] = ()) -> str:
     """Write the description of a data set that holds one inspected file.
 
     Args:
         finding: From :func:`~sysid.ingest.inspection.inspect_file`.
         folder: Where it will be saved; ``None`` is beside the file.
+        split: Shares of estimation, selection and validation: of the rows of one record, or of several records in their
+            order; none leaves all for estimation.
 
     Returns:
         YAML to be saved as ``dataset.yaml``.
@@ -53,7 +56,7 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None) -> str:
         *_grid(finding),
         *_repairs(finding),
         "cases:",
-        *_cases(finding, _seen_from(finding.path, folder)),
+        *(_shared if split else _cases)(finding, _seen_from(finding.path, folder), *([split] if split else [])),
         'provenance: ""',
         'licence: ""',
     ]
@@ -95,6 +98,21 @@ def _cases(finding: FileFinding, file: str) -> list[str]:
         told = "role guessed; " if case.role_guessed else ""
         lines.append(f"  {_text(case.name)}: {_mapping(pairs)}  # {told}{case.finding.samples} samples")
     return lines
+
+
+def _shared(finding: FileFinding, file: str, split: Sequence[float]) -> list[str]:
+    """Cases by shares: parts of one record by their rows, or whole records."""
+    from sysid.ingest.split import spans_of
+
+    if finding.cases:
+        roles = [role.value for role, start, stop in spans_of(split, len(finding.cases)) for _ in range(start, stop)]
+        cases = [replace(case, role=role, role_guessed=False) for case, role in zip(finding.cases, roles, strict=True)]
+        return _cases(replace(finding, cases=tuple(cases)), file)
+    spans = [(role.value, start + 1, stop) for role, start, stop in spans_of(split, finding.samples)]
+    return [
+        f"  {role}: {_mapping({'role': role, 'file': file, 'rows': [first, last]})}  # {last - first + 1} samples"
+        for role, first, last in spans
+    ]
 
 
 def _files(finding: FileFinding) -> list[str]:

@@ -56,11 +56,11 @@ def split_traces(
     elif isinstance(split, Mapping):
         parts = [part for trace in traces for part in _by_time(trace, split)]
     elif isinstance(split, float | int):
-        parts = _by_share(traces, _shares([float(split), 1.0 - float(split)]))
+        parts = _by_share(traces, [float(split)])
     elif all(isinstance(entry, str) for entry in split):
         parts = _by_experiment(traces, [str(entry) for entry in split])
     else:
-        parts = _by_share(traces, _shares([_share(entry) for entry in split]))
+        parts = _by_share(traces, [_share(entry) for entry in split])
     named: list[Trace] = []
     roles: dict[str, Role] = {}
     for role, part in parts:
@@ -70,6 +70,36 @@ def split_traces(
         named.append(dataclasses.replace(part, name=label))
         roles[label] = role
     return TraceSet(name=name, traces=tuple(named), roles=roles)
+
+
+def spans_of(shares: Sequence[float], n: int) -> list[tuple[Role, int, int]]:
+    """What shares come to.
+
+    Args:
+        shares: One share, of estimation, or two or three that add up to 1.
+        n: How many samples, or experiments.
+
+    Returns:
+        For each role its first one, counted from 0, and the one after its last.
+
+    Raises:
+        ConfigError: If they are no shares, or one of them is empty.
+
+    Example:
+        >>> [(role.value, start, stop) for role, start, stop in spans_of([0.7], 10)]
+        [('estimation', 0, 7), ('validation', 7, 10)]
+    """
+    parts = _shares([*shares, 1.0 - shares[0]] if len(shares) == 1 else list(shares))
+    ends = [0, *np.rint(np.cumsum([share for _, share in parts]) * n).astype(int).tolist()]
+    if any(stop <= start for start, stop in pairwise(ends)):
+        raise ConfigError(
+            "a share of the split is empty",
+            where="split",
+            expected=f"at least one of {n} for each role",
+            got=", ".join(f"{role.value} {share:g}" for role, share in parts),
+            remedy="give other shares, or a role for each experiment",
+        )
+    return [(role, start, stop) for (role, _), (start, stop) in zip(parts, pairwise(ends), strict=True)]
 
 
 def _share(entry: Any) -> float:
@@ -89,22 +119,13 @@ def _shares(shares: list[float]) -> list[tuple[Role, float]]:
     return list(zip(SHARES[len(shares)], shares, strict=True))
 
 
-def _by_share(traces: tuple[Trace, ...], shares: list[tuple[Role, float]]) -> list[tuple[Role, Trace]]:
+def _by_share(traces: tuple[Trace, ...], shares: list[float]) -> list[tuple[Role, Trace]]:
     """One record is cut along time; of several, whole experiments go to each role in their order."""
-    n = len(traces[0]) if len(traces) == 1 else len(traces)
-    ends = [0, *np.rint(np.cumsum([share for _, share in shares]) * n).astype(int).tolist()]
-    if any(stop <= start for start, stop in pairwise(ends)):
-        raise ConfigError(
-            "a share of the split is empty",
-            where="split",
-            expected=f"at least one of {n} {'samples' if len(traces) == 1 else 'experiments'} for each role",
-            got=", ".join(f"{role.value} {share:g}" for role, share in shares),
-            remedy="give other shares, or a role for each experiment",
-        )
-    spans = [(role, start, stop) for (role, _), (start, stop) in zip(shares, pairwise(ends), strict=True)]
     if len(traces) == 1:
-        return [(role, _cut(traces[0], start, stop, role.value)) for role, start, stop in spans]
-    return [(role, trace) for role, start, stop in spans for trace in traces[start:stop]]
+        return [
+            (role, _cut(traces[0], start, stop, role.value)) for role, start, stop in spans_of(shares, len(traces[0]))
+        ]
+    return [(role, trace) for role, start, stop in spans_of(shares, len(traces)) for trace in traces[start:stop]]
 
 
 def _by_experiment(traces: tuple[Trace, ...], words: list[str]) -> list[tuple[Role, Trace]]:

@@ -191,3 +191,20 @@ def test_a_guess_is_told_in_words_and_where_to_say_otherwise(write: Write) -> No
     text = "time [s],y [Pa]\n" + rows(20, lambda i: f"{i},{'#N/A' if i == 7 else i * i}")
     told = inspect_file(write("sheet.csv", text)).problems
     assert "'#N/A' is taken for a missing value, which is a guess: source.files.missing in dataset.yaml says it" in told
+
+
+@pytest.mark.parametrize(
+    ("split", "roles"),
+    [
+        ([0.7], {"estimation": 14, "validation": 6}),
+        ([0.5, 0.25, 0.25], {"estimation": 10, "selection": 5, "validation": 5}),
+    ],
+)
+def test_a_record_is_proposed_in_parts(tmp_path: Path, split: list[float], roles: dict[str, int]) -> None:
+    (tmp_path / "log.csv").write_text("t [s],u [V]\n" + "".join(f"{k},{k % 7}\n" for k in range(20)))
+    text = propose_dataset(inspect_file(tmp_path / "log.csv"), split=split)
+    (tmp_path / "dataset.yaml").write_text(text.replace("source:", "source:\n  grid: {fewest_samples: 2}"))
+    loaded = load_dataset(tmp_path / "dataset.yaml")
+    assert {trace.name: len(trace) for trace in loaded} == roles
+    assert {name: role.value for name, role in loaded.roles.items()} == {name: name for name in roles}
+    assert np.concatenate([trace["u"] for trace in loaded]).tolist() == [k % 7 for k in range(20)]

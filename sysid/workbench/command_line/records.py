@@ -18,8 +18,13 @@ commands = typer.Typer()
 def ingest(
     ctx: typer.Context,
     source: Annotated[str, typer.Argument(help="A file with traces, or the name of a data set.")],
+    *,
     propose: Annotated[
         Path | None, typer.Option(help="Write the proposed dataset.yaml here, to be checked by you.")
+    ] = None,
+    split: Annotated[
+        str | None,
+        typer.Option(help="With --propose: shares of estimation, selection and validation, as 0.7 or 0.6,0.2,0.2."),
     ] = None,
     annotate: Annotated[
         str | None, typer.Option(help="Name of an annotator that says in which state each sample is.")
@@ -34,7 +39,7 @@ def ingest(
         return
     from sysid.workbench.commands.ingest import ingest_command
 
-    ingest_command(source, propose=propose, given=ctx.meta[META])
+    ingest_command(source, propose=propose, given=ctx.meta[META], split=split)
 
 
 @commands.command(epilog='Example: sysid orders dryer --mapping "heater -> temperature"')

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,21 +27,29 @@ _PATHS = {".yaml", ".yml", *(suffix for reader in READERS for suffix in reader.s
 """Endings of what can be shown: a word that ends so is a path."""
 
 
-def ingest_command(source: str, *, propose: Path | None, given: Mapping[str, Any] | None = None) -> None:
+def ingest_command(
+    source: str, *, propose: Path | None, given: Mapping[str, Any] | None = None, split: str | None = None
+) -> None:
     """Show what a file or a data set holds.
 
     Args:
         source: A file with traces, a data set's name, or its ``dataset.yaml``.
         propose: Where to write the proposed ``dataset.yaml``.
         given: Options of the readers, as plain data.
+        split: Shares of the proposed cases, as ``0.7`` or ``0.6,0.2,0.2``.
 
     Raises:
         UserError: If it cannot be read.
     """
     path = Path(source)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:
-        _show_file(inspect_file(path, files=files_from(given or {})), propose)
+        _show_file(inspect_file(path, files=files_from(given or {})), propose, _shares(split))
         return
+    if split is not None:
+        raise ConfigError(
+            "only a file is split", where="option --split", expected="a file with traces", got=source,
+            remedy="name the file; a data set has the roles of its cases in its dataset.yaml",
+        )  # fmt: skip
     if given:
         raise ConfigError(
             "only a file is read with options of the command line",
@@ -81,8 +89,18 @@ def _no_such(path: Path) -> ConfigError:
     )
 
 
-def _show_file(found: FileFinding, propose: Path | None) -> None:
-    proposal = propose_dataset(found, folder=None if propose is None else propose.parent)
+def _shares(text: str | None) -> list[float]:
+    try:
+        return [] if text is None else [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ConfigError(
+            "not a split into shares", where="option --split", expected="one share, or two or three that add up to 1",
+            got=text, remedy="write for example --split 0.7, or --split 0.6,0.2,0.2",
+        ) from None  # fmt: skip
+
+
+def _show_file(found: FileFinding, propose: Path | None, split: Sequence[float] = ()) -> None:
+    proposal = propose_dataset(found, folder=None if propose is None else propose.parent, split=split)
     if propose is not None and propose.exists():
         raise ConfigError(
             "the file for the proposal is there already",
