@@ -205,7 +205,7 @@ COMMANDS = [
     Bad(id="a report of a file", command="report mine.txt", files={"mine.txt": "mine"}, says=("mine.txt", "remedy")),
     Bad(id="a workspace over another", command="init .", files={"README.md": "mine"}, says=("README.md", "nothing was changed")),
     Bad(id="a workspace in a file", command="init mine.txt", files={"mine.txt": "mine"}, says=("mine.txt", "remedy")),
-    Bad(id="an export of a fit that is not in the pipeline", command="export first --fit none", says=("one of ARX, open loop, closed loop",)),
+    Bad(id="an export of a fit that is not in the pipeline", command="export first --fit none", says=("one of ARX; open loop; closed loop",)),
     Bad(id="an export before the run", command="export first --fit ARX --run-folder elsewhere", says=("elsewhere", "sysid run first")),
     Bad(id="an export over a folder of one's own", command="export first --fit ARX --out pipelines", says=("pipelines", "remedy")),
     Bad(id="a promotion of no model", command="promote nothing", tracked=True, says=("nothing", "remedy")),

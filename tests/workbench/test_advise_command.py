@@ -26,7 +26,7 @@ def test_a_file_is_looked_at_and_drawn(record: str, capsys: pytest.CaptureFixtur
     assert run_cli(["advise", record]) == 0
     told = capsys.readouterr().out
     assert "rig: u -> y, one sample every 0.1 s" in told
-    assert "[fine] u acts after 1 samples" in told
+    assert "[fine] u acts after 1 sample" in told
     assert "What to try?" in told
     assert Path("rig.advice.svg").is_file()
 
