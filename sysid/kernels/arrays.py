@@ -26,6 +26,22 @@ def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
     return view
 
 
+GONE = 1e-150
+"""Size below which a sensitivity is nothing: its square is the smallest that a processor takes in its stride."""
+
+
+def forget_what_has_died_away(sensitivities: NDArray[np.float64]) -> None:
+    """Set to zero what has all but gone, in place.
+
+    What the first state of a record does dies away, but not to zero: rounded numbers near 1e-320 stay where they are,
+    and processors take a hundred cycles for each. A pass over 100,000 samples was measured six times as long with them.
+
+    Args:
+        sensitivities: Of any shape.
+    """
+    sensitivities[np.abs(sensitivities) < GONE] = 0.0
+
+
 @njit(cache=True, nogil=True)
 def copy_numbers(source, target):
     """Write all numbers of an array over the first of another, both of shape ``(n,)``."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.kernels.arrays import forget_what_has_died_away
 from sysid.models.equation_form import EquationForm
 
 Array = NDArray[np.float64]
@@ -282,6 +283,7 @@ class EquationProvider(AbstractProvider):
         for first in range(0, len(record.output), BLOCK):
             rows = slice(first, min(first + BLOCK, len(record.output)))
             y, J = form.moved(record.u[rows], x, S, p)
+            forget_what_has_died_away(S)
             J *= scale
             J /= self.unit[:, None]
             if record.roots is not None:

@@ -22,6 +22,7 @@ from scipy import linalg
 
 from sysid.estimation.linear.predictor import MirroredPredictor
 from sysid.kernels import linear as kernel
+from sysid.kernels.arrays import GONE, forget_what_has_died_away
 from sysid.models.orthonormal_basis import BasisSection, Domain, basis_of, responses
 from sysid.models.realisation import Realisation, realise
 
@@ -228,9 +229,22 @@ def _beginnings(bases: Bases, domain: Domain, sample_time: float, n_rows: int) -
 
 
 def _made_beginnings(bases: Bases, domain: Domain, sample_time: float, n_rows: int) -> NDArray[np.float64]:
-    pulse = _pulse(domain, n_rows)
-    each = [_pass(basis, domain, sample_time, pulse, 0.0)[-n_rows:] for basis in full(bases, domain)]
-    return np.concatenate(each, axis=1)
+    """No longer than they last: what has died away is nothing, and takes longest to be followed."""
+    m = min(n_rows, _FIRST)
+    while True:
+        pulse = _pulse(domain, m)
+        made = np.concatenate(
+            [_pass(basis, domain, sample_time, pulse, 0.0)[-m:] for basis in full(bases, domain)], axis=1
+        )
+        if m == n_rows or not np.abs(made[-_FIRST // 2 :]).max() >= GONE:
+            break
+        m = min(4 * m, n_rows)
+    forget_what_has_died_away(made)
+    return np.concatenate([made, np.zeros((n_rows - m, made.shape[1]))]) if m < n_rows else made
+
+
+_FIRST = 4096
+"""Rows over which a response is looked at first, for whether it lasts longer."""
 
 
 _KEPT = 20_000

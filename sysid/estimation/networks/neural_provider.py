@@ -14,6 +14,7 @@ from sysid.estimation.least_squares.provider import AbstractProvider, Linearisat
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.networks.provider import BLOCK
 from sysid.kernels import neural_state_space as kernel
+from sysid.kernels.arrays import forget_what_has_died_away
 from sysid.models import NeuralForm
 
 
@@ -331,6 +332,7 @@ class NeuralProvider(AbstractProvider):
             kernel.sensitivities(
                 record.u[first : first + rows], x, S, *self.template.arguments(theta), y[:rows], raw[:rows]
             )
+            forget_what_has_died_away(S)
             yield slice(first, first + rows), y[:rows], raw[:rows]
 
     def _blocks(

@@ -13,6 +13,7 @@ from sysid.estimation.networks import neural_start
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
 from sysid.estimation.networks.neural_state_space import STARTS
+from sysid.estimation.networks.provider import BLOCK
 from sysid.models import (
     History,
     Mapping,
@@ -363,3 +364,22 @@ def test_a_fit_goes_on_from_an_initial_one_of_its_structure_in_that_ones_scaled_
     assert rmse(again, near[0], rest) < 0.95 * rmse(afresh, near[0], rest)
     wider = fit_neural_state_space(far, MAPPING, network, few, rest_output=0.0, initial=first)
     assert wider.model.recursion.scaling == first.model.recursion.scaling
+
+
+def test_what_a_first_state_does_is_gone_once_it_has_died_away():
+    """It stands still near 1e-320 otherwise, where a processor takes a hundred cycles for a number."""
+    sizes, n = NeuralStateSpace(states=1, neurons=0).sizes(1), 9 * BLOCK
+    u = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, n // 32), 32)
+    trace = a_trace("long", u, 0.5 * u)
+    form = NeuralForm(
+        sizes=sizes, theta=np.zeros(sizes.count), scaling=Scaling.to_unit_range([trace.columns(["u"])], [trace["y"]])
+    )
+    starts = experiments_of([trace], MAPPING, Start(kind=StartKind.ESTIMATED), 0.0)
+    provider = NeuralProvider(template=form, experiments=starts)
+    theta = np.zeros(sizes.count + sizes.states)
+    theta[[0, 1, 3]] = 0.9, 0.1, 1.0  # a pole, and what goes in and out
+    theta[-1] = 1.0
+    moves = provider.jacobian(theta)[:, -1]
+    assert moves[0] == pytest.approx(1.0)
+    assert moves[BLOCK] == pytest.approx(0.9**BLOCK)
+    assert np.abs(moves[8 * BLOCK :]).max() == 0.0
