@@ -55,6 +55,7 @@ def step_core(
     moves: bool = True,
     laid: str = "",
     moved: str = "",
+    before: int = 0,
     ring: tuple[str, str] | None = None,
 ) -> Step:
     """Add the nodes of one step.
@@ -67,12 +68,13 @@ def step_core(
         moves: Whether lines are moved on; else the memory that is given has the newest number of each alone.
         laid: What is laid before the first group, if it is known.
         moved: The lines moved on by a row, with any numbers for the newest ones, if they are known.
+        before: How many other rows lie before the memory, and before the lines that are moved.
         ring: Where in the memory the past is read and the newest numbers are written, where lines are not moved.
 
     Returns:
         The names.
     """
-    pasts = _pasts(nodes, form, memory, ring, first=1 if laid else 0)
+    pasts = _pasts(nodes, form, memory, ring, first=1 if laid else 0, before=before)
     made: list[_Made] = []
     for g, group in enumerate(form.groups):
         part = nodes.within(f"{nodes.prefix}group{g}_")
@@ -91,7 +93,7 @@ def step_core(
         make = _equations if group.computes else _group
         made.append(make(part, form, group, pieces, memory))
     raw = join(nodes, [one.raw for one in made], "raw")
-    following = _memory(nodes, form, memory, made, moves=moves, moved=moved, ring=ring)
+    following = _memory(nodes, form, memory, made, moves=moves, moved=moved, before=before, ring=ring)
     if raw == following and moves:  # a loop mixes up what is two of its outputs
         raw = nodes.add("Identity", [raw], "raw_rows")
     return Step(raw=raw, memory=following)
@@ -108,7 +110,7 @@ def past_rows(form: WideForm) -> dict[int, list[int]]:
 
 
 def _pasts(
-    nodes: Nodes, form: WideForm, memory: str, ring: tuple[str, str] | None, *, first: int = 0
+    nodes: Nodes, form: WideForm, memory: str, ring: tuple[str, str] | None, *, first: int, before: int
 ) -> dict[int, str]:
     """What each group from the first on reads of the memory: all of it in one gather, then cut."""
     rows = {g: own for g, own in past_rows(form).items() if g >= first}
@@ -118,7 +120,7 @@ def _pasts(
     if ring:
         gathered = nodes.add("Gather", [memory, ring[0]], "past", axis=0)
     else:
-        gathered = nodes.rows(memory, whole, len(form.memory), "past")
+        gathered = nodes.rows(memory, [before + row for row in whole], before + len(form.memory), "past")
     names = nodes.cut(gathered, {f"past{g}": len(own) for g, own in rows.items()})
     return dict(zip(rows, names, strict=True))
 
@@ -233,8 +235,9 @@ def _held(nodes: Nodes, form: WideForm, group: Group, total: str, parts: dict[st
     if not parts.keys() & {"upper", "lower"}:
         return _own_limits(nodes, group, within(nodes, total, low, high), parts, exact=False), total
     value = total
-    if "upper" in parts and not all(_never_below(form, block, row) for block, row in group.rows):
-        value = nodes.add("Max", [value, nodes.column("low_first", low)], "held_first")
+    if "upper" in parts and not all(known := [_never_below(form, block, row) for block, row in group.rows]):
+        value = nodes.add("Max", [value, nodes.column("low_first", np.where(known, -np.inf, low))], "held_first")
+        low = np.where(known, low, -np.inf)  # where a channel comes below a number, it wins
     for operator, name, numbers in (("Min", "upper", high), ("Max", "lower", low)):
         sides = [nodes.column(f"{name}_numbers", numbers)] if np.isfinite(numbers).any() else []
         sides += [parts[name]] if name in parts else []
@@ -329,6 +332,7 @@ def _memory(
     *,
     moves: bool,
     moved: str,
+    before: int,
     ring: tuple[str, str] | None,
 ) -> str:
     """What the next step begins with: lines moved on by a sample, states, and what rounding took."""
@@ -352,7 +356,7 @@ def _memory(
         return nodes.add("Identity", [memory], "memory_after")
     following = join(nodes, pieces, "memory_moved")
     if scatter:
-        places = nodes.integers(np.array(scatter)[:, np.newaxis])
+        places = nodes.integers(before + np.array(scatter)[:, np.newaxis])
         following = nodes.add("ScatterND", [following, places, newest], "memory_after")
     return following
 

@@ -14,8 +14,9 @@ from onnx import helper
 
 from sysid.export.onnx_blocks import in_blocks
 from sysid.export.onnx_core import Step, join, past_rows, step_core
+from sysid.export.onnx_flags import flags_of
 from sysid.export.onnx_nodes import TO_END, Nodes
-from sysid.export.onnx_outputs import flags_of, in_units, known_inputs, reader, scaled_inputs, state_after
+from sysid.export.onnx_outputs import in_units, known_inputs, reader, scaled_inputs, state_after
 from sysid.export.onnx_step import whole_or_exact
 from sysid.export.surrogate import Surrogate
 from sysid.export.wide_form import WideForm
@@ -49,14 +50,21 @@ def sequence_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         begun = memory
         if plan.memory != form.memory:
             begun = part.add("Gather", [state, part.integers(plan.memory)], "memory_before", axis=0)
-        return (_loop_in_a_ring if _turns(plan) else _loop)(part, plan, x, begun)
+        made = (_loop_in_a_ring if _turns(plan) else _loop)(part, plan, x, begun)
+        order = [plan.places[column] for column in form.memory]
+        return Step(raw=made.raw, memory=part.rows(made.memory, order, len(order), "memory_in_order"))
 
     made = whole_or_exact(nodes, form, u, core)
     units = in_units(nodes, form, made.raw, u)
     nodes.add("Transpose", [units.outputs], "y", perm=[1, 2, 0])
     tails = [_tail(nodes, form, history, rows, depth)] if depth else []
     nodes.add("Transpose", [state_after(nodes, form, made.memory, tails)], "state_out", perm=[1, 0])
-    nodes.add("Transpose", [flags_of(nodes, surrogate, (given, nothing), units)], "flags", perm=[1, 2, 0])
+    nodes.add(
+        "Transpose",
+        [flags_of(nodes, surrogate, (given, nothing), units.watched, units.reached)],
+        "flags",
+        perm=[1, 2, 0],
+    )
     return in_blocks(surrogate, nodes)
 
 

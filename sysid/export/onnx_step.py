@@ -10,8 +10,9 @@ from numpy.typing import DTypeLike
 from onnx import helper
 
 from sysid.export.onnx_core import Step, step_core
+from sysid.export.onnx_flags import flags_of
 from sysid.export.onnx_nodes import Nodes
-from sysid.export.onnx_outputs import ends, flags_of, in_units, known_inputs, reader, scaled_inputs, state_after
+from sysid.export.onnx_outputs import ends, in_units, known_inputs, reader, scaled_inputs, state_after
 from sysid.export.surrogate import Surrogate
 from sysid.export.wide_form import WideForm, readings_of
 
@@ -37,13 +38,20 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
     u, nothing = known_inputs(nodes, given)
     scaled, rows = scaled_inputs(nodes, form, u, (given, nothing))
     x = _terms(nodes, form, scaled, rows, state) if form.inputs else u
-    moves = not form.exact or surrogate.state_length(dtype) > GATHERED
+    size = surrogate.state_length(dtype)
+    moves = not form.exact or size > GATHERED
+    together = _together(nodes, form, scaled, state) if moves else ""
 
     def core(part: Nodes, plan: WideForm) -> Step:
         # Each form takes its own: the runtime warns of a slice that a branch reads too.
-        memory = part.rows(state, form.memory, surrogate.state_length(dtype), "memory")
-        laid = _laid(part, plan, scaled, rows, state)
-        return step_core(part, plan, x, memory, moves=moves, laid=laid, moved=_moved(part, plan, state))
+        laid = _laid(part, plan, (scaled, rows), state, together)
+        if together and plan.memory == form.memory:
+            moved = part.add("Slice", [together, *(part.integers([at]) for at in (0, size, 0))], "state_moved")
+            return step_core(part, plan, x, state, laid=laid, moved=moved, before=form.memory[0])
+        memory = part.rows(state, plan.memory, size, "memory")
+        made = step_core(part, plan, x, memory, moves=moves, laid=laid, moved=_moved(part, plan, state))
+        tails = _tails(part, plan, scaled, rows, state, moves=moves)
+        return Step(raw=made.raw, memory=state_after(part, plan, made.memory, tails, moved=moves))
 
     made = whole_or_exact(nodes, form, u, core)
     units = in_units(nodes, form, made.raw, u)
@@ -53,14 +61,30 @@ def step_graph(surrogate: Surrogate, dtype: DTypeLike) -> Any:
         nodes.add("Gemm", shares, "y", transA=1)
     else:
         nodes.add("Transpose", [units.outputs], "y", perm=[1, 0])
-    after = state_after(nodes, form, made.memory, _tails(nodes, form, scaled, rows, state, moves=moves), moved=moves)
-    nodes.add("Transpose", [after], "state_out", perm=[1, 0])
-    flags_of(nodes, surrogate, (given, nothing), units)
+    nodes.add("Transpose", [made.memory], "state_out", perm=[1, 0])
+    flags_of(nodes, surrogate, (given, nothing), units.watched, units.reached)
     return nodes.graph("step", *ends(nodes, surrogate, ["batch"]))
 
 
-def _laid(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state: str) -> str:
+def _together(nodes: Nodes, form: WideForm, scaled: str, state: str) -> str:
+    """An input before the state, where that is the line of this input and then all others: a row on, it is moved.
+
+    ``""`` where the state is not that plain.
+    """
+    if len(form.input_lines) != 1 or len(form.lines) < 2:
+        return ""
+    (line,), size = form.input_lines, form.surrogate.state_length(nodes.dtype)
+    shifted = sum(one.length for one in form.lines)
+    if (line.first, line.length + shifted) != (0, size) or form.memory != (*range(line.length, size),):
+        return ""
+    if len({reader(one) for one in (*form.inputs, *form.input_lines)}) != 1:
+        return ""
+    return nodes.add("Concat", [scaled, state], "u_before_state", axis=0)
+
+
+def _laid(nodes: Nodes, form: WideForm, inputs: tuple[str, dict[Any, int]], state: str, together: str) -> str:
     """What is laid before the first group, in one gather; ``""`` where others read inputs, or it is not that plain."""
+    scaled, rows = inputs
     group, *more = form.groups
     if (
         any(readings_of(form, other)[1] for other in more)
@@ -74,6 +98,8 @@ def _laid(nodes: Nodes, form: WideForm, scaled: str, rows: dict[Any, int], state
     size = form.surrogate.state_length(nodes.dtype)
     if all(one.lag for one in form.inputs):
         return nodes.rows(state, [column for _, column in past + given], size, "laid")
+    if together:
+        return nodes.rows(together, [of + column for of, column in past + given], 1 + size, "laid")
     return nodes.rows_of([(scaled, len(rows)), (state, size)], past + given, "laid")
 
 
@@ -132,7 +158,7 @@ def whole_or_exact(nodes: Nodes, form: WideForm, u: str, core: Callable[[Nodes, 
         nodes: The graph.
         form: The wide form.
         u: The inputs in units.
-        core: Adds what computes a form, and says what it gives.
+        core: Adds what computes a form, and says what it gives; memory in the order of the wide one.
 
     Returns:
         What is given.
@@ -140,7 +166,7 @@ def whole_or_exact(nodes: Nodes, form: WideForm, u: str, core: Callable[[Nodes, 
     made = core(nodes, form)
     if form.exact:
         return made
-    total = nodes.add("ReduceSum", [made.raw], "sum_of_raw", keepdims=0)
+    total = nodes.add("ReduceL1", [made.raw], "size_of_raw", keepdims=0)
     if any(
         side.column is not None and side.column < len(form.surrogate.inputs)
         for stage in form.surrogate.stages
@@ -148,12 +174,12 @@ def whole_or_exact(nodes: Nodes, form: WideForm, u: str, core: Callable[[Nodes, 
         for side in sides
     ):
         # A limit holds a row behind what is looked at.
-        total = nodes.add("Add", [total, nodes.add("ReduceSum", [u], "sum_of_u", keepdims=0)], "sum_of_all")
-    lost = nodes.add("IsNaN", [nodes.add("Mul", [total, nodes.numbers("zero", 0.0)], "nothing")], "not_numbers")
+        total = nodes.add("Add", [total, nodes.add("ReduceL1", [u], "size_of_u", keepdims=0)], "size_of_all")
+    finite = nodes.add("Less", [total, nodes.numbers("infinite", np.inf)], "all_numbers")
     exact = WideForm.of(form.surrogate, nodes.dtype, exact=True)
     branches = []
     part = Nodes(nodes.dtype, f"{nodes.prefix}exact_", nodes.trailing)
-    branches.append((part, reordered(part, core(part, exact), exact, form)))
+    branches.append((part, _reordered(part, core(part, exact), exact, form)))
     part = Nodes(nodes.dtype, f"{nodes.prefix}wide_", nodes.trailing)
     branches.append((part, [part.add("Identity", [name], f"{name}_kept") for name in (made.raw, made.memory)]))
     graphs = [
@@ -163,13 +189,13 @@ def whole_or_exact(nodes: Nodes, form: WideForm, u: str, core: Callable[[Nodes, 
     raw, memory = (f"{nodes.prefix}{name}_made" for name in ("raw", "memory"))
     nodes.nodes.append(
         helper.make_node(
-            "If", [lost], [raw, memory], name=f"{nodes.prefix}exactly", then_branch=graphs[0], else_branch=graphs[1]
+            "If", [finite], [raw, memory], name=f"{nodes.prefix}wide", then_branch=graphs[1], else_branch=graphs[0]
         )
     )
     return Step(raw=raw, memory=memory)
 
 
-def reordered(nodes: Nodes, made: Step, exact: WideForm, form: WideForm) -> list[str]:
+def _reordered(nodes: Nodes, made: Step, exact: WideForm, form: WideForm) -> list[str]:
     """What the exact form gives, with rows in the order of the wide one."""
     counts = [np.cumsum([0, *(len(group.rows) for group in one.groups)]) for one in (exact, form)]
     order = [0] * int(counts[1][-1])
@@ -181,8 +207,7 @@ def reordered(nodes: Nodes, made: Step, exact: WideForm, form: WideForm) -> list
         for at, (block, row) in enumerate(group.rows):
             order[int(start) + at] = places[block.stage.first, row, block.stage.targets]
     raw = nodes.add("Gather", [made.raw, nodes.integers(order)], "raw_in_order", axis=0)
-    rows = [exact.places[column] for column in form.memory]
-    memory = nodes.rows(made.memory, rows, len(rows), "memory_in_order")
-    if memory == made.memory and not memory.startswith(nodes.prefix):
+    memory = made.memory
+    if not memory.startswith(nodes.prefix):
         memory = nodes.add("Identity", [memory], "memory_kept")
     return [raw, memory]

@@ -10,7 +10,7 @@ import numpy as np
 import onnx
 import pytest
 
-from sysid.export import Kind, Surrogate
+from sysid.export import Kind, Surrogate, expected_flags
 from sysid.export.onnx_core import PRODUCT
 from sysid.export.onnx_exporter import OnnxExporter
 from sysid.models import ARX, NARX, ARXModel, Cascade, Limit, Mapping, VectorNARX
@@ -122,7 +122,7 @@ def test_a_step_moves_its_lines_by_one_slice_and_lays_its_first_readings_by_one_
     surrogate, exporter = Surrogate.of(Cascade(models=models, limits=held)), OnnxExporter()
     file, proto = written(exporter, surrogate, tmp_path)[Kind.STEP]
     made = {node.output[0]: node for node in proto.graph.node}
-    assert len(made["lines_moved"].input) == 4
+    assert (made["state_moved"].op_type, list(made["state_out"].input)) == ("Slice", ["memory_made"])
     assert made["laid"].op_type == "Gather"
     assert not {"older", "newest_first", "group0_readings", "told_at_limit"} & made.keys()
     u = np.random.default_rng(0).uniform(0.0, 90.0, (100, 1))
@@ -198,3 +198,17 @@ def test_float32_as_the_model_stands_would_not(inputs):
     u = inputs(8000, 2).astype(np.float32).astype(np.float64)
     rounded = replace(model, coefficients=model.coefficients.astype(np.float32).astype(np.float64))
     assert np.abs(rounded.simulate(u) - model.simulate(u)).max() > 1e-3
+
+
+@pytest.mark.parametrize("name", ["ONNX, step", "ONNX, sequence"])
+def test_a_channel_that_comes_below_the_models_own_bound_wins(name, rows, opened, tmp_path):
+    models = (wired_narx("STP -> BP", NARX(input_delays=[[0]], output_delays=1, neurons=3), 1),)
+    models += (wired_narx("BP -> BC", NARX(input_delays=[[0]], output_delays=1, neurons=3), 3, clamp=0.05),)
+    surrogate = Surrogate.of(Cascade(models=models, limits={"BC": Limit(high="STP")}))
+    u = np.repeat(np.random.default_rng(0).uniform(20.0, 60.0, 20), 10)[:, np.newaxis]
+    expected, bound = surrogate.simulate(u), models[1].recursion.low * 38.0 + 40.0
+    assert (expected[:, 1] < bound).any()
+    assert (expected[:, 1] >= bound).any()
+    run = opened(rows[name], surrogate, tmp_path).run(u[:, np.newaxis], surrogate.at_rest(u[0])[np.newaxis])
+    np.testing.assert_allclose(run.output[:, 0], expected, rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(run.flags[:, 0], expected_flags(surrogate, u, surrogate.compute(u)))
