@@ -14,8 +14,8 @@ from sysid.export.onnx_core import join
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.surrogate import Surrogate
 
-INT32 = 6
-"""``TensorProto.INT32``."""
+FLOAT, INT32 = 1, 6
+"""``TensorProto.FLOAT`` and ``INT32``: sums of truths are exact in either, and half as long as in double."""
 
 Raised = Sequence[Flag | None]
 Cause = tuple[str, Raised]
@@ -110,16 +110,17 @@ def flags_of(
     causes = [*_compared(nodes, every), *reached]
     which = [flag for _, flags in causes for flag in flags]
     present = sorted({flag for flag in which if flag is not None})
-    numbers = nodes.add("Cast", [join(nodes, [name for name, _ in causes], "causes")], "marks", to=nodes.kind())
+    numbers = nodes.add("Cast", [join(nodes, [name for name, _ in causes], "causes")], "marks", to=FLOAT)
     if nodes.trailing > 1:
         numbers = nodes.add("Reshape", [numbers, nodes.integers([len(which), -1])], "marks_in_rows")
-    table = nodes.numbers("flag_of_cause", [[float(flag is one) for one in which] for flag in present])
+    single = nodes.counting()
+    table = single.numbers("flag_of_cause", [[float(flag is one) for one in which] for flag in present])
     raised = nodes.add("Sign", [nodes.add("MatMul", [table, numbers], "raised")], "raised_or_not")
     values = [[float(flag)] for flag in present]
     if nodes.trailing == 1:
-        total = nodes.add("Gemm", [raised, nodes.numbers("flag_values", values)], "flag_sum", transA=1)
+        total = nodes.add("Gemm", [raised, single.numbers("flag_values", values)], "flag_sum", transA=1)
         return nodes.add("Cast", [total], "flags", to=INT32)
-    total = nodes.add("MatMul", [nodes.numbers("flag_values", np.transpose(values)), raised], "flag_sum")
+    total = nodes.add("MatMul", [single.numbers("flag_values", np.transpose(values)), raised], "flag_sum")
     total = nodes.add("Cast", [total], "flag_row", to=INT32)
     shape = nodes.add(
         "Concat", [nodes.integers([1]), nodes.add("Shape", [nothing], "u_shape", start=1)], "flag_shape", axis=0

@@ -50,6 +50,12 @@ class Nodes:
         part.nodes, part.constants = self.nodes, self.constants
         return part
 
+    def counting(self) -> Nodes:
+        """The same graph, with numbers in float32: for sums of truths."""
+        part = self.within(self.prefix)
+        part.dtype = np.dtype(np.float32)
+        return part
+
     def numbers(self, name: str, values: ArrayLike) -> str:
         """Add a constant of the graph's number type."""
         return self._constant(name, np.asarray(values, dtype=self.dtype))
