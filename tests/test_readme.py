@@ -102,11 +102,12 @@ def skeleton(line: str) -> str:
     line = line.replace(f"{Path.cwd().resolve()}/", "")
     line = re.sub(r", and [^,│]* for its check(?= *│)", "", line)  # told where it takes a second, as beside other work
     line = HASH.sub("<hash>", TIME.sub("<time>", line))
-    return re.sub(r"[━─]+", "━", re.sub(r" +", " ", line)).strip()
+    return re.sub(r"[━─]+", "━", re.sub(r"[ \xa0]+", " ", line)).strip()
 
 
 def masked(text: str) -> str:
-    """A text without what hangs on the data: numbers, and which case is the worst."""
+    """A text without what hangs on the data: numbers, which case is the worst, and whether what was chosen is ahead."""
+    text = re.sub(r"(?<=on the selection traces: ).*", "<ahead>", text)
     return re.sub(r"\((EST|SEL|VAL)\)", "(case)", NUMBER.sub("<number>", text))
 
 

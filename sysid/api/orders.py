@@ -26,7 +26,7 @@ from sysid.models import ARX, Mapping, Start, StartLike
 from sysid.reporting.numbers import pole
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.metrics import percent
-from sysid.validation.order_finalists import Finalist, run_finalists
+from sysid.validation.order_finalists import Finalist, alike_with, run_finalists, smallest_first
 from sysid.validation.structure_search import ARX_KIND, MOST, Found, check_kinds, run_structures, score
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ class OrderSearch:
 
     Args:
         losses: All candidates.
-        finalists: The shortlist, best first: by the free run over the selection traces where there are some, by BIC
-            otherwise.
+        finalists: The shortlist, best first: by the free run over the selection traces where there are some, the
+            smallest of those that cannot be told from the best before all; by BIC otherwise.
         chosen_by: By what the shortlist is sorted, as a sentence.
         grid: What was searched.
         mapping: Inputs and output.
@@ -106,7 +106,7 @@ class OrderSearch:
         arx = [self.finalists[0], *([by_bic] if by_bic is not None else [])]
         found = list({one.fit.model.structure.label: one for one in [*arx, *self.others.finalists]}.values())
         if self.selects:
-            return tuple(sorted(found, key=lambda one: -one.mean_fit))
+            return smallest_first(sorted(found, key=lambda one: -one.mean_fit))
         return tuple(sorted(found, key=lambda one: self.score(one, Criterion.BIC)))
 
     @property
@@ -138,6 +138,7 @@ class OrderSearch:
         ]
         arx = "The best" if self.others is None else "The best ARX model"
         told = [CLOSED_LOOP] if grid.min_nk else []
+        told += self._tie
         told += [f"{arx} stands at the end of what was tried ({', '.join(at_end)}): allow more."] if at_end else []
         if self.others is not None:
             first = self.contenders[0].fit.model.structure.label
@@ -145,6 +146,21 @@ class OrderSearch:
             told += [f"{first} has the largest order that was tried of its kind: allow more (most)."] * at_largest
             told += self.others.notes
         return tuple(told)
+
+    @property
+    def _tie(self) -> list[str]:
+        """That the best free run is no better than smaller ones by more than chance, where that is so."""
+        if not self.selects:
+            return []
+        first, best = self.contenders[0], max(self.contenders, key=lambda one: one.mean_fit)
+        alike = alike_with(best, self.contenders)
+        if best is first or first not in alike:
+            return []
+        labels = [one.fit.model.structure.label for one in (first, best)]
+        return [
+            f"{labels[0]} is put first: the smallest of {len(alike)} whose free runs differ by no more than one "
+            f"standard error from the best, {labels[1]} ({percent(best.mean_fit)} %)."
+        ]
 
     def to_frame(self) -> pd.DataFrame:
         """The shortlist as a table, best first.
@@ -287,7 +303,7 @@ def search_orders(
     if "SS" in kinds:
         states = state_orders(estimation, chosen, most=most)
     if selection:
-        said = BY_SELECTION
+        found, said = smallest_first(found), BY_SELECTION
     else:
         found = tuple(sorted(found, key=lambda one: score(one, losses.n_samples, Criterion.BIC)))
         said = "sorted by BIC, for want of selection traces"

@@ -14,6 +14,7 @@ from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure
 from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.linear_view import linear_views
 from sysid.reporting.modes_table import modes_table
+from sysid.reporting.numbers import number
 from sysid.reporting.parameter_table import parameter_tables
 from sysid.reporting.parts import Part, Picture, Section, identifier, picture
 from sysid.reporting.residuals import GroupRecord, read_residuals
@@ -62,21 +63,26 @@ def _linear_enough(linearity: LinearityRecord) -> Section:
         rows = tuple(
             (
                 Cell(text=f"{row.output}, {row.amplitude}".lstrip(", "), header=True, below=", ".join(row.cases)),
-                Cell(text=row.linear),
+                Cell(text=row.linear, below=_better(row.better_linear, row.better_linear_fit)),
                 figure_cell(row.linear_fit),
-                Cell(text=row.network),
+                Cell(text=row.network, below=_better(row.better_network, row.better_network_fit)),
                 figure_cell(row.network_fit),
             )
             for row in linearity.rows
         )
         table = Table(
-            caption="Free-run fit of the best linear model and the best network by amplitude [%], unseen cases.",
+            caption="Free-run fit of the chosen linear model and the chosen network by amplitude [%], unseen cases.",
             head=(("amplitude", "cases"), ("linear model", ""), ("fit", "%"), ("network", ""), ("fit", "%")),
             rows=rows,
             note="Amplitude: how far the output moves, relative to the case where it moves furthest. 100 % is exact.",
         )
         parts.append(table)
     return Section(anchor="linearity", title="Is linear enough?", parts=tuple(parts))
+
+
+def _better(name: str, fit: float) -> str:
+    """That another one would have been better here, which these cases may tell and not choose."""
+    return f"{name} would be better here: {number(fit, digits=4)} %" if name else ""
 
 
 def _residuals(results: Results, residuals: dict[str, dict[str, GroupRecord]]) -> Section:

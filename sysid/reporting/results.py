@@ -250,15 +250,19 @@ class BestRecord(Record):
 
 
 class AmplitudeRecord(Record):
-    """The best linear model and the best network at one amplitude."""
+    """The chosen linear model and the chosen network at one amplitude."""
 
     amplitude: str = Field(description="minimum, intermediate or full: how far the output of its cases moves.")
     cases: list[str] = Field(description="Names of its cases.")
-    linear: str = Field(description="Name of the linear fit with the highest mean fit over these cases.")
-    linear_fit: Number = Field(description="That free-run fit in percent.")
-    network: str = Field(description="Name of the network with the highest mean fit over these cases.")
-    network_fit: Number = Field(description="That free-run fit in percent.")
+    linear: str = Field(description="Name of the linear fit that what chooses puts first.")
+    linear_fit: Number = Field(description="Its mean free-run fit over these cases in percent.")
+    network: str = Field(description="Name of the network that what chooses puts first.")
+    network_fit: Number = Field(description="Its mean free-run fit over these cases in percent.")
     output: str = Field(default="", description="Which output it is about, where there are several.")
+    better_linear: str = Field(default="", description="Another linear fit that is better here, where there is one.")
+    better_linear_fit: Number = Field(default=math.nan, description="Its free-run fit in percent.")
+    better_network: str = Field(default="", description="Another network that is better here, where there is one.")
+    better_network_fit: Number = Field(default=math.nan, description="Its free-run fit in percent.")
 
 
 class OrderRow(Record):

@@ -63,6 +63,9 @@ class Trial(Record):
     selection_rms_shares: list[Number] = Field(
         default=[], description="Of each selection trace the free run's rms error, as a share of the output's range."
     )
+    selection_errors: list[Number] = Field(
+        default=[], description="Mean squared errors of the free run by part of what chooses, over the outputs' sizes."
+    )
     cases: dict[str, TrialCase] = Field(default={})
 
     def within(self, tolerance: float) -> float:

@@ -16,6 +16,7 @@ from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.intervals import CaseIntervals, case_intervals
 from sysid.validation.metrics import Figures, figures, none
+from sysid.validation.resolution import parts_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,6 +38,7 @@ class CaseResult:
         by_state: By the name of a state: figures of the free run while it lasts, and its share of the samples that
             count; ``None`` where nobody said in which state a sample is.
         constants: Parameters that differ by case, as the run had them, by name; empty where none does.
+        errors: Mean squared errors of the free run by part of the case, in the output's unit squared.
     """
 
     case: str
@@ -52,6 +54,7 @@ class CaseResult:
     intervals: CaseIntervals | None = None
     by_state: Dict[str, tuple[Figures, float]] | None = None
     constants: Dict[str, float] = field(default_factory=dict)
+    errors: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Figures and run time as JSON values, without the signals."""
@@ -207,6 +210,7 @@ def case_results(
             predicted=ahead,
             intervals=interval,
             constants=dict(zip(model.recursion.constants, history.constants, strict=True)),
+            errors=parts_of((run - measured)[counted]),
         )
         for output, unit, measured, run, ahead, interval in zip(
             model.mapping.outputs, model.ends.output_units, *columns, intervals, strict=True

@@ -1,4 +1,4 @@
-"""Is linear enough? The best linear free run against the best network, by the amplitude of the case.
+"""Is linear enough? The chosen linear free run against the chosen network, by the amplitude of the case.
 
 A linear model answers twice the input with twice the output. A system that does not can still be fitted at one
 amplitude, so that a mean over cases hides what matters: the verdict is given amplitude by amplitude.
@@ -7,6 +7,7 @@ amplitude, so that a mean over cases hides what matters: the verdict is given am
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -41,9 +42,7 @@ class Answer(enum.Enum):
         f"A linear model may do: at every amplitude its fit is {ENOUGH:.0f} % or more, or its error is less than twice "
         "the network's."
     )
-    NETWORK = (
-        "Linear is not enough: at some amplitude the network's error is less than half that of every linear model."
-    )
+    NETWORK = "Linear is not enough: at some amplitude the network's error is less than half the linear model's."
     NEITHER = (
         "Neither is good at every amplitude, and the network is not clearly better: more or other data are needed."
     )
@@ -56,16 +55,20 @@ WORST_FIRST = (Answer.NETWORK, Answer.NEITHER, Answer.UNKNOWN, Answer.LINEAR)
 
 @dataclass(frozen=True, kw_only=True)
 class AmplitudeRow:
-    """The best of both kinds at one amplitude.
+    """Both kinds at one amplitude.
 
     Args:
         amplitude: Which.
         cases: Names of its cases.
-        linear: Name of the linear model with the highest mean fit over these cases.
-        linear_fit: That fit in percent.
-        network: Name of the network with the highest mean fit over these cases.
-        network_fit: That fit in percent.
+        linear: Name of the linear model.
+        linear_fit: Its mean fit over these cases in percent.
+        network: Name of the network.
+        network_fit: Its mean fit over these cases in percent.
         output: Which output it is about, where there are several.
+        better_linear: Name of another linear model with a higher mean fit here, which was not chosen.
+        better_linear_fit: That fit in percent.
+        better_network: Likewise of another network.
+        better_network_fit: That fit in percent.
     """
 
     amplitude: Amplitude
@@ -75,6 +78,10 @@ class AmplitudeRow:
     network: str
     network_fit: float
     output: str = ""
+    better_linear: str = ""
+    better_linear_fit: float = math.nan
+    better_network: str = ""
+    better_network_fit: float = math.nan
 
     @property
     def good(self) -> bool:
@@ -95,7 +102,12 @@ class AmplitudeRow:
             "linear_fit": self.linear_fit,
             "network": self.network,
             "network_fit": self.network_fit,
-        } | ({"output": self.output} if self.output else {})
+            **({"output": self.output} if self.output else {}),
+            **({"better_linear": self.better_linear} if self.better_linear else {}),
+            **({"better_linear_fit": self.better_linear_fit} if self.better_linear else {}),
+            **({"better_network": self.better_network} if self.better_network else {}),
+            **({"better_network_fit": self.better_network_fit} if self.better_network else {}),
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,15 +155,17 @@ class Linearity:
         return {"answer": self.answer.name, "text": self.text, "rows": [row.to_dict() for row in self.rows]}
 
 
-def judge_linearity(linear: Dict[str, Evaluation], networks: Dict[str, Evaluation]) -> Linearity:
-    """Compare the best linear free run with the best network, amplitude by amplitude.
-
-    Each amplitude may have its own best model of either kind: the question is what the kind can do. Only cases for
-    validation and test count.
+def judge_linearity(
+    linear: Dict[str, Evaluation], networks: Dict[str, Evaluation], *, ranked: Sequence[str] = ()
+) -> Linearity:
+    """Compare a linear free run with a network's, amplitude by amplitude; unseen cases count, and no other.
 
     Args:
         linear: Evaluations of linear models by name, on the same cases.
         networks: Evaluations of networks by name, on the same cases.
+        ranked: Names of both kinds by what chose between them, best first: the first of each kind is judged, and of
+            the others it is only said where one would be better. Without it each amplitude has the best of each kind,
+            which asks what the kind can do, and is too kind to whichever has more models.
 
     Returns:
         The verdict.
@@ -163,18 +177,9 @@ def judge_linearity(linear: Dict[str, Evaluation], networks: Dict[str, Evaluatio
     for amplitude in Amplitude:
         cases = groups.get(amplitude, ())
         if cases:
-            best, fit = _best(linear, cases)
-            other, other_fit = _best(networks, cases)
-            rows.append(
-                AmplitudeRow(
-                    amplitude=amplitude,
-                    cases=cases,
-                    linear=best,
-                    linear_fit=fit,
-                    network=other,
-                    network_fit=other_fit,
-                )
-            )
+            both = {"linear": _shown(linear, cases, ranked), "network": _shown(networks, cases, ranked)}
+            fields = {name.format(kind): value for kind, found in both.items() for name, value in found.items()}
+            rows.append(AmplitudeRow(amplitude=amplitude, cases=cases, **fields))
     if any(row.worse for row in rows):
         answer = Answer.NETWORK
     elif all(row.good or row.linear_fit >= row.network_fit - 1.0 for row in rows):
@@ -201,10 +206,13 @@ def _by_amplitude(evaluations: Sequence[Evaluation]) -> dict[Amplitude, tuple[st
     return groups
 
 
-def _best(evaluations: Dict[str, Evaluation], cases: Sequence[str]) -> tuple[str, float]:
+def _shown(evaluations: Dict[str, Evaluation], cases: Sequence[str], ranked: Sequence[str]) -> dict[str, Any]:
+    """The chosen one and its fit, and the best of the others where that is better, by field of a row."""
     fits = {
         name: mean_fit(evaluation.cases[case].free_run.nrmse_fit for case in cases)
         for name, evaluation in evaluations.items()
     }
-    name = max(fits, key=lambda key: fits[key] if np.isfinite(fits[key]) else -np.inf)
-    return name, fits[name]
+    best = max(fits, key=lambda key: fits[key] if np.isfinite(fits[key]) else -np.inf)
+    chosen = next((name for name in ranked if name in fits), best)
+    better = {"better_{}": best, "better_{}_fit": fits[best]} if not fits[chosen] >= fits[best] else {}
+    return {"{}": chosen, "{}_fit": fits[chosen], **better}

@@ -17,6 +17,7 @@ from sysid.estimation.result import FitResult
 from sysid.models import Mapping, Start, beginning
 from sysid.traces import Trace
 from sysid.validation.metrics import Figures, figures, mean_fit
+from sysid.validation.resolution import exact, parts_of, tied
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -27,11 +28,13 @@ class Finalist:
         fit: The fitted model.
         cases: Figures of the free run by name of the case.
         one_step_mse: Mean squared one-step error on the estimation traces.
+        errors: Squared errors of the free run over the target's variance, by part of each case.
     """
 
     fit: FitResult
     cases: dict[str, Figures]
     one_step_mse: float
+    errors: tuple[float, ...] = ()
 
     @property
     def mean_fit(self) -> float:
@@ -119,8 +122,7 @@ def run_finalists(
 
     def one(index: int) -> Finalist:
         fit = fit_arx(traces, mapping, losses.orders(index), start=begin, rest_output=rest_output)
-        runs = {case.name: free_run_figures(fit, case, begin) for case in cases}
-        return Finalist(fit=fit, cases=runs, one_step_mse=float(losses.mse[index]))
+        return finalist_of(fit, cases, begin, float(losses.mse[index]))
 
     finalists = []
     with ThreadPoolExecutor(workers) as pool:
@@ -131,20 +133,65 @@ def run_finalists(
     return Finalists(ranked=tuple(ranked), unstable=sum(not np.isfinite(entry.mean_fit) for entry in ranked))
 
 
-def free_run_figures(fit: FitResult, case: Trace, start: Start) -> Figures:
-    """Figures of one free run.
+def finalist_of(fit: FitResult, cases: Sequence[Trace], start: Start, one_step_mse: float) -> Finalist:
+    """Run a model freely over every case.
 
     Args:
         fit: The fitted model.
-        case: The trace.
-        start: How the free run begins, and from which sample on it is scored.
+        cases: The traces.
+        start: How each free run begins, and from which sample on it is scored.
+        one_step_mse: Mean squared one-step error on the estimation traces.
 
     Returns:
-        The figures.
+        The candidate.
     """
-    model = fit.model
-    inputs, target = case.columns(model.mapping.inputs), case.columns([model.mapping.output])[:, 0]
-    begun = beginning(model, inputs, target, start, case.usable_samples)
-    scored = slice(begun.first, None)
-    output: NDArray[np.float64] = model.simulate(inputs[scored], begun.history)
-    return figures(target[scored], output, model.output_unit, case.usable_samples[scored])
+    model, found, errors = fit.model, dict[str, Figures](), list[float]()
+    for case in cases:
+        inputs, target = case.columns(model.mapping.inputs), case.columns([model.mapping.output])[:, 0]
+        begun = beginning(model, inputs, target, start, case.usable_samples)
+        scored = slice(begun.first, None)
+        output: NDArray[np.float64] = model.simulate(inputs[scored], begun.history)
+        counted = case.usable_samples[scored]
+        target = target[scored]
+        found[case.name] = figures(target, output, model.output_unit, counted)
+        spread = float(np.std(target[counted])) if counted.any() else 0.0
+        errors += parts_of((target - output)[counted] / spread) if spread > 0.0 else ()
+    return Finalist(fit=fit, cases=found, one_step_mse=one_step_mse, errors=tuple(errors))
+
+
+def smallest_first(ranked: Sequence[Finalist]) -> tuple[Finalist, ...]:
+    """The smallest of those that cannot be told from the best put before the others.
+
+    Args:
+        ranked: Candidates, best mean fit first.
+
+    Returns:
+        They, the others in their order.
+    """
+    if not ranked:
+        return ()
+    alike = alike_with(ranked[0], ranked)
+    first = min(alike, key=lambda one: (one.fit.model.n_parameters, ranked.index(one)))
+    return (first, *(one for one in ranked if one is not first))
+
+
+def alike_with(best: Finalist, others: Sequence[Finalist]) -> list[Finalist]:
+    """Those that cannot be told from the best, it among them.
+
+    Args:
+        best: The candidate with the best mean fit.
+        others: All candidates.
+
+    Returns:
+        They, in their order; none of them is unstable.
+    """
+    rounding = exact(best.errors)
+    return [
+        one
+        for one in others
+        if one is best
+        or (
+            (np.isfinite(one.mean_fit) and not one.pole_radius >= 1.0)
+            and (tied(best.errors, one.errors) or (rounding and exact(one.errors)))
+        )
+    ]

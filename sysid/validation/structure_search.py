@@ -15,7 +15,7 @@ from sysid.estimation.linear.order_search import Criterion, weighed
 from sysid.estimation.result import FitResult
 from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, TransferFunction
 from sysid.traces import Trace
-from sysid.validation.order_finalists import Finalist, free_run_figures
+from sysid.validation.order_finalists import Finalist, finalist_of
 
 ARX_KIND = "ARX"
 Dead = tuple[int, ...]
@@ -111,8 +111,7 @@ def run_structures(
             except UserError as error:  # too short a record for it, or no start that stays finite
                 notes.append(f"{structure.label} was not fitted: {error.what}.")
                 break
-            runs = {case.name: free_run_figures(found, case, start) for case in cases}
-            finalists.append(Finalist(fit=found, cases=runs, one_step_mse=one_step_mse(found, traces, start)))
+            finalists.append(finalist_of(found, cases, start, one_step_mse(found, traces, start)))
             if n == most:
                 largest.add(structure.label)
     return Found(finalists=tuple(finalists), largest=frozenset(largest), notes=tuple(notes))

@@ -38,7 +38,11 @@ def test_a_criterion_finds_the_orders_and_the_dead_time(found: OrderSearch, crit
 
 def test_the_selection_traces_choose_where_there_are_some(found: OrderSearch) -> None:
     frame = found.to_frame()
-    assert frame["fit"].is_monotonic_decreasing
+    assert frame["fit"][1:].is_monotonic_decreasing
+    # The best free run is no better than that of a smaller structure by more than chance.
+    assert frame["fit"][0] > frame["fit"][1] - 0.5
+    assert frame["parameters"][0] <= frame["parameters"][1]
+    assert f"{frame['structure'][0]} is put first: the smallest of" in str(found)
     assert found.best() == found.fit.model.structure
     assert found.fit.simulate(np.zeros(5), initial=0.0).shape == (5,)
     assert "selection" in found.chosen_by

@@ -26,7 +26,7 @@ from sysid.estimation import FitResult, fit_arx, fit_state_space, fit_transfer_f
 from sysid.estimation.linear.order_search import OrderGrid, search_orders
 from sysid.models import LinearStateSpace, Mapping, Start, StartKind, TransferFunction
 from sysid.traces import Channel, Trace
-from sysid.validation.order_finalists import free_run_figures, run_finalists
+from sysid.validation.order_finalists import finalist_of, run_finalists
 from tests.benchmarks._findings import found
 from tests.benchmarks._public import checked
 
@@ -40,7 +40,7 @@ def trace(name: str, columns: np.ndarray, sample_time: float) -> Trace:
 
 
 def rmse(fit: FitResult, case: Trace, start: Start) -> float:
-    return float(np.sqrt(free_run_figures(fit, case, start).mse))
+    return float(np.sqrt(finalist_of(fit, [case], start, np.nan).cases[case.name].mse))
 
 
 def tanks() -> None:

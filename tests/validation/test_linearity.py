@@ -54,6 +54,16 @@ def test_each_amplitude_has_its_own_best_model() -> None:
     assert [(row.linear, row.linear_fit) for row in verdict.rows] == [("A", 80.0), ("A", 90.0), ("B", 97.0)]
 
 
+def test_what_was_chosen_is_judged_and_what_unseen_cases_like_better_is_only_named() -> None:
+    chosen, other = evaluation(MIN=80.0, MID=90.0, FULL=97.0), evaluation(MIN=99.0, MID=70.0, FULL=97.0)
+    verdict = judge_linearity({"A": chosen}, {"N": chosen, "M": other}, ranked=["N", "A", "M"])
+    assert [(row.network, row.network_fit) for row in verdict.rows] == [("N", 80.0), ("N", 90.0), ("N", 97.0)]
+    assert [row.better_network for row in verdict.rows] == ["M", "", ""]
+    assert verdict.rows[0].to_dict()["better_network_fit"] == 99.0
+    assert "better_network" not in verdict.rows[1].to_dict()
+    assert verdict.answer is Answer.LINEAR
+
+
 def test_a_run_that_diverges_is_never_the_best() -> None:
     lost = evaluation(MIN=float("-inf"), MID=float("nan"), FULL=0.0)
     verdict = judge_linearity({"lost": lost, "A": evaluation(MIN=1.0, MID=1.0, FULL=1.0)}, {"N": lost})

@@ -8,7 +8,7 @@ from sysid.estimation.linear.order_search import OrderGrid, search_orders
 from sysid.models import ARX, Mapping, Start
 from sysid.traces import Role
 from sysid.validation import evaluate_case
-from sysid.validation.order_finalists import run_finalists
+from sysid.validation.order_finalists import alike_with, run_finalists, smallest_first
 from tests.estimation.linear_systems import arx_response, steps, trace_of
 
 MAPPING = Mapping.parse("u1 -> y")
@@ -46,3 +46,17 @@ def test_a_free_run_that_runs_away_is_last_and_counted() -> None:
     finalists = run_finalists(losses, [grown], MAPPING, [long], count=2, rest_output=1.0)
     assert finalists.unstable == 1
     assert finalists.ranked[-1].fit.model.structure == ARX(na=1, nb=(1,), nk=(0,))
+
+
+def test_the_smallest_of_those_that_cannot_be_told_from_the_best_comes_first() -> None:
+    """The plant is ARX [2; 2; 1]: ten parameters are better by chance alone."""
+    estimation, cases = record(14, 0.3), [record(104, 0.3)]
+    losses = search_orders([estimation], MAPPING, OrderGrid(max_na=5, max_nb=5, max_nk=2))
+    ranked = run_finalists(losses, [estimation], MAPPING, cases, count=30, rest_output=0.0).ranked
+    first = smallest_first(ranked)
+    assert ranked[0].fit.model.n_parameters == 11
+    assert first[0].fit.model.n_parameters == 5
+    assert ranked[0].mean_fit - first[0].mean_fit < 0.1
+    assert [one for one in ranked if one is not first[0]] == list(first[1:])
+    assert first[0] in alike_with(ranked[0], ranked)
+    assert smallest_first(()) == ()

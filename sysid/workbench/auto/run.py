@@ -23,6 +23,7 @@ from sysid.workbench.auto.refit import refitted
 from sysid.workbench.auto.search import FOUND, TITLE, Found, Hire, Search, stand_in
 from sysid.workbench.auto.table import table_of_front
 from sysid.workbench.fits import steps
+from sysid.workbench.fits.choice import Choice
 from sysid.workbench.fits.config import FitConfig, Pipeline
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
@@ -239,7 +240,7 @@ class _AutoSteps:
                 further = parts.trained_on and trains_on(model.fit.structure)
                 last = parts.partial or further
                 given[model.fit.name] = self._again(model, made, loaded.value, further=further) if last else made
-        choice = steps.Choice(name=FOUND, chosen_by=found.record.chosen_by)
+        choice = Choice(name=FOUND, chosen_by=found.record.chosen_by)
         work = FitSteps(
             pipeline=pipeline, given=given, chosen=choice, page=self.auto.page, before_page=self.auto.before_page
         )  # fmt: skip

@@ -106,5 +106,6 @@ def together(trials: Sequence[Trial], *, of: int) -> Trial:
             "parameters": max(trial.parameters for trial in trials),
             "selection_free_run_mse": _mean(trials) if worst.usable else math.nan,
             "selection_rms_shares": [share for trial in trials for share in trial.selection_rms_shares],
+            "selection_errors": [error for trial in trials for error in trial.selection_errors],
         }
     )

@@ -9,9 +9,14 @@ from dataclasses import dataclass, replace
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.numbers import number, quantity
 from sysid.reporting.sweep_record import Trial
+from sysid.validation.resolution import tied
 from sysid.workbench.auto.plan import ALIKE, RIVAL, ranked_by
 
 Error = Callable[[Trial], float]
+NEAR = 0.15
+"""Part of the least error within which a linear model that cannot be told from it is chosen in its place."""
+EXACT = 1e-8
+"""Share of the output's range below which an error is none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +72,18 @@ def choose(
     usable = sorted((t for t in trials if math.isfinite(error(t))), key=rank)
     chosen, refused = first_stable(usable)
     limit = error(chosen) * (1.0 + ALIKE) ** 2
-    alike = [t for t in usable[refused:] if error(t) <= limit and outside(t) <= outside(chosen)]
+    linear = [t for t in usable if ESTIMATORS[t.structure["kind"]].linear]
+
+    def no_worse(trial: Trial) -> bool:
+        return (
+            error(trial) <= limit
+            or (trial in linear and cannot_be_told(chosen, trial, error))
+            or both_exact(chosen, trial)
+        )
+
+    alike = [t for t in usable[refused:] if no_worse(t) and outside(t) <= outside(chosen)]
     more = tolerance is not None and min(map(error, usable[refused:])) < error(chosen)
     smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
-    linear = [t for t in usable if ESTIMATORS[t.structure["kind"]].linear]
     nonlinear = sum(not ESTIMATORS[t.structure["kind"]].linear for t in trials)
     found = Choice(
         chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=nonlinear,
@@ -81,6 +94,17 @@ def choose(
         return found
     first = usable[ahead[0]]
     return replace(found, chosen=first, least=first, refused=ahead[0], more_within="", stable=smallest)
+
+
+def cannot_be_told(best: Trial, other: Trial, error: Error) -> bool:
+    """Whether one's error cannot be told from the least by what chose, nor lies far from it."""
+    near = error(other) <= error(best) * (1.0 + NEAR) ** 2
+    return near and tied(best.selection_errors, other.selection_errors)
+
+
+def both_exact(*trials: Trial) -> bool:
+    """Whether what several leave is rounding: an error of 1e-16 is no better than one of 1e-14."""
+    return all(one.selection_rms_shares and max(one.selection_rms_shares) <= EXACT for one in trials)
 
 
 def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit: str, ended: str, error: Error) -> str:
@@ -107,8 +131,11 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit
     if choice.more_within:
         why = f"{choice.chosen.label} has {choice.more_within}, more than any of less error than its {shown(root)} has"
     elif choice.least.number != choice.chosen.number:
+        within = error(choice.chosen) <= error(choice.least) * (1.0 + ALIKE) ** 2
+        alike = f"within {ALIKE:.0%} of" if within else "of those that what chose cannot tell from"
+        on = " on what chose" if within else ""
         why = (
-            f"{choice.chosen.label} is the smallest within {ALIKE:.0%} of the least free-run error on what chose: "
+            f"{choice.chosen.label} is the smallest {alike} the least free-run error{on}: "
             f"{shown(root)} (root mean square) beside {shown(math.sqrt(error(choice.least)))} of "
             f"{choice.least.label}"
         )
@@ -116,7 +143,7 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit
     finals = f", {best} again from other starts" if again else ""
     finals += f", the {raced} best networks trained on side by side before that" if raced else ""
     parts = [f"{why}, of {tried} tried{finals}"]
-    if choice.linear is not None and choice.linear.number != choice.chosen.number:
+    if choice.linear is not None and not ESTIMATORS[choice.chosen.structure["kind"]].linear:
         linear = math.sqrt(error(choice.linear))
         share = 1.0 - root / linear if linear else 0.0  # what is met exactly has no error to better
         parts.append(f"{share:.0%} less than the best linear model, {choice.linear.label}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -66,11 +67,12 @@ def curves(fit: FitResult, data: Data, config: PipelineConfig) -> dict[str, Any]
     return {"curves": [curve.drawn().to_dict() for curve in found]}
 
 
-def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:
+def linearity(fits: Sequence[FitReady], chosen: str | None) -> dict[str, Any] | None:
     """Judge whether a linear model is enough for the data of a run.
 
     Args:
         fits: The fits that are ready.
+        chosen: Name of the fit that was chosen, or of the system that it is part of.
 
     Returns:
         The verdict as JSON values, of several outputs on each; ``None`` unless there are linear models and networks
@@ -80,12 +82,12 @@ def linearity(fits: Sequence[FitReady]) -> dict[str, Any] | None:
     for ready in fits:
         if ready.fit.status.comparable:
             usable.setdefault(ready.output, []).append(ready)
-    each = {output: _judged(some) for output, some in usable.items()}
+    each = {output: _judged(some, chosen) for output, some in usable.items()}
     found = {output: one for output, one in each.items() if one is not None}
     return Linearity.of_outputs(found).to_dict() if found else None
 
 
-def _judged(fits: Sequence[FitReady]) -> Linearity | None:
+def _judged(fits: Sequence[FitReady], chosen: str | None) -> Linearity | None:
     """The verdict on one output, where there are models of both kinds."""
     linear, networks = (
         {
@@ -95,4 +97,12 @@ def _judged(fits: Sequence[FitReady]) -> Linearity | None:
         }
         for asked in (True, False)
     )
-    return judge_linearity(linear, networks) if linear and networks else None
+    if not linear or not networks:
+        return None
+    selects = not any(math.isnan(ready.selection_mse) for ready in fits)
+
+    def rank(ready: FitReady) -> tuple[bool, bool, float]:
+        mse = ready.selection_mse if selects else ready.evaluation.mean_mse(Role.ESTIMATION)
+        return chosen not in {ready.config.name, ready.system}, math.isnan(mse), mse
+
+    return judge_linearity(linear, networks, ranked=[ready.config.name for ready in sorted(fits, key=rank)])

@@ -17,6 +17,7 @@ from sysid.reporting.results import Results, parse_results
 from sysid.reporting.sweep_record import has_sweep, read_sweep
 from sysid.units import squared
 from sysid.workbench.fits import steps
+from sysid.workbench.fits.choice import Choice, choose
 from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data, load_data, unmade_data
 from sysid.workbench.fits.estimates import how_long
@@ -82,7 +83,7 @@ class FitSteps:
 
     pipeline: Pipeline
     given: Mapping[str, GivenFit] = field(default_factory=dict)
-    chosen: steps.Choice | None = None
+    chosen: Choice | None = None
     page: bool = True
     before_page: Callable[[], object] | None = None
 
@@ -135,7 +136,7 @@ class FitSteps:
         sizes = steps.output_sizes(loaded.value, self.config.mapping.outputs)
         pairs = {name: one.pairs for name, one in fitted.items()}
         unstable = self.config.export is None or self.config.export.unstable
-        choice = self.chosen or steps.choose(pairs, asked, sizes, unstable=unstable, tolerance=self.config.tolerance)
+        choice = self.chosen or choose(pairs, asked, sizes, unstable=unstable, tolerance=self.config.tolerance)
         best = fitted[choice.name]
         leaves = self.config.export is not None and not choice.withheld
         bundle = run.do(self._export(run, best, loaded)) if leaves else None
@@ -355,7 +356,7 @@ class FitSteps:
         data: Data,
         fitted: Mapping[str, Fitted],
         *,
-        choice: steps.Choice | None,
+        choice: Choice | None,
         exports: Sequence[Mapping[str, Any]],
         advice: Sequence[Mapping[str, Any]] = (),
         orders: Sequence[Mapping[str, Any]] = (),

@@ -21,15 +21,19 @@ from sysid.validation.beyond import beyond
 from sysid.validation.metrics import mean_fit
 from sysid.validation.repeated import repeated
 from sysid.validation.still import still
+from sysid.workbench.fits.choice import Choice
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.evidence import linearity
-from sysid.workbench.fits.steps import Choice, Scores
+from sysid.workbench.fits.steps import Scores
 from sysid.workbench.runner.events import FitReady
 from sysid.workbench.runner.store import read_arrays, read_json, write_arrays, write_json
 
 SIGNALS = ("time", "target", "simulated", "predicted")
 """What is kept of every case, sample by sample."""
+
+CHOSE = ("selection_rms_shares", "selection_errors", "estimation_errors")
+"""What is kept of the traces that choose."""
 
 INTERVAL = ("low", "high")
 """What is kept besides where there are intervals."""
@@ -80,7 +84,7 @@ def write_scores(folder: Path, scores: Scores) -> list[Path]:
     }
     write_arrays(folder / "signals.npz", arrays)
     figures = {name: case.to_dict() for name, case in cases.items()}
-    chose = {"selection_mse": scores.selection_mse, "selection_rms_shares": list(scores.selection_rms_shares)}
+    chose = {"selection_mse": scores.selection_mse, **{name: list(getattr(scores, name)) for name in CHOSE}}
     write_json(folder / "evaluation.json", {"cases": figures, **chose})
     return [folder / "signals.npz", folder / "evaluation.json"]
 
@@ -136,14 +140,19 @@ def read_scores(folder: Path) -> Scores:
             if "by_state" in fields
             else None,
             constants=fields.get("constants", {}),
-            **{signal: np.asarray(arrays[f"{name}/{signal}"], dtype=np.float64) for signal in SIGNALS},
+            **_signals(arrays, name),
         )
         for name, fields in stored["cases"].items()
     }
-    shares = tuple(map(float, stored["selection_rms_shares"]))
     return Scores(
-        evaluation=Evaluation(cases=cases), selection_mse=float(stored["selection_mse"]), selection_rms_shares=shares
+        evaluation=Evaluation(cases=cases),
+        selection_mse=float(stored["selection_mse"]),
+        **{name: tuple(map(float, stored[name])) for name in CHOSE},
     )
+
+
+def _signals(arrays: Mapping[str, Any], name: str) -> dict[str, Any]:
+    return {signal: np.asarray(arrays[f"{name}/{signal}"], dtype=np.float64) for signal in SIGNALS}
 
 
 def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: TraceSet) -> dict[str, Any]:
@@ -258,7 +267,7 @@ def results_document(
         "systems": system_records(fits),
         "orders": [dict(one) for one in orders],
         "best": asdict(choice) | {"name": first} if choice else None,
-        "linearity": linearity(fits),
+        "linearity": linearity(fits, choice.name if choice else None),
         "advice": list(advice),
         "published": config.report.published,
         "sweep": None if sweep is None else sweep.summary.model_dump(),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.reporting.results import Results
-from sysid.workbench.fits import steps
+from sysid.workbench.fits.choice import Choice
 from sysid.workbench.fits.config import Pipeline, read_pipeline
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
 from sysid.workbench.fits.table import table_of_fits, told_of_fits
@@ -35,7 +35,7 @@ def program(request: RunRequest) -> Program[Results]:
 
 
 def program_of(
-    pipeline: Pipeline, *, given: Mapping[str, GivenFit] | None = None, chosen: steps.Choice | None = None
+    pipeline: Pipeline, *, given: Mapping[str, GivenFit] | None = None, chosen: Choice | None = None
 ) -> Program[Results]:
     """A pipeline as a program.
 

@@ -21,8 +21,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.grey_box.by_case import for_case
-from sysid.estimation.result import Status
-from sysid.estimation.tolerance import outside, spans_of
+from sysid.estimation.tolerance import spans_of
 from sysid.export.exporters import wanted_formats
 from sysid.models import AbstractStructure, Cascade
 from sysid.traces import Role
@@ -167,11 +166,15 @@ class Scores:
         evaluation: On every case.
         selection_mse: Mean free-run mse on the selection traces; NaN without any.
         selection_rms_shares: Root mean square of each of them, as a share of the output's range over all records.
+        selection_errors: Squared errors by part of each of them, in the output's unit squared.
+        estimation_errors: The same of the estimation traces.
     """
 
     evaluation: Evaluation
     selection_mse: float
     selection_rms_shares: tuple[float, ...] = ()
+    selection_errors: tuple[float, ...] = ()
+    estimation_errors: tuple[float, ...] = ()
 
 
 def scores_key(fit: str, structure: AbstractStructure, data: Data, config: PipelineConfig) -> str:
@@ -195,7 +198,7 @@ def scores_key(fit: str, structure: AbstractStructure, data: Data, config: Pipel
         "traces": data.traces.digest,
         "selection": [trace.digest for trace in data.selection],
         # Scores of a release that kept less are made again.
-        "kept": ["figures", "signals", "residuals", "intervals", "curves", "shares"],
+        "kept": ["figures", "signals", "residuals", "intervals", "curves", "shares", "errors"],
         "code": code,
     }
     return digest(terms | _common(config))
@@ -224,92 +227,11 @@ def score(fit: FitResult, data: Data, config: PipelineConfig) -> Scores:
         evaluation=evaluation,
         selection_mse=float(np.mean(errors)) if errors else math.nan,
         selection_rms_shares=tuple(float(np.sqrt(error) / span) for error in errors),
+        selection_errors=tuple(error for case in chosen for error in case.errors),
+        estimation_errors=tuple(
+            error for case in evaluation.cases.values() if case.role is Role.ESTIMATION for error in case.errors
+        ),
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Choice:
-    """Which fit is put first.
-
-    Args:
-        name: The fit.
-        chosen_by: By which figure, on which traces, as a sentence.
-        cases_chose: Whether the cases that are scored took part in the choice.
-        withheld: Whether it may not be exported, being unstable.
-    """
-
-    name: str
-    chosen_by: str
-    cases_chose: bool = False
-    withheld: bool = False
-
-
-def choose(
-    fits: Mapping[str, Sequence[tuple[FitResult, Scores]]],
-    asked: str,
-    sizes: Sequence[float] = (1.0,),
-    *,
-    unstable: bool = True,
-    tolerance: float | None = None,
-) -> Choice:
-    """Choose the fit that is exported and put first in the report.
-
-    Args:
-        fits: By name of the fit, for each of its outputs the fit and its figures.
-        asked: ``best``, or the name of a fit.
-        sizes: For each output the squared error that counts as one.
-        unstable: Whether an unstable fit may be exported; else the best of the others is.
-        tolerance: Share of each output's range: who stays within it over more of the selection traces comes first;
-            ``None`` for the error alone.
-
-    Returns:
-        The choice. Cases for validation have no say in it.
-    """
-    if not unstable:
-        stable = {
-            name: pairs for name, pairs in fits.items() if all(fit.status is not Status.UNSTABLE for fit, _ in pairs)
-        }
-        found = choose(stable or fits, asked, sizes, tolerance=tolerance)
-        if found.name in stable:
-            left = ", ".join(name for name in fits if name not in stable)
-            only = f" Only stable fits may be exported; {left} is not." if left and asked == "best" else ""
-            return dataclasses.replace(found, chosen_by=found.chosen_by + only)
-        return dataclasses.replace(
-            found, withheld=True, chosen_by=f"{found.chosen_by} It is not exported: its free run is unstable."
-        )
-    if asked != "best":
-        return Choice(name=asked, chosen_by="Named in the pipeline.")
-
-    def mean(figure: Callable[[Scores], float], pairs: Sequence[tuple[FitResult, Scores]]) -> float:
-        return float(np.mean([figure(scores) / size for (_, scores), size in zip(pairs, sizes, strict=True)]))
-
-    what = "mean squared error" if len(sizes) == 1 else "mean over the outputs of squared error over variance,"
-    # An unstable fit is compared by its figures like the others, and says what it is in its status.
-    usable = {name: pairs for name, pairs in fits.items() if all(fit.status.comparable for fit, _ in pairs)} or fits
-    by_selection = {name: mean(lambda scores: scores.selection_mse, pairs) for name, pairs in usable.items()}
-    if not any(math.isnan(mse) for mse in by_selection.values()):
-        sentence = f"Least {what} of the free run on the selection traces."
-        lost = {name: _outside(pairs, tolerance) for name, pairs in usable.items()}
-        best = min(by_selection, key=lambda name: (lost[name], by_selection[name]))
-        if by_selection[best] > min(by_selection.values()):
-            sentence = f"Over more selection traces within {tolerance:.3g} of the range than those of less {what}."
-        return Choice(name=best, chosen_by=sentence)
-    # Evidence cannot be compared between open and closed loop: their residuals are not the same.
-    by_estimation = {
-        name: mean(lambda scores: scores.evaluation.mean_mse(Role.ESTIMATION), pairs) for name, pairs in usable.items()
-    }
-    return Choice(
-        name=min(by_estimation, key=by_estimation.__getitem__),
-        chosen_by=f"Least {what} of the free run on the estimation traces, for want of selection traces; "
-        "it favours the model with the most parameters.",
-    )
-
-
-def _outside(pairs: Sequence[tuple[FitResult, Scores]], tolerance: float | None) -> int:
-    """Selection traces on which some output leaves the tolerance."""
-    if tolerance is None:
-        return 0
-    return outside(np.array([scores.selection_rms_shares for _, scores in pairs]).T, tolerance)
 
 
 def output_sizes(data: Data, outputs: Sequence[str]) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from sysid.workbench.auto.run import Searched
 from sysid.workbench.auto.search import FOUND
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
 from sysid.workbench.experiments.run import Experimented, write_dataset
-from sysid.workbench.fits import steps
+from sysid.workbench.fits.choice import Choice
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
@@ -136,7 +136,7 @@ def program_of(ground: Ground, grower: Grower, grown: Grown, export: Dict[str, A
     }
     work = FitSteps(
         pipeline=Pipeline(config=checked, text=text, path=folder / "pipeline.yaml"), given=given,
-        chosen=steps.Choice(name=GROWN, chosen_by=f"{grown.record.sentence}."),
+        chosen=Choice(name=GROWN, chosen_by=f"{grown.record.sentence}."),
     )  # fmt: skip
     data = data_of(grower.traces(added), mapping)
 

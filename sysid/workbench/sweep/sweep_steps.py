@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import shutil
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.errors import ConfigError
+from sysid.reporting.numbers import quantity
 from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
-from sysid.workbench.fits import steps
+from sysid.units import squared
+from sysid.workbench.fits.choice import Choice, against
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.estimates import how_long
@@ -123,7 +127,7 @@ class SweepSteps:
             for model, made in zip(models_of(fit, pipeline.config), found.given[trial.number], strict=True)
         }
         cases_chose = self.config.choose.on == "cases"
-        choice = steps.Choice(name=WINNER, chosen_by=found.record.chosen_by, cases_chose=cases_chose)
+        choice = Choice(name=WINNER, chosen_by=found.record.chosen_by, cases_chose=cases_chose)
         results = FitSteps(pipeline=pipeline, given=given, chosen=choice).run(run, loaded)
         ready = events.SweepReady(
             record=found.record, folder=run.store.path, command=run.command, data=self.config.data,
@@ -302,7 +306,8 @@ class SweepSteps:
         refused: int,
     ) -> SweepRecord:
         config, choose = self.config, self.config.choose
-        sentence = f"Least {FIGURES[choose.by].words} on {TRACES[choose.on]} among {len(tried)} trials."
+        sentence = f"Least {FIGURES[choose.by].words} on {TRACES[choose.on]} among {len(tried)} trials"
+        sentence += f"{_before(tried, winner, choose.by, choose.on, unit)}."
         if choose.tolerance is not None:
             sentence = (
                 f"Over {winner.within(choose.tolerance):.0%} of the selection traces within {choose.tolerance:.3g} of "
@@ -341,6 +346,21 @@ class SweepSteps:
             publish(record, url)
         except Exception as error:  # noqa: BLE001 - a database can fail in any way, and the sweep is on disk
             run.tell(events.Warned(text=f"not written to the Optuna store ({type(error).__name__}: {error})"))
+
+
+def _before(tried: Sequence[Trial], winner: Trial, by: str, on: str, unit: str) -> str:
+    """The figure that chose, and the trials that the winner was chosen before."""
+    usable = [trial for trial in tried if trial.in_full]
+    labels = Counter(trial.label for trial in usable)
+    names = {t.number: t.label if labels[t.label] == 1 else f"{t.label} (trial {t.number})" for t in usable}
+    told = (by, on) == ("free_run_mse", "selection")
+    of = FIGURES[by].unit.format(unit=unit, squared=squared(unit)) or "1"
+    return against(
+        names[winner.number],
+        {names[trial.number]: FIGURES[by].of(trial, on) for trial in usable},
+        partial(quantity, unit=of),
+        {names[trial.number]: trial.selection_errors if told else () for trial in usable},
+    )
 
 
 def _ranges(space: Space) -> dict[str, list[Any]]:

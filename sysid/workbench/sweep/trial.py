@@ -23,6 +23,7 @@ from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, part_
 from sysid.estimation.tolerance import spans_of
 from sysid.models import AbstractModel, Start, beginning
 from sysid.traces import Role, Trace, TraceSet
+from sysid.validation.resolution import parts_of
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.outputs import models_of
@@ -320,14 +321,20 @@ def _scores(bench: Bench, models: Sequence[AbstractModel]) -> dict[str, Any]:
         f"selection_{name}": float(np.mean([one[name] for one in chosen])) if chosen else math.nan
         for name in ("free_run_mse", "one_step_mse")
     }
-    return {"cases": cases, "selection_rms_shares": [float(share.max()) for share in shares], **means}
+    parts = [error for errors, _ in runs for error in np.mean(errors["parts"], axis=0)]
+    return {
+        "cases": cases,
+        "selection_rms_shares": [float(share.max()) for share in shares],
+        "selection_errors": [float(error) for error in parts],
+        **means,
+    }
 
 
 def _case(
     models: Sequence[AbstractModel], trace: Trace, start: Start, sizes: Mapping[str, float], repeats: int
-) -> tuple[dict[str, list[float]], dict[str, float]]:
-    """Errors of each output, each over the squared error that counts as one; and the time, where it is measured."""
-    errors: dict[str, list[float]] = {"free_run_mse": [], "one_step_mse": []}
+) -> tuple[dict[str, list[Any]], dict[str, float]]:
+    """Errors of each output over the squared error that counts as one, by part too; and the time, where measured."""
+    errors: dict[str, list[Any]] = {"free_run_mse": [], "one_step_mse": [], "parts": []}
     seconds, n_samples = 0.0, 0
     for model in models:
         inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
@@ -342,12 +349,14 @@ def _case(
         for name, run in runs.items():
             squared = ((run - target)[counted] ** 2).reshape(-1, len(size))
             errors[name] += list(np.mean(squared, axis=0) / size)
+        left = ((runs["free_run_mse"] - target)[counted]).reshape(-1, len(size)) / np.sqrt(size)
+        errors["parts"] += [parts_of(one) for one in left.T]
         seconds += _seconds(lambda m=model, u=inputs, h=history: m.simulate(u, h), repeats)  # type: ignore[misc]
     return errors, {"run_time_s": seconds, "n_samples": n_samples} if repeats else {}
 
 
-def _means(errors: Mapping[str, list[float]], more: Mapping[str, float]) -> dict[str, float]:
-    return {**{name: float(np.mean(values)) for name, values in errors.items()}, **more}
+def _means(errors: Mapping[str, list[Any]], more: Mapping[str, float]) -> dict[str, float]:
+    return {**{name: float(np.mean(values)) for name, values in errors.items() if name != "parts"}, **more}
 
 
 def _seconds(run: Callable[[], object], repeats: int) -> float:

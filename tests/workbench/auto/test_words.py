@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from sysid.models import ARX, NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.search import error
@@ -46,7 +48,28 @@ def test_two_models_that_are_exact_are_no_better_than_each_other() -> None:
     smaller = arx(1, 0.0).model_copy(update={"operations": 5})
     found = choose([smaller, arx(2, 0.0), network(3, 1.0, 60)], error, stable)
     assert (found.chosen.number, found.linear.number if found.linear else 0) == (2, 1)
-    assert "0% less than the best linear model" in sentence(found, 3, unit="V", ended="", error=error)
+    assert "no nonlinear model does better" in sentence(found, 3, unit="V", ended="", error=error)
+
+
+def test_a_linear_model_that_what_chose_cannot_tell_from_a_network_is_chosen() -> None:
+    scatter = np.tile([0.5, 1.5], 8)
+    alike, worse = scatter + 0.1 * np.tile([0.0, 0.0, 3.0, -2.0], 4), scatter + 0.1
+    best = network(2, 1.0, 60).model_copy(update={"selection_errors": list(scatter)})
+    for errors, number in ((alike, 1), (worse, 2)):
+        other = arx(1, 1.05).model_copy(update={"selection_errors": list(errors)})
+        found = choose([other, best], error, stable)
+        assert found.chosen.number == number
+        said = sentence(found, 2, unit="V", ended="", error=error)
+        assert ("of those that what chose cannot tell from the least" in said) is (number == 1)
+
+
+def test_errors_of_rounding_are_alike_and_the_smallest_is_chosen() -> None:
+    exact = {"selection_rms_shares": [1e-15]}
+    trials = [
+        arx(1, 1e-16).model_copy(update={**exact, "operations": 20}),
+        arx(2, 5e-15).model_copy(update={**exact, "operations": 3}),
+    ]
+    assert choose(trials, error, stable).chosen.number == 2
 
 
 def test_that_no_network_was_tried_is_said() -> None:

@@ -7,12 +7,18 @@ from types import SimpleNamespace as Fake
 import pytest
 
 from sysid.estimation.result import Status
-from sysid.workbench.fits.steps import choose
+from sysid.workbench.fits.choice import choose
+
+
+def fitted(status: Status, mse: float):
+    model = Fake(ends=Fake(output_units=("V",)))
+    return [(Fake(status=status, model=model), Fake(selection_mse=mse, selection_errors=()))]
+
 
 FOUND = {
-    "good": [(Fake(status=Status.CONVERGED), Fake(selection_mse=2.0))],
-    "best": [(Fake(status=Status.UNSTABLE), Fake(selection_mse=1.0))],
-    "poor": [(Fake(status=Status.CONVERGED), Fake(selection_mse=3.0))],
+    "good": fitted(Status.CONVERGED, 2.0),
+    "best": fitted(Status.UNSTABLE, 1.0),
+    "poor": fitted(Status.CONVERGED, 3.0),
 }
 
 

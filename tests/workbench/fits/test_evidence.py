@@ -76,7 +76,7 @@ def _with_start(config: PipelineConfig, start: object) -> PipelineConfig:
 
 
 def test_the_linearity_verdict_compares_the_kinds_by_amplitude(fitted: Fitted) -> None:
-    found = linearity([ready(fitted, "ARX"), ready(fitted, "open loop")])
+    found = linearity([ready(fitted, "ARX"), ready(fitted, "open loop")], "ARX")
     assert found is not None
     (row,) = found["rows"]
     assert (row["amplitude"], row["cases"], row["linear"], row["network"]) == ("full", ["run-3"], "ARX", "open loop")
@@ -84,5 +84,5 @@ def test_the_linearity_verdict_compares_the_kinds_by_amplitude(fitted: Fitted) -
 
 
 def test_there_is_no_verdict_without_a_usable_fit_of_each_kind(fitted: Fitted) -> None:
-    assert linearity([ready(fitted, "ARX")]) is None
-    assert linearity([ready(fitted, "ARX"), ready(fitted, "open loop", Status.NOT_IMPROVED)]) is None
+    assert linearity([ready(fitted, "ARX")], "ARX") is None
+    assert linearity([ready(fitted, "ARX"), ready(fitted, "open loop", Status.NOT_IMPROVED)], None) is None

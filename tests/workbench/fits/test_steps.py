@@ -14,7 +14,7 @@ from sysid.estimation import FitResult, Loop, Status
 from sysid.models import ARX, ARXModel, Mapping
 from sysid.traces import Role
 from sysid.validation import CaseResult, Evaluation, Figures
-from sysid.workbench.fits import steps
+from sysid.workbench.fits import choice, steps
 from sysid.workbench.fits.config import PipelineConfig, parse_pipeline
 from sysid.workbench.fits.data import Data, load_data
 
@@ -185,8 +185,8 @@ def test_each_output_counts_by_its_own_size() -> None:
     near, far = (fitted({Role.ESTIMATION: 1.0}, mse) for mse in (1.0, 100.0))
     small, large = (fitted({Role.ESTIMATION: 1.0}, mse) for mse in (0.001, 0.1))
     fits = {"good at the small one": [far, small], "good at the large one": [near, large]}
-    assert steps.choose(fits, "best", (1e4, 1e-3)).name == "good at the small one"
-    assert steps.choose(fits, "best", (1.0, 1.0)).name == "good at the large one"
+    assert choice.choose(fits, "best", (1e4, 1e-3)).name == "good at the small one"
+    assert choice.choose(fits, "best", (1.0, 1.0)).name == "good at the large one"
 
 
 def test_selection_traces_choose_and_validation_has_no_say() -> None:
@@ -196,13 +196,25 @@ def test_selection_traces_choose_and_validation_has_no_say() -> None:
         "best on estimation": fitted({Role.ESTIMATION: 0.1, Role.VALIDATION: 9.0}, 4.0),
     }
     given = one_output(fits)
-    assert steps.choose(given, "best").name == "best on selection"
-    assert "selection traces" in steps.choose(given, "best").chosen_by
+    assert choice.choose(given, "best").name == "best on selection"
+    assert "selection traces" in choice.choose(given, "best").chosen_by
     without = {name: (fit, dataclasses.replace(scores, selection_mse=math.nan)) for name, (fit, scores) in fits.items()}
-    assert steps.choose(one_output(without), "best").name == "best on estimation"
-    assert "for want of selection traces" in steps.choose(one_output(without), "best").chosen_by
-    named = steps.choose(given, "best on validation")
+    assert choice.choose(one_output(without), "best").name == "best on estimation"
+    assert "for want of selection traces" in choice.choose(one_output(without), "best").chosen_by
+    named = choice.choose(given, "best on validation")
     assert (named.name, named.chosen_by) == ("best on validation", "Named in the pipeline.")
+
+
+def test_the_sentence_has_what_chose_and_the_next_or_those_that_it_cannot_be_told_from() -> None:
+    errors = {"good": np.tile([0.5, 1.5], 6), "next": np.tile([0.5, 1.5, 1.0, 1.2], 3), "far": np.full(12, 9.0)}
+    fits = {}
+    for name, some in errors.items():
+        fit, scores = fitted({Role.ESTIMATION: 1.0}, float(some.mean()))
+        fits[name] = (fit, dataclasses.replace(scores, selection_errors=tuple(some)))
+    said = choice.choose(one_output(fits), "best").chosen_by
+    assert said.endswith(": 1.00\xa0V², tied with next (1.05\xa0V²): the difference is within one standard error.")
+    said = choice.choose(one_output({name: fits[name] for name in ("good", "far")}), "best").chosen_by
+    assert said.endswith("on the selection traces: 1.00\xa0V², before 9.00\xa0V² of far.")
 
 
 def test_who_stays_within_a_tolerance_over_more_traces_is_best_whatever_the_mean() -> None:
@@ -211,18 +223,18 @@ def test_who_stays_within_a_tolerance_over_more_traces_is_best_whatever_the_mean
     for name, (mse, some) in shares.items():
         fit, scores = fitted({Role.ESTIMATION: 1.0}, mse)
         fits[name] = (fit, dataclasses.replace(scores, selection_rms_shares=tuple(some)))
-    assert steps.choose(one_output(fits), "best").name == "uneven"
-    found = steps.choose(one_output(fits), "best", tolerance=0.01)
+    assert choice.choose(one_output(fits), "best").name == "uneven"
+    found = choice.choose(one_output(fits), "best", tolerance=0.01)
     assert found.name == "even"
     assert "within 0.01 of the range" in found.chosen_by
-    assert "within" not in steps.choose(one_output(fits), "best", tolerance=0.05).chosen_by
+    assert "within" not in choice.choose(one_output(fits), "best", tolerance=0.05).chosen_by
     # Of several outputs each has to stay within it over the same trace.
     both = {"even": [fits["even"], fits["uneven"]], "uneven": [fits["uneven"], fits["uneven"]]}
-    assert steps.choose(both, "best", (1.0, 1.0), tolerance=0.01).name == "uneven"
+    assert choice.choose(both, "best", (1.0, 1.0), tolerance=0.01).name == "uneven"
 
 
 def test_a_fit_that_failed_is_not_chosen_unless_all_did() -> None:
     good = fitted({Role.ESTIMATION: 1.0}, 5.0)
     failed = fitted({Role.ESTIMATION: 1.0}, 1.0, Status.NOT_IMPROVED)
-    assert steps.choose(one_output({"failed": failed, "good": good}), "best").name == "good"
-    assert steps.choose(one_output({"failed": failed}), "best").name == "failed"
+    assert choice.choose(one_output({"failed": failed, "good": good}), "best").name == "good"
+    assert choice.choose(one_output({"failed": failed}), "best").name == "failed"
