@@ -171,7 +171,7 @@ def _judged(one: Compared, traces: TraceSet, start: Start) -> Iterator[_Judged]:
         alone, uncertain = (part.model, part.posterior) if isinstance(part, FitResult) else (part, posterior)
         units = dict(zip(alone.mapping.outputs, alone.ends.output_units, strict=True))
         for output, found in evaluate_outputs(alone, traces, start, posterior=uncertain).items():
-            label = f"{alone.structure.label} -> {output}" if several else alone.structure.label
+            label = f"{alone.label} -> {output}" if several else alone.label
             yield _Judged(label=label, output=output, unit=units[output], evaluation=found)
 
 

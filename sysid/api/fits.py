@@ -87,7 +87,7 @@ class Fit(FitResult):
         if history is not None and not isinstance(initial, History | tuple):
             other = not np.array_equal(history.output[0], self.model.resting)
             if other and np.array_equal(run, self.model.simulate(inputs)):
-                raise unheeded(f"{initial}", model=self.model.structure.label)
+                raise unheeded(f"{initial}", model=self.model.label)
         return run
 
     def predict(self, y: Any, u: Any, *, steps: int = 1, initial: Initial = None) -> NDArray[np.float64]:
@@ -205,7 +205,7 @@ class Fit(FitResult):
 
     def summary(self) -> str:
         """What was fitted, how it ended, its parameters as far as there is an uncertainty of them, and its fit."""
-        lines = [f"{self.model.structure.label}, {self.model.mapping}", self.status.value]
+        lines = [f"{self.model.label}, {self.model.mapping}", self.status.value]
         lines += [f"Parameters: {self.model.n_parameters}. Trained for {self.train_time_s:.3g} s."]
         if self.uncertainty is not None:
             pairs = zip(
@@ -223,7 +223,7 @@ class Fit(FitResult):
         return "\n".join([*lines, str(self._compared)])
 
     def __repr__(self) -> str:
-        return f"<Fit of {self.model.structure.label}, {self.model.mapping}: {self.status.name}>"
+        return f"<Fit of {self.model.label}, {self.model.mapping}: {self.status.name}>"
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.summary())}</pre>"

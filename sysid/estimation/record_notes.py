@@ -100,10 +100,10 @@ def outnumbered(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...
         None, or a sentence.
     """
     samples = sum(int(trace.usable_samples.sum()) for trace in traces)
-    if model.n_parameters < samples * len(model.mapping.outputs):
+    if model.n_together < samples * len(model.mapping.outputs):
         return ()
     return (
-        f"The model has {model.n_parameters} parameters and the records have {samples} samples: most of them are not "
+        f"The model has {model.n_together} parameters and the records have {samples} samples: most of them are not "
         "told by the records, and a close fit says nothing. Record longer, or take a smaller model.",
     )
 

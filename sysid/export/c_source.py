@@ -114,7 +114,7 @@ def _stage(surrogate: Surrogate, stage: Stage) -> dict[str, Any]:
         )
     ]
     common = {
-        "title": f"{stage.model.mapping}, {stage.model.structure.label}",
+        "title": f"{stage.model.mapping}, {stage.model.label}",
         "first": stage.first,
         "lost": stage.first_remainder,
         "low": form.low if np.isfinite(form.low) else None,

@@ -12,7 +12,7 @@ from sysid.errors import ConfigError
 from sysid.export.program_form import ProgramForm
 from sysid.export.state_space_form import StateSpaceForm
 from sysid.kernels.neurons import NEURONS, Neuron
-from sysid.models import NeuralForm, StateSpace
+from sysid.models import NeuralEnsemble, NeuralForm, StateSpace
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
 from sysid.models.equation_form import EquationForm
@@ -151,6 +151,7 @@ def lowered_form(model: Member) -> LaggedForm | StateSpaceForm | ProgramForm:
 HIDDEN: dict[type, Callable[..., StateSpaceForm | ProgramForm]] = {
     StateSpace: StateSpaceForm.linear,
     NeuralForm: StateSpaceForm.neural,
+    NeuralEnsemble: StateSpaceForm.ensemble,
     EquationForm: lambda form, ends: ProgramForm(ends=ends, lowered=form),
 }
 """Forms with hidden states, and what they become; every other form is lagged."""

@@ -129,7 +129,7 @@ def _stage(stage: Stage, fit: FitResult | None) -> dict[str, Any]:
     ]
     return {
         "mapping": str(stage.model.mapping),
-        "label": stage.model.structure.label,
+        "label": stage.model.label,
         "structure": stage.model.to_dict()["structure"],
         "n_parameters": stage.model.n_parameters,
         "scaling": {

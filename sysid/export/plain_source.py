@@ -28,7 +28,7 @@ def plain_stage(stage: Stage) -> dict[str, Any]:
     """
     form, n = stage.form, stage.form.n_inputs
     common = {
-        "title": f"{stage.model.mapping}, {stage.model.structure.label}",
+        "title": f"{stage.model.mapping}, {stage.model.label}",
         "first": stage.first,
         "size": stage.state.size,
         "form": form,

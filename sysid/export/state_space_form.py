@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels.neurons import NEURONS, Neuron
-from sysid.models import History, NeuralForm, Scaling, StateSpace, VectorScaling
+from sysid.models import History, NeuralEnsemble, NeuralForm, Scaling, StateSpace, VectorScaling
 from sysid.models.activations import PLAIN
 from sysid.models.ends import Ends
 
@@ -123,6 +123,11 @@ class StateSpaceForm:
             gain=E[:, :-1],
             rest=E[:, -1],
         )
+
+    @classmethod
+    def ensemble(cls, lowered: NeuralEnsemble, ends: Ends) -> StateSpaceForm:
+        """Several neural state spaces as one, whose state after a history the members find by themselves."""
+        return replace(cls.neural(lowered.joined, ends), lowered=lowered)
 
     @property
     def scaling(self) -> Scaling | VectorScaling:

@@ -167,7 +167,7 @@ class Surrogate:
         """The structures of the stages; of many, their number."""
         if len(self.stages) > MANY:
             return f"{len(self.stages)} models with {self.source.n_parameters} parameters"
-        return ", ".join(stage.model.structure.label for stage in self.stages)
+        return ", ".join(stage.model.label for stage in self.stages)
 
     @property
     def lines(self) -> tuple[DelayLine, ...]:

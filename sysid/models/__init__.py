@@ -26,6 +26,7 @@ from sysid.models.linear_state_space import (
 )
 from sysid.models.mapping import Mapping
 from sysid.models.narx import NARX, NARXModel
+from sysid.models.neural_ensemble import NeuralEnsemble
 from sysid.models.neural_form import NeuralForm
 from sysid.models.neural_state_space import (
     NeuralStateSpace,
@@ -80,6 +81,7 @@ __all__ = [
     "Mapping",
     "Member",
     "NARXModel",
+    "NeuralEnsemble",
     "NeuralForm",
     "NeuralStateSpace",
     "NeuralStateSpaceModel",

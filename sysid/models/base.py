@@ -51,6 +51,16 @@ class AbstractModel(ABC):
         """Number of fitted parameters."""
 
     @property
+    def n_together(self) -> int:
+        """Parameters that were fitted together: all of them, but for the members of an ensemble."""
+        return self.n_parameters
+
+    @property
+    def label(self) -> str:
+        """What it is called in tables: its structure, and what that does not tell."""
+        return self.structure.label
+
+    @property
     @abstractmethod
     def recursion(self) -> AbstractForm:
         """The form that is run and exported."""

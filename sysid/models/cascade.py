@@ -117,7 +117,7 @@ class Cascade:
     @property
     def label(self) -> str:
         """The structures of the members."""
-        return ", ".join(f"{model.mapping} {model.structure.label}" for model in self.models)
+        return ", ".join(f"{model.mapping} {model.label}" for model in self.models)
 
     def member(self, output: str) -> Member:
         """The member that writes a channel.
@@ -402,7 +402,7 @@ def _check_circles(models: Sequence[Member], wiring: Wiring) -> None:
         raise ConfigError(
             "the models cannot be wired",
             expected="models that read lagged samples (ARX, NARX) where some read each other in a circle",
-            got=", ".join(f"{model.mapping} {model.structure.label}" for model in alone),
+            got=", ".join(f"{model.mapping} {model.label}" for model in alone),
             remedy="fit it as ARX or NARX, or open the circle",
         )
 

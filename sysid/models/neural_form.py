@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -15,6 +16,7 @@ from sysid.kernels.neurons import code_of
 from sysid.models.activations import PLAIN
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
+from sysid.models.neural_sizes import Sizes
 from sysid.models.scaling import Scaling, VectorScaling
 
 STATE_BOUND = 10.0
@@ -35,86 +37,18 @@ CORRECTIONS = 50
 """Levenberg-Marquardt steps at most to find the state that a history shows; mostly a handful suffice."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Sizes:
-    """Where each part of the flat parameters ``[M | W | V | L | Wy | v | E]`` stands; the kernel has the equations.
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Scaled inputs and outputs of a history, and which samples are not masked."""
 
-    ``E``, of shape ``(n_states, n_inputs + n_outputs + 1)``, takes the oldest sample of a history (scaled inputs,
-    scaled outputs, 1) to the state there.
+    inputs: NDArray[np.float64]
+    output: NDArray[np.float64]
+    known: NDArray[np.bool_]
 
-    Args:
-        states: ``n``.
-        inputs: ``m``.
-        neurons: ``k``, in the state equation.
-        output_neurons: ``q``, in the output equation.
-        outputs: ``o``.
-
-    Example:
-        >>> Sizes(states=2, inputs=1, neurons=5, output_neurons=0).count
-        48
-    """
-
-    states: int
-    inputs: int
-    neurons: int
-    output_neurons: int
-    outputs: int = 1
-
-    @property
-    def row(self) -> int:
-        """Length of ``z = [x; u; 1]``."""
-        return self.states + self.inputs + 1
-
-    @property
-    def dynamic(self) -> slice:
-        """``M``, ``W`` and ``V``: the state equation."""
-        return slice(0, (self.states + self.neurons) * self.row + self.states * self.neurons)
-
-    @property
-    def linear(self) -> slice:
-        """``M``."""
-        return slice(0, self.states * self.row)
-
-    @property
-    def hidden(self) -> slice:
-        """``W``."""
-        return slice(self.linear.stop, self.linear.stop + self.neurons * self.row)
-
-    @property
-    def readout(self) -> slice:
-        """``V``."""
-        return slice(self.hidden.stop, self.dynamic.stop)
-
-    @property
-    def output(self) -> slice:
-        """``L``, ``Wy`` and ``v``: the output equation."""
-        start = self.dynamic.stop
-        return slice(start, start + self.outputs * (self.row + self.output_neurons) + self.output_neurons * self.row)
-
-    @property
-    def output_linear(self) -> slice:
-        """``L``."""
-        return slice(self.output.start, self.output.start + self.outputs * self.row)
-
-    @property
-    def output_hidden(self) -> slice:
-        """``Wy``."""
-        return slice(self.output_linear.stop, self.output_linear.stop + self.output_neurons * self.row)
-
-    @property
-    def output_readout(self) -> slice:
-        """``v``."""
-        return slice(self.output_hidden.stop, self.output.stop)
-
-    @property
-    def start(self) -> slice:
-        """``E``: the map to the initial state."""
-        return slice(self.output.stop, self.output.stop + self.states * (self.inputs + self.outputs + 1))
-
-    @property
-    def count(self) -> int:
-        """Number of parameters."""
-        return int(self.start.stop)
+    @classmethod
+    def of(cls, scaled: NDArray[np.float64], output: NDArray[np.float64], known: NDArray[np.bool_] | None) -> Seen:
+        """Samples, all of which are known by default."""
+        return cls(scaled, output, np.ones(len(output), dtype=np.bool_) if known is None else known)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -152,13 +86,18 @@ class NeuralForm(AbstractForm):
         theta = np.array(self.theta, dtype=np.float64)
         theta.setflags(write=False)
         object.__setattr__(self, "theta", theta)
-        if theta.shape != (self.sizes.count,):
+        if theta.shape != (self._count,):
             raise TraceError(
                 "the parameter vector does not fit the structure",
-                expected=f"{self.sizes.count} parameters",
+                expected=f"{self._count} parameters",
                 got=f"shape {theta.shape}",
                 remedy="use parameters that were fitted with this structure",
             )
+
+    @property
+    def _count(self) -> int:
+        """Number of parameters."""
+        return self.sizes.count
 
     @property
     def numbers(self) -> NDArray[np.float64]:
@@ -240,24 +179,56 @@ class NeuralForm(AbstractForm):
         Returns:
             Shape ``(n_states,)``.
         """
-        seen = _Seen(scaled, output, np.ones(len(output), dtype=np.bool_) if known is None else known)
+        seen = Seen.of(scaled, output, known)
         # From what is expected the output may not show the way: descents begin all around.
-        expected = x
         around = [x, np.clip(x, -1.0, 1.0), np.zeros(len(x)), *np.eye(len(x)), *-np.eye(len(x))]
         if self.rectified:
             # Across the kink of an absolute value no descent leads. With either sign given there is no kink.
-            signed = replace(self, rectified=False, low=-np.inf, high=np.inf)
-            n = self.sizes.outputs
-            around += [
-                signed._descended(replace(seen, output=np.array(signs) * output), expected, expected, HISTORY_NOISE)
-                for signs in product((1.0, -1.0), repeat=n if n <= MOST_SIGNED else 1)
-            ]
+            around += [self.descended_with(signs, seen, x) for signs in self.all_signs]
+        return self.sought(seen, x, around)
+
+    @property
+    def all_signs(self) -> list[tuple[float, ...]]:
+        """Signs that outputs may have which a rectified output hides."""
+        n = self.sizes.outputs
+        return list(product((1.0, -1.0), repeat=n if n <= MOST_SIGNED else 1))
+
+    def descended_with(
+        self, signs: tuple[float, ...], seen: Seen, expected: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The state before some samples of a rectified output, if the outputs had these signs.
+
+        Args:
+            signs: Of the outputs.
+            seen: The samples.
+            expected: State expected, shape ``(n_states,)``.
+
+        Returns:
+            Shape ``(n_states,)``.
+        """
+        signed = replace(self, rectified=False, low=-np.inf, high=np.inf)
+        wanted = replace(seen, output=np.array(signs) * seen.output)
+        return signed._descended(wanted, expected, expected, HISTORY_NOISE)
+
+    def sought(
+        self, seen: Seen, expected: NDArray[np.float64], around: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """The state before some samples, by descents from some.
+
+        Args:
+            seen: The samples.
+            expected: State expected, shape ``(n_states,)``.
+            around: Where descents begin, each of this shape.
+
+        Returns:
+            Shape ``(n_states,)``.
+        """
         descents = [self._descended(seen, begin, expected, HISTORY_NOISE) for begin in around]
         found = min(descents, key=lambda x: self._misfit(seen, x, expected, HISTORY_NOISE))
         # The less the state leaves of the output, the less what was expected has a say.
-        noise, spare = HISTORY_NOISE, int(np.count_nonzero(seen.known)) * self.sizes.outputs - len(x)
+        noise, spare = HISTORY_NOISE, int(np.count_nonzero(seen.known)) * self.sizes.outputs - len(expected)
         for _ in range(SHARPENED if spare > 0 else 0):
-            level = max(float(np.linalg.norm(self._away(seen, found))) / spare**0.5, LEAST_NOISE)
+            level = max(float(np.linalg.norm(self.away(seen, found))) / spare**0.5, LEAST_NOISE)
             if not level < noise / 2.0:
                 break
             noise = level
@@ -265,14 +236,14 @@ class NeuralForm(AbstractForm):
         return found
 
     def _descended(
-        self, seen: _Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float
+        self, seen: Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float
     ) -> NDArray[np.float64]:
         """Levenberg-Marquardt from one state."""
         n = len(x)
         damping, best = 1e-3, self._misfit(seen, x, expected, noise)
         for _ in range(CORRECTIONS):
             J = self._linearised(seen.inputs, x)[seen.known].reshape(-1, n)
-            away = self._away(seen, x)[seen.known].ravel()
+            away = self.away(seen, x)[seen.known].ravel()
             if not np.isfinite(J).all():
                 break
             # By orthogonal factors: squared, the precision of a state that is seen well leaves no digit to the others.
@@ -378,19 +349,18 @@ class NeuralForm(AbstractForm):
         kernel.sensitivities(scaled, x.copy(), S, *self.arguments(self.theta), y, J)
         return J[:, :, dynamic : dynamic + n]
 
-    def _away(self, seen: _Seen, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Outputs minus what was seen, zero where that is masked."""
+    def away(self, seen: Seen, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Outputs minus what was seen, zero where that is masked.
+
+        Args:
+            seen: The samples.
+            x: State before the first of them, shape ``(n_states,)``.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``, in scaled numbers.
+        """
         return np.where(seen.known[:, None], self.run(seen.inputs, x.copy()) - seen.output, 0.0)
 
-    def _misfit(self, seen: _Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float) -> float:
-        away = self._away(seen, x).ravel()
+    def _misfit(self, seen: Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float) -> float:
+        away = self.away(seen, x).ravel()
         return float(away @ away / noise**2 + np.sum((x - expected) ** 2))
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """Scaled inputs and outputs of a history, and which samples are not masked."""
-
-    inputs: NDArray[np.float64]
-    output: NDArray[np.float64]
-    known: NDArray[np.bool_]

@@ -18,7 +18,9 @@ from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP
-from sysid.models.neural_form import NeuralForm, Sizes
+from sysid.models.neural_ensemble import NeuralEnsemble, check_shares
+from sysid.models.neural_form import NeuralForm
+from sysid.models.neural_sizes import Sizes
 from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.structure import AbstractStructure
 
@@ -148,12 +150,15 @@ class _NeuralModel(AbstractModel):
     sample_time: float
     input_units: tuple[str, ...]
     clamp: float = CLAMP
+    shares: tuple[int, ...] = (1,)
 
     def __post_init__(self) -> None:
         theta = np.array(self.theta, dtype=np.float64)
         theta.setflags(write=False)
         object.__setattr__(self, "theta", theta)
         object.__setattr__(self, "input_units", tuple(self.input_units))
+        object.__setattr__(self, "shares", tuple(self.shares))
+        check_shares(self.shares)
 
     @property
     def structure(self) -> NeuralStateSpace:
@@ -166,17 +171,29 @@ class _NeuralModel(AbstractModel):
         return len(self.theta)
 
     @property
+    def n_together(self) -> int:
+        """Parameters of one member."""
+        return len(self.theta) // len(self.shares)
+
+    @property
+    def label(self) -> str:
+        """The structure, and how many members an ensemble has."""
+        n = len(self.shares)
+        return self.network.label if n == 1 else f"{self.network.label}, mean of {n}"
+
+    @property
     def recursion(self) -> NeuralForm:
-        """The form that is run."""
-        return NeuralForm(
-            sizes=self.network.sizes(len(self.mapping.inputs), len(self.mapping.outputs)),
-            theta=self.theta,
-            scaling=self.scaling,
-            activation=self.network.activation,
-            rectified=self.network.output == "absolute",
-            low=-self.clamp,
-            high=self.clamp,
-        )
+        """The form that is run: that of an ensemble, where there are several members."""
+        fields: dict[str, Any] = {
+            "sizes": self.network.sizes(len(self.mapping.inputs), len(self.mapping.outputs)),
+            "theta": self.theta,
+            "scaling": self.scaling,
+            "activation": self.network.activation,
+            "rectified": self.network.output == "absolute",
+            "low": -self.clamp,
+            "high": self.clamp,
+        }
+        return NeuralEnsemble(**fields, shares=self.shares) if len(self.shares) > 1 else NeuralForm(**fields)
 
     def output_moves(
         self,
@@ -211,6 +228,7 @@ class _NeuralModel(AbstractModel):
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
             "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
+            **({"shares": list(self.shares)} if len(self.shares) > 1 else {}),  # single ones keep their digest
         }
 
     @staticmethod
@@ -222,6 +240,7 @@ class _NeuralModel(AbstractModel):
             "sample_time": fields["sample_time"],
             "input_units": tuple(fields["input_units"]),
             "clamp": np.inf if fields["clamp"] is None else fields["clamp"],
+            "shares": tuple(fields.get("shares", (1,))),
         }
 
 
@@ -231,7 +250,7 @@ class NeuralStateSpaceModel(_NeuralModel):
 
     Args:
         network: The structure.
-        theta: Flat parameters in scaled numbers (see :class:`Sizes`).
+        theta: Flat parameters in scaled numbers (see :class:`Sizes`), of an ensemble those of its members in turn.
         scaling: Between units and scaled numbers.
         mapping: Which channels go in, which comes out.
         sample_time: Seconds.
@@ -239,6 +258,8 @@ class NeuralStateSpaceModel(_NeuralModel):
         output_unit: Unit of the output.
         rest_output: Output at rest, in its unit.
         clamp: Bound of the output in scaled numbers; infinite for none.
+        shares: Of an ensemble, whose output is the mean of its members', the weight of each as a whole number; the
+            structure is that of one member.
     """
 
     scaling: Scaling
@@ -268,7 +289,7 @@ class VectorNeuralStateSpaceModel(_NeuralModel, SeveralOutputs):
 
     Args:
         network: The structure.
-        theta: Flat parameters in scaled numbers (see :class:`Sizes`).
+        theta: Flat parameters in scaled numbers (see :class:`Sizes`), of an ensemble those of its members in turn.
         scaling: Between units and scaled numbers.
         mapping: Which channels go in, which come out.
         sample_time: Seconds.
@@ -276,6 +297,7 @@ class VectorNeuralStateSpaceModel(_NeuralModel, SeveralOutputs):
         output_units: Unit of each output.
         rest_outputs: Each output at rest, in its unit.
         clamp: Bound of the outputs in scaled numbers; infinite for none.
+        shares: As for one output.
     """
 
     network: VectorNeuralStateSpace

@@ -5,11 +5,12 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -150,6 +151,13 @@ def build_vector_neural(**options) -> VectorNeuralStateSpaceModel:
     )
 
 
+def build_ensemble(build: Callable[..., Any], shares: tuple[int, ...], **options) -> Any:
+    """Members of one structure that differ a little."""
+    one, rng = build(**options), np.random.default_rng(11)
+    thetas = [one.theta * (1.0 + 0.1 * rng.normal(size=one.theta.size)) for _ in shares]
+    return replace(one, theta=np.concatenate(thetas), shares=shares)
+
+
 def build_polynomial(orders: AbstractPolynomial, theta: list[float]) -> PolynomialModel:
     model = build()
     return PolynomialModel(orders=orders, theta=np.array(theta), **{name: getattr(model, name) for name in TERMS})
@@ -173,6 +181,10 @@ MODELS = {
     ),
     "neural, neurons in the output alone": lambda: build_neural(neurons=0, output_neurons=5),
     "neural, against the bounds of its states": lambda: build_neural(neurons=3, slowest=1.1),
+    "neural, an ensemble": lambda: build_ensemble(build_neural, (2, 1, 1), slowest=0.9, neurons=3, output_neurons=2),
+    "neural, an ensemble of two outputs, absolute": lambda: build_ensemble(
+        build_vector_neural, (1, 1), neurons=3, output="absolute"
+    ),
     "discrete": build,
     "continuous": lambda: build(Domain.CONTINUOUS),
     "without dead time": lambda: build(delays=(0, 0)),

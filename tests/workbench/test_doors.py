@@ -87,6 +87,7 @@ FITS = [
         EVERYWHERE, id="NARX gated, an ensemble",
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
+    pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2, "ensemble": 2}, ALONE, id="NSS, an ensemble"),
     pytest.param(GREY, {"seed": 7, "max_iterations": 12, "starts": 2}, ALONE, id="GreyBox"),
     pytest.param(GREY_BY_CASE, {"seed": 7, "max_iterations": 6, "starts": 1}, ALONE, id="GreyBox by case"),
     pytest.param(VECTOR_GREY, {"seed": 7, "max_iterations": 12, "starts": 1}, ALONE, id="VectorGreyBox, of one"),

@@ -21,10 +21,10 @@ the selection traces most is cast next, until none lowers it by :data:`WORTH`. A
 some inputs takes the mean with it, though: the united network has to pass the check of its free run, where there is
 one, and where it does not, picks are cast once more and it has to after every pick.
 
-Limits: the price of a free run grows with the members; all must agree on what a regressor means, so that hidden states,
-which have no common coordinates, cannot be united; the selection traces choose more often than between single starts,
-so that their score is the less a figure of accuracy; the united network does not stand at a minimum of its own loss, so
-that the posterior there is wider than that of a single fit.
+Limits: the price of a free run grows with the members; all must agree on what a regressor means: hidden states, which
+have no common coordinates, stand side by side (``neural_ensemble.py``); the selection traces choose more often than
+between single starts, so that their score is the less a figure of accuracy; the united network does not stand at a
+minimum of its own loss, so that the posterior there is wider than that of a single fit.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import cast
+from typing import Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,18 +80,22 @@ def check(training: Training, selection: Sequence[Trace]) -> None:
         )
 
 
+Whole = TypeVar("Whole")
+"""What a ballot is about: networks, or their runs, of which the mean is taken as well."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ensemble:
+class Ensemble(Generic[Whole]):
     """Who was selected.
 
     Args:
         picks: For each member its place among the candidates and its picks, in the order of their first pick.
-        model: The united network.
+        model: The united network, or what stands for it.
         score: Its error on the selection traces.
     """
 
     picks: dict[int, int]
-    model: NARXModel
+    model: Whole
     score: float
 
 
@@ -114,7 +118,7 @@ def selected(
     multistart: starts.Multistart,
     candidates: Sequence[starts.Candidate],
     vet: Callable[[starts.Network], bool] | None = None,
-) -> tuple[Ensemble, list[starts.Candidate]] | None:
+) -> tuple[Ensemble[NARXModel], list[starts.Candidate]] | None:
     """The ensemble of the candidates of a multistart.
 
     Args:
@@ -150,6 +154,7 @@ def selected(
         models,
         [c.score for c in usable],
         lambda model: starts.judged(multistart, model)[0],
+        unite=united,
         picks=training.ensemble,
         origins=[c.number for c in usable],
         accept=vet or (lambda _: True),
@@ -160,7 +165,7 @@ def selected(
 
 
 def as_candidate(
-    multistart: starts.Multistart, ensemble: Ensemble, members: Sequence[starts.Candidate], task: Task
+    multistart: starts.Multistart, ensemble: Ensemble[NARXModel], members: Sequence[starts.Candidate], task: Task
 ) -> starts.Candidate:
     """The ensemble as one more candidate of its multistart.
 
@@ -206,16 +211,17 @@ def as_candidate(
 
 
 def elect(
-    models: Sequence[NARXModel],
+    models: Sequence[Whole],
     scores: Sequence[float],
-    score: Callable[[NARXModel], float],
+    score: Callable[[Whole], float],
     *,
+    unite: Callable[[Sequence[Whole], Sequence[int]], Whole],
     picks: int,
     origins: Sequence[int] | None = None,
-    accept: Callable[[NARXModel], bool] = lambda _: True,
+    accept: Callable[[Whole], bool] = lambda _: True,
     workers: int = 1,
     on_pick: Callable[[int], None] = lambda _: None,
-) -> Ensemble | None:
+) -> Ensemble[Whole] | None:
     """Make the picks one after the other, each for the member that helps most.
 
     A check of a free run costs as much as a pick. The one that matters is that of the network that comes out: picks are
@@ -225,6 +231,7 @@ def elect(
         models: The candidates, all of one structure and scaling.
         scores: Error of each on the selection traces; one that is not finite is not eligible.
         score: The error of a model on them.
+        unite: The mean of some, by the picks of each.
         picks: At most so many.
         origins: The start that each candidate comes from; by default each is its own.
         accept: Whether a united network may stand; where picks are cast once more, whoever would make it one that may
@@ -240,6 +247,7 @@ def elect(
         models,
         scores,
         score,
+        unite=unite,
         picks=picks,
         origins=origins or range(len(models)),
         workers=workers,
@@ -250,24 +258,26 @@ def elect(
 
 
 def _cast(
-    models: Sequence[NARXModel],
+    models: Sequence[Whole],
     scores: Sequence[float],
-    score: Callable[[NARXModel], float],
+    score: Callable[[Whole], float],
     *,
+    unite: Callable[[Sequence[Whole], Sequence[int]], Whole],
     picks: int,
     origins: Sequence[int],
-    accept: Callable[[NARXModel], bool],
+    accept: Callable[[Whole], bool],
     workers: int,
     on_pick: Callable[[int], None],
-) -> Ensemble | None:
+) -> Ensemble[Whole] | None:
     """The picks made, each checked; see :func:`elect`."""
     order = sorted((i for i, value in enumerate(scores) if np.isfinite(value)), key=lambda i: scores[i])
-    eligible, found, ensemble = order[:ELIGIBLE], dict(enumerate(scores)), None
+    eligible, found = order[:ELIGIBLE], dict(enumerate(scores))
+    ensemble: Ensemble[Whole] | None = None
     with ThreadPoolExecutor(workers) as pool:
         for pick in range(1, picks + 1):
             on_pick(pick)
             selected = Counter(ensemble.picks) if ensemble else Counter[int]()
-            networks = {i: _of(models, selected + Counter([i])) for i in eligible}
+            networks = {i: _of(models, selected + Counter([i]), unite) for i in eligible}
             if ensemble:
                 found = dict(zip(eligible, pool.map(score, networks.values()), strict=True))
             bar = (1.0 - WORTH) * ensemble.score if ensemble else np.inf
@@ -285,8 +295,8 @@ def _cast(
 def _first_accepted(
     ranked: Sequence[int],
     origins: Sequence[int],
-    networks: Mapping[int, NARXModel],
-    accept: Callable[[NARXModel], bool],
+    networks: Mapping[int, Whole],
+    accept: Callable[[Whole], bool],
 ) -> tuple[int | None, set[int]]:
     """Who is picked, and the starts that are passed over from now on."""
     barred: set[int] = set()
@@ -299,8 +309,10 @@ def _first_accepted(
     return None, barred
 
 
-def _of(models: Sequence[NARXModel], picks: Counter[int]) -> NARXModel:
-    return united([models[i] for i in picks], list(picks.values()))
+def _of(
+    models: Sequence[Whole], picks: Counter[int], unite: Callable[[Sequence[Whole], Sequence[int]], Whole]
+) -> Whole:
+    return unite([models[i] for i in picks], list(picks.values()))
 
 
 def united(members: Sequence[NARXModel], picks: Sequence[int]) -> NARXModel:

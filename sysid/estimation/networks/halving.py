@@ -16,20 +16,21 @@ on, what the selection traces say of a start is noise; they choose at the end, a
 T = TypeVar("T")
 
 
-def better_half(ranked: Sequence[T]) -> Sequence[T]:
+def better_half(ranked: Sequence[T], least: int = 1) -> Sequence[T]:
     """Who goes on after a look.
 
     Args:
         ranked: The best first.
+        least: So many go on in any case.
 
     Returns:
         Half of them, the larger one of an odd number.
 
     Example:
-        >>> better_half("abc"), better_half("a")
-        ('ab', 'a')
+        >>> better_half("abc"), better_half("a"), better_half("abcdef", least=4)
+        ('ab', 'a', 'abcd')
     """
-    return ranked[: (len(ranked) + 1) // 2]
+    return ranked[: max((len(ranked) + 1) // 2, least)]
 
 
 def rungs_of(training: Training) -> tuple[float, ...]:
@@ -44,11 +45,12 @@ def rungs_of(training: Training) -> tuple[float, ...]:
     return RUNGS if training.n_starts > 1 else RUNGS[-1:]
 
 
-def planned_iterations(training: Training) -> float:
+def planned_iterations(training: Training, least: int = 1) -> float:
     """Iterations of the whole multistart, all starts together, if none of them converges early.
 
     Args:
         training: How to train.
+        least: Starts that are trained to their end.
 
     Returns:
         Their number.
@@ -59,21 +61,24 @@ def planned_iterations(training: Training) -> float:
         >>> round(planned_iterations(Training(max_iterations=100, starts=8)))
         176
     """
-    return training.max_iterations * turns(training.n_starts, rungs_of(training), 1)
+    return training.max_iterations * turns(training.n_starts, rungs_of(training), 1, least)
 
 
-def turns(starts: int, rungs: Sequence[float], workers: int) -> float:
+def turns(starts: int, rungs: Sequence[float], workers: int, least: int = 1) -> float:
     """How long the whole multistart takes where so many starts run at the same time.
 
     Args:
         starts: How many there are.
         rungs: Shares of the iterations after which half of them are dropped.
         workers: Starts that run side by side.
+        least: Starts that are trained to their end.
 
     Returns:
         In units of one start's run, if none converges early.
     """
     taken, before, n = 0.0, 0.0, starts
     for share in rungs:
-        taken, before, n = taken + math.ceil(n / workers) * (share - before), share, max(1, (n + 1) // 2)
+        taken, before, n = (
+            taken + math.ceil(n / workers) * (share - before), share, len(better_half(range(n), least))
+        )  # fmt: skip
     return taken

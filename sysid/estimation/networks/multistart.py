@@ -90,6 +90,8 @@ class Multistart:
     learnt: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda theta: theta
     """From trained parameters to the same with those that no residual reads, such as a map to a state."""
     until: float = math.inf
+    least: int = 1
+    """Starts that are trained to their end, whoever is ahead: those that an ensemble unites."""
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
     """Where the runs of this multistart, and of others of the same fit, are kept."""
     name: str = ""
@@ -196,7 +198,7 @@ def run(multistart: Multistart) -> list[Candidate]:
     numbers = list(range(training.n_starts))
     latest: dict[int, Candidate] = {}
     seen: list[Candidate] = []
-    total = turns(training.n_starts, rungs, training.workers)
+    total = turns(training.n_starts, rungs, training.workers, multistart.least)
     # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
     with one_blas_thread():
         for rung, share in enumerate(rungs):
@@ -204,13 +206,13 @@ def run(multistart: Multistart) -> list[Candidate]:
             seconds = training.max_time_s * (share - before) / total
             reached = _rung(multistart, numbers, latest, share, seconds)
             if rung == 0:  # the time of those that were left out is the others'
-                total = turns(len(reached), rungs, training.workers)
+                total = turns(len(reached), rungs, training.workers, multistart.least)
             seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
             if multistart.stop.is_set():
                 break
             latest = reached
             order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
-            numbers = [candidate.number for candidate in better_half(order)]
+            numbers = [candidate.number for candidate in better_half(order, multistart.least)]
     return seen
 
 
@@ -336,7 +338,7 @@ def _pretraining(
                 max_iterations=training.max_iterations,
                 mse=entry.mse * scale,
                 elapsed_s=entry.elapsed_s,
-                fraction=min(1.0, sum(multistart.iterations.values()) / planned_iterations(training)),
+                fraction=min(1.0, sum(multistart.iterations.values()) / planned_iterations(training, multistart.least)),
             )
         )
 
@@ -402,7 +404,7 @@ def _in_basis(multistart: Multistart, theta: NDArray[np.float64]) -> NDArray[np.
 def _engine(multistart: Multistart, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
     training = multistart.training
     scale = multistart.template.scaling.error_unit
-    planned = planned_iterations(training)
+    planned = planned_iterations(training, multistart.least)
 
     def report(entry: Iteration) -> None:
         multistart.iterations[number] = entry.iteration

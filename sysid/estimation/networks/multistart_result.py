@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.attempts import Attempt
 from sysid.estimation.networks import multistart as starts
-from sysid.estimation.networks.choosing import Choice
+from sysid.estimation.networks.choosing import Choice, rank
 from sysid.estimation.networks.training import Training
 from sysid.estimation.result import FitResult, Status
 from sysid.models import History
@@ -118,8 +118,9 @@ def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[A
 def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
     notes = []
     if training.n_starts > 1:
-        by_selection = choice.by != "evidence" and np.isfinite(choice.chosen.score)
-        by_evidence = choice.by != "loss" and choice.chosen.solution.evidence is not None
+        one = min((c for c in candidates if not c.members), key=lambda c: rank(c, choice.by))
+        by_selection = choice.by != "evidence" and np.isfinite(one.score)
+        by_evidence = choice.by != "loss" and one.solution.evidence is not None
         how = "the largest evidence" if by_evidence else "the least error on the estimation traces"
         how = "the least error on the selection traces (geometric mean)" if by_selection else how
         begun = len({one.number for one in candidates if not one.members})
@@ -129,15 +130,15 @@ def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Tra
                 f"Of {training.n_starts} starts {begun} had a place in {training.max_time_s:.3g} s, as iterations are "
                 "slow; more time (max_time_s) lets the others begin."
             )
-    if choice.chosen.members:
+    if choice.chosen.members and np.isfinite(choice.chosen.score):
         single = [
             c.score
             for c, stable in zip(candidates, choice.stable, strict=True)
             if not c.members and stable is not False and np.isfinite(c.score)
         ]
         notes.append(
-            f"An ensemble: the mean of {len(choice.chosen.members)} one-step maps as one network. Its error on the "
-            f"selection traces is {choice.chosen.score:.3g}, that of the best single start {min(single):.3g}."
+            f"An ensemble of {len(choice.chosen.members)} picks: its error on the selection traces is "
+            f"{choice.chosen.score:.3g}, that of the best single start {min(single, default=np.nan):.3g}."
         )
     refused = sum(stable is False for stable in choice.stable)
     if refused and any(choice.stable):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -248,6 +248,34 @@ class NeuralProvider(AbstractProvider):
             total += np.sum(weights * (y - record.target) ** 2, axis=0)
             counted += weights.sum(axis=0)  # with the weights of outputs, which thus are none
         return np.asarray(total / counted)
+
+    def there_and_back(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """Scaled outputs over each record, and from there on over its inputs backwards, with signs and without bounds.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            One array of shape ``(2 * n_samples, n_outputs)`` per record.
+        """
+        form = replace(self.at(theta), rectified=False, low=-np.inf, high=np.inf)
+        return tuple(form.run(np.concatenate([r.u, r.u[::-1]]), self._begin(r, theta)) for r in self._records)
+
+    def loss_of(self, outputs: Sequence[NDArray[np.float64]]) -> float:
+        """Half the weighted sum of squared residuals of given runs.
+
+        Args:
+            outputs: For each record scaled outputs with signs and without bounds, shape ``(n_samples, n_outputs)``.
+
+        Returns:
+            The loss.
+        """
+        form, total = self.template, 0.0
+        for record, signed in zip(self._records, outputs, strict=True):
+            y = np.clip(np.abs(signed) if form.rectified else signed, form.low, form.high)
+            residual = record.weighted(y - record.target)
+            total += 0.5 * float(residual @ residual)
+        return total
 
     def at(self, theta: NDArray[np.float64]) -> NeuralForm:
         """The form with these parameters.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
@@ -9,6 +10,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.clock import now
@@ -18,6 +20,7 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
+from sysid.estimation.networks.neural_ensemble import United, united
 from sysid.estimation.networks.neural_map import learnt_map
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
@@ -29,6 +32,7 @@ from sysid.estimation.result import FitResult
 from sysid.models import (
     AbstractStructure,
     Mapping,
+    NeuralEnsemble,
     NeuralStateSpace,
     NeuralStateSpaceModel,
     Scaling,
@@ -44,8 +48,28 @@ STARTS = 6
 checkpoint, all of them take some 1.6 times the iterations of one."""
 
 
-check_training = partial(check_hidden_states, "a neural state space")
-"""Refuses options that do not apply to hidden states."""
+SPARE = 1.5
+"""Starts of a fit that asks for none, for each member of an ensemble: not all will be among them."""
+
+
+def check_training(training: Training) -> None:
+    """Refuse options that do not apply to hidden states.
+
+    Args:
+        training: How to train.
+
+    Raises:
+        ConfigError: If there are some, or an ensemble has more members than there are starts.
+    """
+    check_hidden_states("a neural state space", training, unites=True)
+    if training.starts is not None and training.starts < training.ensemble:
+        raise ConfigError(
+            "an ensemble has more members than there are starts",
+            where="ensemble",
+            expected=f"at most starts: {training.starts}",
+            got=training.ensemble,
+            remedy="raise starts, or leave it out for as many as are needed",
+        )
 
 
 LINEAR_SHARE, LINEAR_SHARE_GIVEN = 0.3, 0.1
@@ -202,8 +226,9 @@ def _fit(
 ) -> FitResult:
     """Fit a model of any number of outputs."""
     began = now()
-    training = (training or Training()).with_starts(STARTS)
+    training = training or Training()
     check_training(training)
+    training = training.with_starts(max(STARTS, math.ceil(SPARE * training.ensemble) if training.ensemble > 1 else 0))
     experiments, windows = records.experiments, Windows.of(records.experiments, training)
     provider = NeuralProvider(template=template.recursion, experiments=windows.experiments)
     starts.check_samples(provider)
@@ -218,16 +243,26 @@ def _fit(
         template=template,
         selection=records.selection,
         start=records.start,
-        initial=None if records.initial is None else records.initial.model.recursion.numbers,
+        initial=None if records.initial is None else _numbers(records.initial),
         on_progress=on_progress,
         learnt=partial(learnt_map, provider),
         checkpoints=checkpoints_of(on_progress),
         # A fit whose linear start took all of its time would be that start alone.
+        least=training.ensemble,
         until=max(starts.deadline(began, training, on_progress), now() + LEAST_FREE * training.max_time_s),
     )
     candidates = starts.run(multistart)
-    candidates += reweighted(multistart, provider, choose(candidates, training.choose_by).chosen)
-    choice = choose(candidates, training.choose_by, vet)
+    for best in _ends(candidates, training):
+        candidates += reweighted(multistart, provider, best)
+    whole = None
+    if training.ensemble > 1 and not multistart.stop.is_set():
+        whole = united(multistart, provider, candidates)
+    choice = (
+        choose(candidates, training.choose_by, vet)
+        if whole is None
+        else whole.choice(candidates, training.choose_by, vet)
+    )
+    candidates += [] if whole is None else [whole.candidate]
     if windows.samples:
         race = choice.chosen
         provider = replace(provider, experiments=experiments)
@@ -248,20 +283,34 @@ def _fit(
         [(e.inputs, e.history) for e in (*experiments, *others)],
         interrupted=multistart.stop.is_set(),
     )
-    posterior = _posterior(choice.chosen, provider, records)
+    posterior = _posterior(choice.chosen, provider, records, whole)
     seconds = multistart.checkpoints.earlier_s + now() - began
     found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
-    return replace(found, posterior=posterior)
+    notes = () if whole is None else whole.notes(choice)
+    return replace(found, posterior=posterior, notes=(*found.notes, *notes))
 
 
-def _posterior(chosen: starts.Candidate, provider: NeuralProvider, records: Records) -> Posterior | None:
+def _ends(candidates: Sequence[starts.Candidate], training: Training) -> list[starts.Candidate]:
+    """The best candidate; for an ensemble every start that was trained to its end."""
+    if training.ensemble == 1:
+        return [choose(candidates, training.choose_by).chosen]
+    return list({one.number: one for one in candidates[-training.ensemble :]}.values())
+
+
+def _posterior(
+    chosen: starts.Candidate, provider: NeuralProvider, records: Records, whole: United | None
+) -> Posterior | None:
     """Of the model's weights; those of its map to an initial state only where a record begins by it."""
     model = chosen.model
-    to_plain = np.eye(model.n_parameters, provider.n_parameters)
-    if provider.all_free:
-        to_plain[provider.template.sizes.start] = 0.0
     runs, others = records.runs(model)
-    found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
+    unread = provider.template.sizes.start if provider.all_free else None
+    if whole is not None and chosen is whole.candidate:
+        found = whole.posterior(runs, unread)
+    else:
+        to_plain = np.eye(model.n_parameters, provider.n_parameters)
+        if unread is not None:
+            to_plain[unread] = 0.0
+        found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
     return None if found is None else calibrate(found, model, others)
 
 
@@ -282,6 +331,12 @@ def check_neural_initial(network: AbstractStructure, initial: AbstractStructure,
             expected=network.label, got=initial.label,
             remedy="start from a fit of the same structure, or leave initial out",
         )  # fmt: skip
+
+
+def _numbers(initial: FitResult) -> NDArray[np.float64]:
+    """The parameters of an initial fit; of an ensemble those of its first member, the best of them."""
+    form = initial.model.recursion
+    return (form.members[0] if isinstance(form, NeuralEnsemble) else form).numbers
 
 
 def _scaling(initial: FitResult) -> Any:

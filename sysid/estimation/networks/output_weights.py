@@ -67,7 +67,7 @@ def reweighted(multistart: Multistart, provider: NeuralProvider, best: Candidate
         if np.abs(np.log(np.divide(anew.output_weights, provider.output_weights))).max() < ALIKE:
             break
         provider = anew
-        name = f"outputs by their noise, {turn + 1}"
+        name = f"start {best.number + 1}, outputs by their noise, {turn + 1}"
         best = advanced(multistart, provider, best, name=name, iterations=iterations)
         found.append(best)
     return found

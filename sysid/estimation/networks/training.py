@@ -95,7 +95,9 @@ class Training(TypedFields):
             on over all samples (``windows.py``). By default 5,000 where the records have more than 200,000 samples
             together; 0 for never.
         ensemble: Picks that unite candidates of the multistart into one network whose one-step map is the mean of
-            theirs (``ensemble.py``), selected on the selection traces; 1 for none. Each member adds its neurons.
+            theirs (``ensemble.py``), selected on the selection traces; 1 for none. Each member adds its neurons. Of
+            hidden states so many starts at most as one model whose free run is the mean of theirs
+            (``neural_ensemble.py``); each adds its states.
         input_subsets: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs
             and networks that do without each of the sets (``input_subsets.py``), for an ensemble whose members differ
             in what they rely on. All see everything by default.
@@ -219,12 +221,13 @@ LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_s
 """Options of a training that concern lagged regressors."""
 
 
-def check_hidden_states(name: str, training: Training) -> None:
+def check_hidden_states(name: str, training: Training, *, unites: bool = False) -> None:
     """Refuse what does not apply to hidden states.
 
     Args:
         name: What is trained, with an article.
         training: How to train.
+        unites: Whether its starts can be united.
 
     Raises:
         ConfigError: If it is for one step ahead, or has options that are for lagged regressors alone.
@@ -237,7 +240,8 @@ def check_hidden_states(name: str, training: Training) -> None:
             got=training.loop.value,
             remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
         )
-    strangers = [option for option in LAGGED_ONLY if getattr(training, option) != getattr(Training(), option)]
+    strange = [option for option in LAGGED_ONLY if not (unites and option == "ensemble")]
+    strangers = [option for option in strange if getattr(training, option) != getattr(Training(), option)]
     if strangers:
         raise ConfigError(
             f"{name} is not trained with {', '.join(strangers)}",

@@ -100,7 +100,7 @@ def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, w
     look = {"color": PALETTE[number % len(PALETTE)], "linestyle": DASHES[number % len(DASHES)]}
     for view in views:
         response = view.responses(w)[0]
-        above.loglog(w, np.abs(response), label=fit.model.structure.label, **look)
+        above.loglog(w, np.abs(response), label=fit.model.label, **look)
         phase = np.degrees(np.unwrap(np.angle(response)))
         measured = np.degrees(found.phase[np.isfinite(found.phase[:, 0]), 0]) if len(found.phase) else phase
         turns = 360.0 * np.round((measured[0] - phase[0]) / 360.0) if len(measured) else 0.0

@@ -179,7 +179,7 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: Tr
         "system": ready.system,
         "model_slug": ready.model_slug or ready.config.slug,
         "structure": model.structure.to_dict(),
-        "label": model.structure.label,
+        "label": model.label,
         "loop": fit.loop.value,
         "train_time_s": fit.train_time_s,
         "status": fit.status.name,
@@ -297,7 +297,7 @@ def _system(name: str, outputs: Sequence[FitReady]) -> dict[str, Any]:
     return {
         "name": name,
         "mapping": str(whole),
-        "label": outputs[0].fit.model.structure.label,
+        "label": outputs[0].fit.model.label,
         "fits": {ready.output: ready.config.name for ready in outputs},
         "models": len(models),
         "n_parameters": sum(fit.model.n_parameters for fit in models.values()),

@@ -54,7 +54,7 @@ def run_name(ready: FitReady) -> str:
     """
     model = ready.fit.model
     mapping = shortened(visible(ready.pipeline.mapping), 180)
-    return f"{mapping} · {model.structure.label} · {ready.fit.loop.value}"
+    return f"{mapping} · {model.label} · {ready.fit.loop.value}"
 
 
 def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
@@ -73,7 +73,7 @@ def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:
             "pipeline": run.pipeline,
             "pipeline_run": run.run_id,
             "fit": ready.config.name,
-            "structure": ready.fit.model.structure.label,
+            "structure": ready.fit.model.label,
             "loop": ready.fit.loop.value,
             "status": ready.fit.status.name,
             "data": data.traces.name,
@@ -123,7 +123,7 @@ def parameters(ready: FitReady) -> dict[str, str]:
         "chosen_kind": model.structure.kind,
         "chosen_loop": ready.fit.loop.value,
         "chosen_parameters": model.n_parameters,
-        "chosen_structure": model.structure.label,
+        "chosen_structure": model.label,
         "error_unit": squared(ready.unit),
         "mapping": ready.pipeline.mapping,
         "start": ready.pipeline.start.kind.value,
@@ -238,7 +238,7 @@ def _picture(ready: FitReady, case: CaseResult) -> NDArray[np.uint8]:
         case.time,
         case.target,
         case.simulated,
-        title=f"{case.case}, {case.role.value}: {model.structure.label}, {ready.fit.loop.value} loop",
+        title=f"{case.case}, {case.role.value}: {model.label}, {ready.fit.loop.value} loop",
         label=ready.output,
         unit=ready.unit,
     )

@@ -1,4 +1,4 @@
-"""Committees: one network that is the mean of several, selected where a pick helps."""
+"""Ensembles: one network that is the mean of several, selected where a pick helps."""
 
 from collections import Counter
 from dataclasses import replace
@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sysid.errors import ConfigError
-from sysid.estimation import Loop, Status, Training, fit_narx, fit_neural_state_space
+from sysid.estimation import Loop, Status, Training, fit_narx
 from sysid.estimation.networks.ensemble import ELIGIBLE, WORTH, elect, united
-from sysid.models import NARX, Mapping, NARXModel, NeuralStateSpace, Scaling
+from sysid.models import NARX, Mapping, NARXModel, Scaling
 from sysid.models.recursion import parameter_count
 from sysid.validation import predict_interval
 from tests.estimation.tank import TANK
@@ -80,7 +80,7 @@ def distance(target: float):
 def test_picks_go_to_whoever_helps_most_and_more_than_once_if_need_be():
     models = [linear(0.0), linear(4.0), linear(9.0)]
     score = distance(4.0 / 3.0)  # (0 + 0 + 4) / 3
-    ensemble = elect(models, [score(m) for m in models], score, picks=4)
+    ensemble = elect(models, [score(m) for m in models], score, unite=united, picks=4)
     assert Counter(ensemble.picks) == Counter({0: 2, 1: 1})
     assert ensemble.score == pytest.approx(score(ensemble.model))
     assert ensemble.score < min(score(m) for m in models)
@@ -89,7 +89,7 @@ def test_picks_go_to_whoever_helps_most_and_more_than_once_if_need_be():
 def test_no_pick_is_cast_that_brings_too_little():
     models = [linear(0.0), linear(0.01)]
     score = distance(0.5)
-    ensemble = elect(models, [score(m) for m in models], score, picks=6)
+    ensemble = elect(models, [score(m) for m in models], score, unite=united, picks=6)
     assert ensemble.score > (1.0 - WORTH) * score(models[1])
     assert ensemble.picks == {1: 1}
 
@@ -98,7 +98,7 @@ def test_no_more_picks_are_cast_than_there_are():
     models = [linear(0.0), linear(1.0)]
     score = distance(np.pi / 6.0)
     seen = []
-    ensemble = elect(models, [score(m) for m in models], score, picks=3, on_pick=seen.append)
+    ensemble = elect(models, [score(m) for m in models], score, unite=united, picks=3, on_pick=seen.append)
     assert sum(ensemble.picks.values()) <= 3
     assert seen == list(range(1, 1 + len(seen)))
 
@@ -112,10 +112,10 @@ def test_whoever_makes_it_unstable_is_passed_over_with_all_of_his_start():
         seen.append(float(model.recursion.constant))
         return seen[-1] not in {2.0, 2.1}  # with either of the second start
 
-    ensemble = elect(models, [1.0, 2.0, 2.0, 3.0], score, picks=2, origins=[0, 1, 1, 2], accept=accept)
+    ensemble = elect(models, [1.0, 2.0, 2.0, 3.0], score, unite=united, picks=2, origins=[0, 1, 1, 2], accept=accept)
     assert ensemble.picks == {0: 1, 3: 1}
     assert 2.1 not in seen  # one refusal is enough
-    assert elect(models, [1.0, 2.0, 2.0, 3.0], score, picks=2, accept=lambda _: False) is None
+    assert elect(models, [1.0, 2.0, 2.0, 3.0], score, unite=united, picks=2, accept=lambda _: False) is None
 
 
 def test_a_ensemble_that_passes_is_checked_once():
@@ -126,7 +126,7 @@ def test_a_ensemble_that_passes_is_checked_once():
         asked.append(model)
         return True
 
-    ensemble = elect(models, [score(m) for m in models], score, picks=3, accept=accept)
+    ensemble = elect(models, [score(m) for m in models], score, unite=united, picks=3, accept=accept)
     assert sum(ensemble.picks.values()) == 3
     assert asked == [ensemble.model]
 
@@ -134,7 +134,9 @@ def test_a_ensemble_that_passes_is_checked_once():
 def test_the_network_that_was_accepted_is_the_one_that_comes_back():
     models, accepted = [linear(0.0), linear(4.0)], []
     score = distance(2.0)
-    ensemble = elect(models, [1.0, 2.0], score, picks=2, accept=lambda model: accepted.append(model) is None)
+    ensemble = elect(
+        models, [1.0, 2.0], score, unite=united, picks=2, accept=lambda model: accepted.append(model) is None
+    )
     assert ensemble.picks == {0: 1, 1: 1}
     assert ensemble.model is accepted[-1]
 
@@ -148,7 +150,7 @@ def test_whoever_diverged_or_is_far_behind_is_not_eligible():
         asked.append(model.recursion.constant)
         return 1.0
 
-    elect(models, scores, score, picks=2, workers=2)
+    elect(models, scores, score, unite=united, picks=2, workers=2)
     assert len(asked) == ELIGIBLE
     assert min(asked) > -(ELIGIBLE + 1)
     assert max(asked) < 0.0
@@ -221,11 +223,6 @@ def test_a_ensemble_needs_traces_that_elect_it(fields):
     selection = [tank(2)] if fields else []
     with pytest.raises(ConfigError, match="nothing can choose the members of an ensemble"):
         fit_narx([tank(1)], TANK, SMALL, Training(ensemble=2, **fields), selection=selection)
-
-
-def test_hidden_states_have_no_common_coordinates():
-    with pytest.raises(ConfigError, match="ensemble"):
-        fit_neural_state_space([tank(1)], TANK, NeuralStateSpace(states=1, neurons=2), Training(ensemble=2))
 
 
 def test_one_step_ahead_a_ensemble_is_scored_one_step_ahead():

@@ -170,7 +170,7 @@ def test_there_is_no_open_loop():
         fit_neural_state_space([linear(0)], MAPPING, NeuralStateSpace(states=1, neurons=1), Training(loop=Loop.OPEN))
 
 
-@pytest.mark.parametrize("given", [{"pretraining": 100}, {"stride": 2}, {"ensemble": 3}, {"basis": "plain"}], ids=str)
+@pytest.mark.parametrize("given", [{"pretraining": 100}, {"stride": 2}, {"basis": "plain"}], ids=str)
 def test_options_of_lagged_regressors_are_refused(given):
     with pytest.raises(ConfigError, match=next(iter(given))):
         fit_neural_state_space([linear(0)], MAPPING, NeuralStateSpace(states=1, neurons=1), Training(**given))

@@ -1,0 +1,87 @@
+"""Where each part of a neural state space stands in its flat parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sizes:
+    """Where each part of the flat parameters ``[M | W | V | L | Wy | v | E]`` stands; the kernel has the equations.
+
+    ``E``, of shape ``(n_states, n_inputs + n_outputs + 1)``, takes the oldest sample of a history (scaled inputs,
+    scaled outputs, 1) to the state there.
+
+    Args:
+        states: ``n``.
+        inputs: ``m``.
+        neurons: ``k``, in the state equation.
+        output_neurons: ``q``, in the output equation.
+        outputs: ``o``.
+
+    Example:
+        >>> Sizes(states=2, inputs=1, neurons=5, output_neurons=0).count
+        48
+    """
+
+    states: int
+    inputs: int
+    neurons: int
+    output_neurons: int
+    outputs: int = 1
+
+    @property
+    def row(self) -> int:
+        """Length of ``z = [x; u; 1]``."""
+        return self.states + self.inputs + 1
+
+    @property
+    def dynamic(self) -> slice:
+        """``M``, ``W`` and ``V``: the state equation."""
+        return slice(0, (self.states + self.neurons) * self.row + self.states * self.neurons)
+
+    @property
+    def linear(self) -> slice:
+        """``M``."""
+        return slice(0, self.states * self.row)
+
+    @property
+    def hidden(self) -> slice:
+        """``W``."""
+        return slice(self.linear.stop, self.linear.stop + self.neurons * self.row)
+
+    @property
+    def readout(self) -> slice:
+        """``V``."""
+        return slice(self.hidden.stop, self.dynamic.stop)
+
+    @property
+    def output(self) -> slice:
+        """``L``, ``Wy`` and ``v``: the output equation."""
+        start = self.dynamic.stop
+        return slice(start, start + self.outputs * (self.row + self.output_neurons) + self.output_neurons * self.row)
+
+    @property
+    def output_linear(self) -> slice:
+        """``L``."""
+        return slice(self.output.start, self.output.start + self.outputs * self.row)
+
+    @property
+    def output_hidden(self) -> slice:
+        """``Wy``."""
+        return slice(self.output_linear.stop, self.output_linear.stop + self.output_neurons * self.row)
+
+    @property
+    def output_readout(self) -> slice:
+        """``v``."""
+        return slice(self.output_hidden.stop, self.output.stop)
+
+    @property
+    def start(self) -> slice:
+        """``E``: the map to the initial state."""
+        return slice(self.output.stop, self.output.stop + self.states * (self.inputs + self.outputs + 1))
+
+    @property
+    def count(self) -> int:
+        """Number of parameters."""
+        return int(self.start.stop)
