@@ -118,6 +118,8 @@ def _member_step(model: Member, past: dict[str, list[float]]) -> list[float]:
     columns = model.recursion.columns
     if columns is None:
         raise TypeError(f"{model.mapping} is no recursion over lagged regressors")
+    if isinstance(model, GreyBoxModel):
+        return [_MemberTwin(model, past).value()]
     x = []
     for column, (name, lags) in enumerate(zip((*ends.inputs, *ends.outputs), columns.lags.inputs, strict=True)):
         own = column >= len(ends.inputs)
@@ -324,6 +326,23 @@ class EquationTwin:
         linear = self.weights[net.linear]
         total = self.weights[net.readout] @ np.tanh(hidden[:, :n] @ z + hidden[:, n]) + linear[:n] @ z + linear[n]
         return complex(norms[2 * n] * total)
+
+
+class _MemberTwin(EquationTwin):
+    """An equation of a cascade at one sample, of what every channel was before."""
+
+    def __init__(self, model: GreyBoxModel, seen: dict[str, list[float]]) -> None:
+        super().__init__(model, np.empty(0, dtype=np.complex128))
+        self.seen = seen
+        self.memory = {}
+
+    def value(self) -> float:
+        """What it gives."""
+        now = self.values | {name: self.seen[name][-1] for name in self.model.mapping.inputs}
+        return _real(self._of(self.system.definitions[self.model.mapping.output].right, now))
+
+    def _ago(self, name: str, lag: int, now: Dict[str, complex]) -> complex:  # noqa: ARG002 - of one sample only
+        return self.seen[name][-1 - lag]
 
 
 _REMEMBERING = ("relay", "latch", "hold")

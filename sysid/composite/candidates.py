@@ -17,7 +17,7 @@ from sysid.composite.plan import TrainingPlan
 from sysid.composite.stages import Choice, choose_together, fit_member, model_of, one_step_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Training
-from sysid.models import NARXModel
+from sysid.models import AbstractModel, NARXModel
 from sysid.traces import Trace
 
 SEEDS_OF_A_CANDIDATE = 1000
@@ -77,7 +77,7 @@ class Candidates:
         Returns:
             Their models, and the fixed ones.
         """
-        return {name: fits[positions[name]].model for name, fits in self.fits.items()} | self.fixed
+        return {**{name: fits[positions[name]].model for name, fits in self.fits.items()}, **self.fixed}
 
     @property
     def one_step(self) -> Members | None:
@@ -284,7 +284,7 @@ def _choice(
 ) -> Choice:
     """Which candidates the whole does best with."""
     models = {name: [one.model for one in own] for name, own in found.fits.items()}
-    both: Mapping[str, Sequence[NARXModel]] = {**models, **{name: [model] for name, model in found.fixed.items()}}
+    both: Mapping[str, Sequence[AbstractModel]] = {**models, **{name: [model] for name, model in found.fixed.items()}}
     alone = {**found.alone, **dict.fromkeys(found.fixed, 0)}
 
     def make(say: Callable[[str], None]) -> dict[str, Any]:

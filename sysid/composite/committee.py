@@ -99,8 +99,7 @@ def _renamed(model: Member, names: Dict[str, str]) -> Member:
     other = Mapping(
         inputs=(names.get(name, name) for name in mapping.inputs), outputs=(names[name] for name in mapping.outputs)
     )
-    renamed: Member = replace(model, mapping=other)  # type: ignore[type-var]  # every model is a dataclass
-    return renamed
+    return model.over(other)
 
 
 def _limit(limit: Limit, names: Dict[str, str]) -> Limit:

@@ -6,14 +6,19 @@ channels, one set of names for each. Nothing here is trained yet; :mod:`sysid.co
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping as Dict
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from sysid.equations.functions import OWN
+from sysid.equations.syntax import Call, Delayed, nodes_of
+from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training, estimators
-from sysid.models import NARX, AbstractStructure, Limit, Mapping
+from sysid.models import NARX, AbstractStructure, GreyBox, Limit, Mapping
 from sysid.models.cascade_run import Level
+from sysid.models.grey_box import Table, lowered
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,38 +165,87 @@ def _check_structure(mapping: Mapping, structure: AbstractStructure, training: T
 
 @dataclass(frozen=True, kw_only=True)
 class FixedMember(Standing):
-    """A submodel that is declared and not fitted: a weighted sum of its inputs, held between two bounds.
+    """A submodel that is declared and not fitted: an expression of its inputs, held between two bounds.
+
+    A weighted sum has its weights in ``gains``, and runs as one; any other expression is an ``equation``.
 
     Args:
+        equation: The expression, in the language of equations, which reads all inputs and remembers nothing else:
+            ``"max(a, b[k-1])*c"``. Its output's own past is an input under another name.
+        tables: By name the points of functions that it calls.
         gains: The weight of each input, in the output's unit per the input's, or its weights by lag (``{0: 2, 1: -1}``
             looks one sample ahead); under the output's own name the weight of its last value: 1 sums up, more is a
             relay with hysteresis.
         constant: What is added, in the output's unit.
-        low: Least value.
-        high: Greatest value.
+        low: Least value; none by default.
+        high: Greatest value; none by default.
         rest: Value at rest.
         unit: Of the output; a pure number by default.
 
     Raises:
-        ConfigError: If the gains are not those of the inputs, or the bounds do not hold the rest.
+        ConfigError: If the gains, or what the equation reads, are not those of the inputs; if the equation cannot be
+            read, or remembers; or if the bounds do not hold the rest.
     """
 
-    gains: Dict[str, float | Dict[int, float]]
+    gains: Dict[str, float | Dict[int, float]] = field(default_factory=dict)
+    equation: str = ""
+    tables: tuple[Table, ...] | Dict[str, Any] = ()
     constant: float = 0.0
-    low: float
-    high: float
+    low: float = -math.inf
+    high: float = math.inf
     rest: float
     unit: str = "1"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if set(self.gains) - {self.output} != set(self.mapping.inputs):
+        object.__setattr__(self, "tables", self.grey_box.tables if self.equation else tuple(self.tables))
+        if self.equation:
+            self._check_equation()
+        else:
+            self._check_gains()
+        if not self.low <= self.rest <= self.high or self.low == self.high:
+            raise ConfigError(
+                f"the bounds of {self.output} do not hold its rest",
+                where="low, high",
+                expected="low at most rest, rest at most high, low below high",
+                got=f"low {self.low:g}, rest {self.rest:g}, high {self.high:g}",
+                remedy="correct the bounds",
+            )
+
+    @property
+    def points(self) -> dict[str, tuple[tuple[float, float], ...]]:
+        """By table its points."""
+        return dict(self.tables)
+
+    @property
+    def grey_box(self) -> GreyBox:
+        """The equation as a structure without parameters."""
+        return GreyBox(equations=f"{written_name(self.output)} = {self.equation}", tables=self.tables)
+
+    def _check_equation(self) -> None:
+        system = self.grey_box.system
+        lowered(self.grey_box, self.mapping.inputs, (self.output,), None)
+        parts = [node for one in system.equations for node in nodes_of(one.right)]
+        lost = any(isinstance(node, Delayed) and (node.seconds or node.name == self.output) for node in parts)
+        remembers = any(isinstance(node, Call) and node.function in OWN for node in parts)
+        if lost or remembers or self.gains or self.constant or set(system.others) != set(self.mapping.inputs):
+            raise ConfigError(
+                f"the equation of {self.mapping} is none of these inputs",
+                where="equation",
+                expected=f"an expression of {', '.join(self.mapping.inputs)}, now or whole samples ago, that remembers "
+                "nothing, and neither gains nor a constant beside it",
+                got=self.equation,
+                remedy="correct the mapping, or write it under equations: what is remembered is made a channel there",
+            )
+
+    def _check_gains(self) -> None:
+        if set(self.gains) - {self.output} != set(self.mapping.inputs) or self.tables:
             raise ConfigError(
                 f"the gains of {self.mapping} are not those of its inputs",
                 where="gains",
                 expected=f"one for each of {', '.join(self.mapping.inputs)}, with or without {self.output}",
                 got=", ".join(self.gains) or "none",
-                remedy="correct the gains or the mapping",
+                remedy="correct the gains or the mapping, or write an equation, which alone calls tables",
             )
         own = self.gains.get(self.output, 0.0)
         if isinstance(own, Dict):
@@ -212,14 +266,6 @@ class FixedMember(Standing):
                     got=", ".join(str(lag) for lag in given) or "none",
                     remedy="write a number for the newest sample alone, or lags from 0 on",
                 )
-        if not self.low <= self.rest <= self.high or self.low == self.high:
-            raise ConfigError(
-                f"the bounds of {self.output} do not hold its rest",
-                where="low, high",
-                expected="low at most rest, rest at most high, low below high",
-                got=f"low {self.low:g}, rest {self.rest:g}, high {self.high:g}",
-                remedy="correct the bounds",
-            )
 
     @property
     def weights(self) -> tuple[Dict[int, float], ...]:

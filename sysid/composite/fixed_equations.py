@@ -1,19 +1,22 @@
 """Fixed submodels as equations: ``RL = relay(BP - AR, on=1.45, off=-0.985, slope=20)``.
 
-An equation here is a weighted sum of channels, now and some samples ago, held between two bounds
-(:mod:`sysid.composite.fixed_members`). Sums are done in fractions of the decimals that are written: 0.1 + 0.2 is 0.3,
-and an equation is the same submodel to the last bit as the weights that it stands for.
+An equation here is an expression of channels, now and some samples ago, held between two bounds. A weighted sum is
+found as one, and runs as one (:mod:`sysid.composite.fixed_members`); anything else is taken as it is written
+(:mod:`sysid.composite.fixed_expressions`). Sums are done in fractions of the decimals that are written: 0.1 + 0.2 is
+0.3, and an equation is the same submodel to the last bit as the weights that it stands for.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 from sysid.composite.composite import FixedMember
+from sysid.composite.fixed_expressions import expression_of, reads_nothing, words_of
+from sysid.equations.functions import CONSTANTS
 from sysid.equations.parser import DEEPEST, parse
 from sysid.equations.syntax import (
     CONTINUOUS,
@@ -32,7 +35,6 @@ from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.models import Mapping
 
-_FORM = "a weighted sum of channels, alone or in clamp(sum, low, high), switch(sum) or relay(sum, on=, off=, slope=)"
 _SWITCH = (0.0, 1.0)
 """Bounds of a switch: off, on and how far between."""
 
@@ -44,23 +46,26 @@ def fixed_by_equations(
     unit: str | Dict[str, str] = "1",
     instances: tuple[str, ...] = ("",),
     shared: tuple[str, ...] = (),
+    tables: Dict[str, Any] | None = None,
 ) -> tuple[FixedMember, ...]:
-    """Fixed submodels, one for each equation.
+    """Fixed submodels, one for each equation; beside one that reads its own past, what that was.
 
     Args:
         text: Equations, one a line: ``y = clamp(2*u - x[k-1], -5, 5)``, ``y[k+1] = ...``; ``y = switch(u - 3)``, a pure
-            number that is held between 0 and 1; or ``y = relay(u, on=2, off=1, slope=20)``, a switch with hysteresis:
-            beyond ``on`` it goes to 1, the quicker the larger ``slope``, and stays until ``u`` is back at ``off``.
+            number that is held between 0 and 1; ``y = relay(u, on=2, off=1, slope=20)``, a switch with hysteresis:
+            beyond ``on`` it goes to 1, the quicker the larger ``slope``, and stays until ``u`` is back at ``off``,
+            without a slope at once; or any expression of the language, ``y = where(u > 3, max(u, x), y[k-1])``.
         rest: Values at rest, in the units of the outputs: one for all, or by output; 0 for those without.
         unit: Units of the outputs: one for all but switches, or by output; a pure number for those without.
         instances: Suffixes of the channel names, one for each instance.
         shared: Inputs that have the same name in every instance.
+        tables: By name the points ``[[x, y], ...]`` of functions that equations call.
 
     Returns:
         The submodels, in the order of the equations.
 
     Raises:
-        ConfigError: If the text is none, an equation is no held sum, or what has a rest or a unit has no equation.
+        ConfigError: If the text is none, an equation cannot be fixed, or what has a rest or a unit has no equation.
 
     Example:
         >>> (relay,) = fixed_by_equations("R = relay(p - q, on=1.5, off=-0.5, slope=10)", rest={"R": 1})
@@ -73,14 +78,16 @@ def fixed_by_equations(
         _check_known(what, list(given) if isinstance(given, Dict) else [], names)
     members = [
         FixedMember(
-            **_held_sum(one, text),
+            **words,
             rest=rest.get(one.name, 0.0) if isinstance(rest, Dict) else rest,
             unit=unit.get(one.name, "1") if isinstance(unit, Dict) else "1" if _is_switch(one) else unit,
             instances=instances,
-            shared=tuple(name for name in shared if name in _read(one)),
+            shared=tuple(name for name in shared if name in words["mapping"].inputs),
         )
         for one in equations
+        for words in _found(one, text, tables or {})
     ]
+    _check_known("tables", list(tables or {}), [node.function for one in equations for node in _calls(one)])
     _check_known("shared", list(shared), [name for one in equations for name in _read(one)])
     return tuple(members)
 
@@ -98,6 +105,15 @@ def equation_of(fixed: FixedMember) -> str:
         >>> equation_of(*fixed_by_equations("y[k+1] = 0.5*y[k] + 2*u[k]"))
         'y = 2*u[k-1] + 0.5*y[k-1]'
     """
+    total = fixed.equation or _sum_of(fixed)
+    if (fixed.low, fixed.high) == _SWITCH and fixed.unit == "1":
+        total = f"switch({total})"
+    elif (fixed.low, fixed.high) != (-math.inf, math.inf):
+        total = f"clamp({total}, {_number(fixed.low)}, {_number(fixed.high)})"
+    return f"{written_name(fixed.output)} = {total}"
+
+
+def _sum_of(fixed: FixedMember) -> str:
     terms = [
         (weight, f"{written_name(name)}[k-{lag}]" if lag else written_name(name))
         for name, weights in zip(fixed.mapping.inputs, fixed.weights, strict=True)
@@ -110,12 +126,7 @@ def equation_of(fixed: FixedMember) -> str:
         written.append((fixed.constant, _number(abs(fixed.constant))))
     first, *others = written
     total = ("-" if first[0] < 0 else "") + first[1]
-    total += "".join(f" {'-' if weight < 0 else '+'} {term}" for weight, term in others)
-    if (fixed.low, fixed.high) == _SWITCH and fixed.unit == "1":
-        total = f"switch({total})"
-    elif (fixed.low, fixed.high) != (-math.inf, math.inf):
-        total = f"clamp({total}, {_number(fixed.low)}, {_number(fixed.high)})"
-    return f"{written_name(fixed.output)} = {total}"
+    return total + "".join(f" {'-' if weight < 0 else '+'} {term}" for weight, term in others)
 
 
 def _number(value: float) -> str:
@@ -123,7 +134,11 @@ def _number(value: float) -> str:
 
 
 def _is_switch(equation: Equation) -> bool:
-    return isinstance(equation.right, Call) and equation.right.function in {"switch", "relay"}
+    return isinstance(equation.right, Call) and equation.right.function in {"switch", "relay", "latch"}
+
+
+def _calls(equation: Equation) -> list[Call]:
+    return [node for node in nodes_of(equation.right) if isinstance(node, Call)]
 
 
 def _read(equation: Equation) -> frozenset[str]:
@@ -167,8 +182,12 @@ class _Sum:
         return _Sum(weights=weights, constant=self.constant * factor)
 
 
-def _held_sum(equation: Equation, text: str) -> dict[str, Any]:
-    """An equation in the words of :class:`FixedMember`."""
+class _NoSum(Exception):  # noqa: N818 - nobody is told: what is no sum is an expression
+    """Something is no weighted sum."""
+
+
+def _found(equation: Equation, text: str, tables: Dict[str, Any]) -> list[dict[str, Any]]:
+    """An equation in the words of :class:`FixedMember`: those of what goes with it first."""
     if equation.kind == CONTINUOUS:
         raise equation_error(
             f"{equation.name} is given by its rate",
@@ -178,37 +197,37 @@ def _held_sum(equation: Equation, text: str) -> dict[str, Any]:
             remedy=f"write {equation.name}[k+1] = {equation.name}[k] + h*(...), h being the sample time",
         )
     reader = _Reader(text=text, shift=int(equation.kind == DISCRETE))
-    total, low, high = reader.held(equation.right, equation.name)
+    inside, low, high = reader.bounded(equation.right)
+    try:
+        return [_held_sum(equation, reader.total(inside, equation.name), text) | {"low": low, "high": high}]
+    except _NoSum:
+        found = expression_of(equation, inside, text)
+    try:
+        total = replace(reader, shift=0).total(found.equation.right, equation.name)
+        words = _held_sum(found.equation, total, text)
+    except _NoSum:
+        called = {node.function for node in _calls(equation)}
+        own = {name: points for name, points in tables.items() if name in called}
+        words = words_of(found.equation) | {"tables": own}
+    return [*found.past, words | {"low": low, "high": high}]
+
+
+def _held_sum(equation: Equation, total: _Sum, text: str) -> dict[str, Any]:
+    """A weighted sum in these words; told where it is none that is held."""
     by_lag: dict[str, dict[int, float]] = {}
     for (name, lag), weight in total.weights.items():
         by_lag.setdefault(name, {})[lag] = float(weight)
     own = by_lag.pop(equation.name, {})
-    _check_own(equation, own, text)
+    if set(own) - {1}:
+        raise _NoSum
     inputs = tuple(by_lag)
     if not inputs:
-        raise equation_error(
-            f"{equation.name} reads no other channel",
-            text,
-            equation.at,
-            expected="at least one channel on the right side",
-            remedy="leave it out: a constant is added where it is needed",
-        )
+        raise reads_nothing(equation, text)
     gains: dict[str, Any] = {name: one[0] if set(one) == {0} else one for name, one in by_lag.items()}
     if own:
         gains[equation.name] = own[1]
     mapping = Mapping(inputs=inputs, outputs=(equation.name,))
-    return {"mapping": mapping, "gains": gains, "constant": float(total.constant), "low": low, "high": high}
-
-
-def _check_own(equation: Equation, own: Dict[int, float], text: str) -> None:
-    for lag in sorted(set(own) - {1}):
-        raise equation_error(
-            f"{equation.name} reads itself {'now' if lag == 0 else f'{lag} samples ago'}",
-            text,
-            equation.at,
-            expected=f"its last value alone, {equation.name}[k-1]",
-            remedy="write it so; give an earlier value a name in an equation of its own",
-        )
+    return {"mapping": mapping, "gains": gains, "constant": float(total.constant)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -223,17 +242,25 @@ class _Reader:
     text: str
     shift: int
 
-    def held(self, node: Node, name: str) -> tuple[_Sum, float, float]:
-        """A right side as a sum and its two bounds."""
+    def bounded(self, node: Node) -> tuple[Node, float, float]:
+        """What of a right side stands between two numbers, and the numbers."""
         if isinstance(node, Call) and node.function in {"clamp", "saturate"}:
             given = self._named(node, ("x", "low", "high"))
-            low, high = (float(self._constant(given[bound])) for bound in ("low", "high"))
-            return self.sum(given["x"]), low, high
+            try:
+                low, high = (float(self._constant(given[bound])) for bound in ("low", "high"))
+            except _NoSum:
+                return node, -math.inf, math.inf
+            return given["x"], low, high
         if isinstance(node, Call) and node.function == "switch":
-            return self.sum(self._named(node, ("x",))["x"]), *_SWITCH
+            return self._named(node, ("x",))["x"], *_SWITCH
         if isinstance(node, Call) and node.function == "relay":
-            return self._relay(node, name), *_SWITCH
-        return self.sum(node), -math.inf, math.inf
+            return node, *_SWITCH
+        return node, -math.inf, math.inf
+
+    def total(self, node: Node, name: str) -> _Sum:
+        """What stands between bounds, as a sum."""
+        with_slope = isinstance(node, Call) and node.function == "relay" and len(node.parts) > len(("x", "on", "off"))
+        return self._relay(node, name) if with_slope and isinstance(node, Call) else self.sum(node)
 
     def _relay(self, node: Call, name: str) -> _Sum:
         """A Schmitt trigger as a sum with its own last value: see :mod:`sysid.composite.fixed_members`."""
@@ -271,7 +298,7 @@ class _Reader:
     def _constant(self, node: Node) -> Fraction:
         value = self.sum(node)
         if value.weights:
-            raise self._no_sum(node, "a bound, a factor or a setting that hangs on a channel", "a number")
+            raise _NoSum
         return value.constant
 
     def sum(self, node: Node, depth: int = 0) -> _Sum:
@@ -291,32 +318,24 @@ class _Reader:
     def _term(self, node: Node, depth: int) -> _Sum:
         """What is no sum or difference: a number, a channel, or one of them so many times."""
         if depth > DEEPEST:
-            raise self._no_sum(node, f"more than {DEEPEST} factors in a row", _FORM)
+            raise _NoSum
         match node:
             case Number():
                 return _Sum(constant=Fraction(repr(node.value)))
+            case Name() if node.name in CONSTANTS:
+                return _Sum(constant=Fraction(repr(CONSTANTS[node.name])))
             case Name():
                 return _Sum(weights={(node.name, self.shift): Fraction(1)})
             case Delayed(seconds=False):
                 return _Sum(weights={(node.name, int(node.lag) + self.shift): Fraction(1)})
-            case Delayed():
-                raise self._no_sum(node, "a delay in seconds", f"a delay in samples, {node.name}[k-5]")
             case Operation(operator="*" | "/" as sign, operands=operands):
                 left, right = (self.sum(one, depth + 1) for one in operands)
                 if sign == "*" and not left.weights:
                     left, right = right, left
-                if not right.weights and (sign == "*" or right.constant):
+                if sign == "/" and not right.weights and not right.constant:
+                    raise equation_error(
+                        "a division by 0", self.text, node.at, expected="another divisor", remedy="correct it"
+                    )
+                if not right.weights:
                     return left.times(right.constant if sign == "*" else 1 / right.constant)
-            case Call():
-                raise self._no_sum(node, f"{node.function} within an expression", _FORM)
-        raise self._no_sum(node, "no weighted sum", _FORM)
-
-    def _no_sum(self, node: Node, what: str, expected: str) -> ConfigError:
-        return equation_error(
-            f"{what} in the equation of a fixed submodel",
-            self.text,
-            node.at,
-            expected=expected,
-            remedy="give the part a name in an equation of its own; what is no held sum is fitted as a member, or is a "
-            "GreyBox (docs/how/equations.md)",
-        )
+        raise _NoSum

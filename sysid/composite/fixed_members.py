@@ -16,6 +16,10 @@ With weights by lag it looks ahead: :math:`2x(n) - x(n-1)` is what :math:`x` wil
 happens. A switch with such a sum, and with one over what :math:`x` moves in a sample as its gain, says for how much of
 the next sample it will be open. That goes from 0 to 1 as steadily as the instant of switching moves, where a steeper
 switch jumps from one sample to the next: what follows has no edge, and training sees which way to move the instant.
+
+What is no weighted sum, such as a product, the greater of two channels, a root or a table, is an equation. It runs in
+the same pass, exactly as it is written; training goes through it by the derivatives of its operations, which know
+nothing of a switch: what a comparison decides has an edge.
 """
 
 from __future__ import annotations
@@ -23,18 +27,21 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from sysid.composite.composite import FixedMember
 from sysid.composite.members import bounds_of, placed
 from sysid.errors import ConfigError
-from sysid.models import NARX, Cascade, NARXModel, Scaling
+from sysid.models import NARX, Cascade, GreyBoxModel, NARXModel, Scaling
 from sysid.traces import Channel, Trace
 
 
-def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = None) -> NARXModel:
-    """A fixed submodel in its first instance, as a network without neurons: it runs and is exported like the others.
+def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = None) -> NARXModel | GreyBoxModel:
+    """A fixed submodel in its first instance, as a model that runs and is exported like the others.
+
+    A sum is a network without neurons, and what is no sum a grey box without parameters.
 
     Args:
         fixed: What is declared.
@@ -48,18 +55,25 @@ def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = 
         ChannelError: If the trace lacks an input.
     """
     inputs = fixed.mapping.inputs
+    channels: Dict[str, Any] = {
+        "scaling": Scaling.identity(len(inputs)),
+        "mapping": fixed.mapping,
+        "sample_time": like.sample_time,
+        "input_units": tuple((units or {}).get(name) or like.channel(name).unit for name in inputs),
+        "output_unit": fixed.unit,
+        "rest_output": fixed.rest,
+    }
+    if fixed.equation:
+        return GreyBoxModel(
+            grey=fixed.grey_box, theta=np.empty(0), norms=(), levels=(), spans=(), substeps=1, **channels
+        )
     lags = [sorted(one) for one in fixed.weights]
     weights = [one[lag] for one, own in zip(fixed.weights, lags, strict=True) for lag in own]
     return NARXModel(
         network=NARX(input_delays=lags, output_delays=1, neurons=0),
         theta=np.array([fixed.constant, *weights, fixed.memory]),
-        scaling=Scaling.identity(len(inputs)),
-        mapping=fixed.mapping,
-        sample_time=like.sample_time,
-        input_units=tuple((units or {}).get(name) or like.channel(name).unit for name in inputs),
-        output_unit=fixed.unit,
-        rest_output=fixed.rest,
         clamp=np.inf,  # its bounds are limits of the whole: a model at its own bound counts as lost
+        **channels,
     )
 
 

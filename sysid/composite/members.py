@@ -14,12 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from sysid.composite.composite import Composite, FixedMember, Member, Standing
 from sysid.estimation.estimators import JOINING
-from sysid.models import Cascade, Limit, Mapping, NARXModel
+from sysid.models import AbstractModel, Cascade, Limit, Mapping, NARXModel
 from sysid.traces import Trace
 
 _T = TypeVar("_T")
 
-Members = dict[str, NARXModel]
+_Model = TypeVar("_Model", bound=AbstractModel)
+
+Members = Dict[str, AbstractModel]
 """The members by the output of their first instance, the fixed ones among them."""
 
 
@@ -48,7 +50,7 @@ def network_of(model: object) -> NARXModel | None:
     return cast("NARXModel", model) if kind in JOINING else None
 
 
-def placed(member: Standing, model: NARXModel, instance: str) -> NARXModel:
+def placed(member: Standing, model: _Model, instance: str) -> _Model:
     """A member's model in one of its instances.
 
     Args:
@@ -61,7 +63,7 @@ def placed(member: Standing, model: NARXModel, instance: str) -> NARXModel:
     """
     # The model's, not the member's: it may read more than it was fitted with (reads).
     inputs = tuple(member.channel(name, instance) for name in model.mapping.inputs)
-    return replace(model, mapping=Mapping(inputs=inputs, output=member.channel(member.output, instance)))
+    return model.over(Mapping(inputs=inputs, output=member.channel(member.output, instance)))
 
 
 def assembled(composite: Composite, models: Members, *, without: str | None = None) -> Cascade:
@@ -82,7 +84,7 @@ def assembled(composite: Composite, models: Members, *, without: str | None = No
     return wired(composite, [placed(one, models[one.output], there) for one in standing for there in one.instances])
 
 
-def wired(composite: Composite, models: Sequence[NARXModel]) -> Cascade:
+def wired(composite: Composite, models: Sequence[AbstractModel]) -> Cascade:
     """Models in their instances as one, at rest and between limits as declared.
 
     Args:

@@ -6,7 +6,7 @@ import numpy as np
 
 from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_members import fixed_model
-from sysid.composite.members import assembled
+from sysid.composite.members import Members, assembled
 from sysid.composite.plan import RoundPlan, TrainingPlan
 from sysid.composite.shared_weights import SharedWeights
 from sysid.composite.stages import reading_more
@@ -28,8 +28,8 @@ def rehearse(composite: Composite, plan: TrainingPlan, like: Trace) -> None:
             writes; or a round cannot share weights.
         ChannelError: If the trace lacks a channel of a member's first instance.
     """
-    models = {member.output: untaught(member, like) for member in composite.members}
-    models |= {fixed.output: fixed_model(fixed, like) for fixed in composite.fixed}
+    networks = {member.output: untaught(member, like) for member in composite.members}
+    models: Members = {**networks} | {fixed.output: fixed_model(fixed, like) for fixed in composite.fixed}
     whole = assembled(composite, models)
     for output in plan.retrain.members if plan.retrain else ():
         composite.member(output)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from sysid.estimation import FitResult, Training, estimators
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.warm_start import grown, widened
 from sysid.estimation.result import Loop, Status
-from sysid.models import Cascade, NARXModel
+from sysid.models import AbstractModel, Cascade, NARXModel
 from sysid.traces import Trace
 
 SWEEPS = 3
@@ -110,7 +111,7 @@ class Choice:
 
 def choose_together(
     composite: Composite,
-    candidates: Mapping[str, Sequence[NARXModel]],
+    candidates: Mapping[str, Sequence[AbstractModel]],
     alone: Mapping[str, int],
     selection: Sequence[Trace],
     *,
@@ -148,7 +149,9 @@ def choose_together(
     return Choice(members=chosen, score=best, tried=tried)
 
 
-def _with(composite: Composite, candidates: Mapping[str, Sequence[NARXModel]], chosen: Mapping[str, int]) -> Cascade:
+def _with(
+    composite: Composite, candidates: Mapping[str, Sequence[AbstractModel]], chosen: Mapping[str, int]
+) -> Cascade:
     return assembled(composite, {name: models[chosen[name]] for name, models in candidates.items()})
 
 
@@ -177,7 +180,7 @@ def retrain(
         The fit.
     """
     # Of its candidates' structures the one that was chosen.
-    member = composite.member(output).of_structure(models[output].network)
+    member = composite.member(output).of_structure(cast("NARXModel", models[output]).network)
     others = assembled(composite, models, without=output)
     start = FitResult(
         model=models[output], status=Status.MAX_ITERATIONS, loop=member.training.loop, history={},

@@ -249,5 +249,5 @@ def computed(operation: int, values: Sequence[float]) -> float:
     v = np.array([*values, *[0.0] * (4 - len(values))])
     # Unsigned, as every program's: for other integers the machine is compiled a second time.
     code = np.array([[operation, 0, min(1, len(values) - 1), min(2, len(values) - 1), 0]], dtype=np.uint64)
-    machine.evaluate(code, v, 3, np.zeros(1), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)))
+    machine.evaluate(code, 0, 1, v, 3, np.zeros(1), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)))
     return float(v[3])

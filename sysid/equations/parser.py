@@ -30,10 +30,11 @@ DEEPEST = 60
 SAMPLE, TIME = "k", "t"
 """How the number of a sample, and the time, are written: in ``x[k-1]`` and ``u(t - 0.5)``."""
 
-_BINDING = {
+BINDING = {
     "or": 1, "and": 2, "<": 4, "<=": 4, ">": 4, ">=": 4, "==": 4, "!=": 4,
     "+": 5, "-": 5, "*": 6, "/": 6, "^": 8, "**": 8,
 }  # fmt: skip
+"""How much each operator between two expressions binds."""
 _NOT, _MINUS = 3, 7
 _COMPARING = 4
 RESERVED = frozenset({"and", "or", "not", TIME, "dt"})
@@ -180,7 +181,7 @@ class _Parser:
         left = self._prefix()
         while True:
             word = self.now
-            power = _BINDING.get(word.text, 0) if word.kind in {"sign", "name"} else 0
+            power = BINDING.get(word.text, 0) if word.kind in {"sign", "name"} else 0
             if power <= binding:
                 break
             self.take()
@@ -198,7 +199,7 @@ class _Parser:
             )
         right_first = word.text in {"^", "**"}
         right = self.expression(power - 1 if right_first else power)
-        if power == _COMPARING and self.now.text in _BINDING and _BINDING[self.now.text] == _COMPARING:
+        if power == _COMPARING and self.now.text in BINDING and BINDING[self.now.text] == _COMPARING:
             raise self.wrong(
                 "two comparisons in a row",
                 self.now,

@@ -7,8 +7,11 @@ for every type of argument, of which an array that can be written and one that c
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 
@@ -40,6 +43,17 @@ def forget_what_has_died_away(sensitivities: NDArray[np.float64]) -> None:
         sensitivities: Of any shape.
     """
     sensitivities[np.abs(sensitivities) < GONE] = 0.0
+
+
+@intrinsic
+def stands_apart(_context: Any) -> Any:
+    """Keep the function in which this stands out of those that call it: long ones are compiled again in each."""
+
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return types.void(), generate
 
 
 @njit(cache=True, nogil=True)

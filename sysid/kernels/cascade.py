@@ -6,6 +6,9 @@ Members run in order within a sample: one that reads an upstream output with lag
 One may also read the past of what is computed after it: models that stand in a circle, as reservoirs that feed each
 other do.
 
+A member may be an equation in the place of :math:`w x_t + c`, which the register machine runs
+(``sysid/kernels/register_machine.py``).
+
 ``values`` holds every channel once, in its unit, and a regressor is one of them and a lag, whatever it means
 (``sysid/kernels/cascade_layout.py``).
 
@@ -33,6 +36,7 @@ from sysid.kernels.cascade_layout import (
     laid_out,
 )
 from sysid.kernels.neurons.table import activate
+from sysid.kernels.register_machine import evaluate
 from sysid.kernels.registers import LANES, affine, dot, tanh
 
 Array = NDArray[np.float64]
@@ -134,6 +138,9 @@ def _walk(p, layout, values, past, kept, held):
     flat, wide = values.reshape(-1), values.shape[1]
     back = _u(p.regressor_lag * wide - p.regressor_channel)
     indices = _placed(layout.sums.indices, back)
+    e = p.equations
+    is_equation, steps_first, steps, v = e.is_one, e.code_first, e.code, e.registers.copy()
+    given, first_of, result, widths, places, table = _u(e.given), e.first, e.result, e.widths, e.places, e.table
     for row in range(past, len(values)):
         here, t, at = np.uintp(row * wide), np.uintp(row - past), np.uintp(0)
         for level in range(np.uintp(len(network_first) - 1)):
@@ -161,6 +168,11 @@ def _walk(p, layout, values, past, kept, held):
                     if linear_first[o] >= 0:
                         linear = _weighted(theta, np.uintp(linear_first[o]), x, first_x, n_x)
                     total += dot(g, readout_first[o], h, neuron_first[m], blocks[m]) + linear
+                elif is_equation[m]:
+                    for i in range(n_x):
+                        v[given[m] + i] = flat[here - back[first_x + i]]
+                    evaluate(steps, steps_first[m], steps_first[m + ONE], v, first_of[m], widths, places, table)
+                    total += v[result[m]]
                 else:
                     total += _linear(theta, np.uintp(linear_first[o]), flat, back, first_x, here, n_x)
                 code = FREE

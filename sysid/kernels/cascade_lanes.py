@@ -15,6 +15,7 @@ from sysid.kernels.arrays import copy_numbers, copy_rows
 from sysid.kernels.cascade import _bounded, _limited
 from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, gates_at, in_units
 from sysid.kernels.neurons.table import activate
+from sysid.kernels.register_machine import evaluate
 
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -101,6 +102,16 @@ def _limits(p, o, now_values, low, high):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _add_equation(total, e, m, v, x, n_x):
+    """Add what an equation gives to the totals of all lanes, one after the other."""
+    for lane in range(len(total)):
+        for i in range(n_x):
+            v[e.given[m] + i] = x[i, lane]
+        evaluate(e.code, e.code_first[m], e.code_first[m + 1], v, e.first[m], e.widths, e.places, e.table)
+        total[lane] += v[e.result[m]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sizes(p):
     width, neurons = 1, 1
     for m in range(len(p.neurons)):
@@ -127,6 +138,7 @@ def run(p, depth, rest, lanes, values, held):
     h, g = hidden.reshape(most, lanes), np.zeros((most, lanes))
     low, high, codes = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes, dtype=np.int8)
     theta, bounds = in_units(p)
+    registers = p.equations.registers.copy()
     # Lanes without a record of their own repeat the last one.
     record = np.minimum(np.arange(lanes), records - 1)
     past = np.zeros((depth + CHUNK, channels, lanes))
@@ -171,6 +183,8 @@ def run(p, depth, rest, lanes, values, held):
                     _weighted(value, theta, own + n * (n_x + 1) + j * n, n, h)
                 if linear:
                     _weighted(value, theta, at + n_y + j * n_x, n_x, x)
+                elif p.equations.is_one[m]:
+                    _add_equation(value, p.equations, m, registers, x, n_x)
                 codes[:] = FREE
                 if _outside(value, bounds[o, 0], bounds[o, 1], low, high):
                     _hold(value, codes, bounds[o, 0], bounds[o, 1], low, high, low_code, high_code)

@@ -9,7 +9,7 @@ sample, and what several members read stands there for all of them as soon as it
 Members run level by level. A level begins with networks that do not read each other at the same sample: they run side
 by side, and what they wait for, such as the functions of their neurons, they wait for once. The sums that can
 follow them do, one after the other; those that wait for nobody are the first level's. So what lies between two levels
-is always a network, or an output that a channel limits, and never a sum.
+is always a network, an equation, or an output that a channel limits, and never a sum.
 """
 
 from __future__ import annotations
@@ -22,6 +22,40 @@ from numpy.typing import NDArray
 
 from sysid.kernels.arrays import copy_numbers
 from sysid.kernels.registers import LANES
+
+
+class Equations(NamedTuple):
+    """Members that are equations, as the register machine runs them (``sysid/kernels/register_machine.py``).
+
+    Each has registers of its own among those of all, ``[numbers | regressors | results]``, and the instructions name
+    them by their place there. Such a member has no neurons and no linear part; what it computes is added to its
+    constant, which is 0.
+
+    Attributes:
+        is_one: Whether a member is an equation.
+        code: Instructions of all, shape ``(n, 5)``.
+        code_first: Where each member's begin; one more entry than members.
+        registers: All registers, with the numbers in place.
+        low: The first register of each member.
+        given: Where its regressors begin.
+        first: The first register that its instructions write.
+        result: The register that is its output.
+        widths: Of switches: all are exact.
+        places: Of each table of each member its first row and its rows, shape ``(n_tables, 2)``.
+        table: Rows of all tables, shape ``(n_rows, 2)``.
+    """
+
+    is_one: NDArray[np.bool_]
+    code: NDArray[np.uint64]
+    code_first: NDArray[np.int64]
+    registers: NDArray[np.float64]
+    low: NDArray[np.int64]
+    given: NDArray[np.int64]
+    first: NDArray[np.int64]
+    result: NDArray[np.int64]
+    widths: NDArray[np.float64]
+    places: NDArray[np.int64]
+    table: NDArray[np.float64]
 
 
 class Program(NamedTuple):
@@ -44,6 +78,7 @@ class Program(NamedTuple):
         bounds: Lower and upper bound of each output in scaled numbers, shape ``(n_outputs, 2)``.
         limits: Lower and upper limit of each output in its unit, shape ``(n_outputs, 2)``; infinite for none.
         limit_channel: Column of ``values`` that is the limit instead, shape ``(n_outputs, 2)``; -1 for none.
+        equations: Members that are neither networks nor sums.
     """
 
     theta: NDArray[np.float64]
@@ -62,6 +97,7 @@ class Program(NamedTuple):
     bounds: NDArray[np.float64]
     limits: NDArray[np.float64]
     limit_channel: NDArray[np.int64]
+    equations: Equations
 
 
 class Sums(NamedTuple):
@@ -378,7 +414,7 @@ def laid_out(p):
     is_sum = fixed.copy()
     for m in range(len(blocks)):
         for o in range(p.output_first[m], p.output_first[m + 1]):
-            is_sum[o] &= blocks[m] == 0
+            is_sum[o] &= blocks[m] == 0 and not p.equations.is_one[m]
     order, level_first = _levels(p, is_sum)
     networks, network_first, neurons_first = _networks(blocks, order, level_first)
     weights, weights_first, gate_blocks, neuron_first, readout, readout_first = _in_blocks(p, theta, order)

@@ -12,8 +12,9 @@ scaled numbers, with lag :math:`l_i`,
 
 The sum runs over regressors that are an output of the cascade, the member's own or an upstream one: the
 sensitivity of the upstream output is an input of the downstream recursion, scaled from the one's numbers to the
-other's. Inputs of the whole contribute nothing. An output held by a constant has a zero row; held by a channel, it has
-that channel's row.
+other's. Of a member that is an equation the factors :math:`c_{ji,t}` are the derivatives of its operations, taken back
+through them (``sysid/kernels/register_machine.py``). Inputs of the whole contribute nothing. An output held by a
+constant has a zero row; held by a channel, it has that channel's row.
 
 Rows end after the parameters of the member itself: no output depends on members that run later.
 
@@ -32,6 +33,7 @@ from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import FREE, HIGH_CHANNEL, LOW_CHANNEL, gates_at
 from sysid.kernels.neurons.table import slopes_of_sums, slopes_of_values
+from sysid.kernels.register_machine import evaluate, moves_of, partials
 
 ONE = np.uintp(1)
 _u = np.uintp
@@ -192,6 +194,10 @@ def sensitivities(p, past, first, n_rows, values, kept, held, own_first, extent,
     theta, lags, scales, regressor_scale = p.theta, p.regressor_lag, p.output_scale, p.regressor_scale
     flat, wide = values.reshape(-1), values.shape[1]
     back = (lags * wide - p.regressor_channel).view(np.uintp)
+    e = p.equations
+    is_equation, steps_first, steps, v = e.is_one, e.code_first, e.code, e.registers.copy()
+    given, first_of, low, result, widths, places, table = e.given, e.first, e.low, e.result, e.widths, e.places, e.table
+    d, bar = np.empty((len(steps), 3)), np.empty(len(v))
     for t in range(first, first + n_rows):
         here, at_neuron = _u((past + t) * wide), 0
         for m in range(len(p.neurons)):
@@ -229,6 +235,15 @@ def sensitivities(p, past, first, n_rows, values, kept, held, own_first, extent,
                 if whole:
                     _clear(J, row + _u(own_first[m] + size), row + _u(extent[o]))
                 _factors(c, theta, _u(at), gated, _u(at) + to_gates, _u(j), k, r, y, linear, h, s, g)
+                if is_equation[m]:
+                    begin, end = steps_first[m], steps_first[m + 1]
+                    for i in range(n_x):
+                        v[given[m] + i] = x[i]
+                    evaluate(steps, begin, end, v, first_of[m], widths, places, table)
+                    partials(steps, begin, end, v, first_of[m], widths, places, table, d)
+                    moves_of(steps, begin, end, d, result[m], low[m], first_of[m], bar)
+                    for i in range(n_x):
+                        c[i] = bar[given[m] + i]
                 found = 0
                 for i in range(first_x, first_x + n_x):
                     of = source[i]

@@ -33,7 +33,7 @@ import math
 import numpy as np
 from numba import njit
 
-from sysid.kernels.arrays import copy_numbers, copy_rows
+from sysid.kernels.arrays import copy_numbers, copy_rows, stands_apart
 
 ADD, SUB, MUL, DIV, NEG, POW, FMA, ABS, MIN, MAX = range(10)
 SQRT, EXP, LOG, TANH, SIN, COS, ATAN, SIGN, GREATER, NOT_LESS, SELECT, TABLE = range(10, 22)
@@ -63,18 +63,24 @@ def _logistic(x):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def evaluate(code, v, first, widths, places, table):
+def evaluate(code, begin, end, v, first, widths, places, table):
     """Run a program: the registers from ``first`` on are written.
 
+    What is called for every sample takes whole arrays and where in them something begins: to cut a piece out is to
+    count who holds it.
+
     Args:
-        code: Instructions ``(operation, a, b, c, own)``, shape ``(n, 5)``.
+        code: Instructions ``(operation, a, b, c, own)``, shape ``(n, 5)``, of one program or of several.
+        begin: The program's first.
+        end: One more than its last.
         v: Registers.
         first: The first result.
         widths: Of each switch.
         places: Of each table its first row and its rows, shape ``(n_tables, 2)``.
         table: Rows ``(x, y)`` of all tables.
     """
-    for i in range(len(code)):
+    stands_apart()
+    for i in range(begin, end):
         op = code[i, 0]
         a = v[code[i, 1]]
         if op == FMA:
@@ -140,15 +146,28 @@ def evaluate(code, v, first, widths, places, table):
             r = math.cos(a) if abs(a) < math.inf else math.nan
         else:
             r = math.atan(a)
-        v[first + i] = r
+        v[first + i - begin] = r
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _partials(code, v, first, widths, places, table, d):
-    """Partial derivatives of every instruction with respect to what it reads, shape ``(n, 3)``."""
-    for i in range(len(code)):
+def partials(code, begin, end, v, first, widths, places, table, d):
+    """Partial derivatives of every instruction with respect to what it reads, shape ``(n, 3)``.
+
+    Args:
+        code: As for :func:`evaluate`, which has run.
+        begin: As there.
+        end: As there.
+        v: As there.
+        first: As there.
+        widths: As there.
+        places: As there.
+        table: As there.
+        d: A row an instruction of ``code``, of which those of this program are written.
+    """
+    stands_apart()
+    for i in range(begin, end):
         op = code[i, 0]
-        a, r = v[code[i, 1]], v[first + i]
+        a, r = v[code[i, 1]], v[first + i - begin]
         d[i, 0] = d[i, 1] = d[i, 2] = 0.0
         if op == FMA:
             d[i, 0], d[i, 1], d[i, 2] = v[code[i, 2]], a, 1.0
@@ -212,13 +231,25 @@ def _partials(code, v, first, widths, places, table, d):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _row(code, d, result, first, bar):
-    """What one result moves by with every register that is no result, left in ``bar``."""
-    for i in range(len(bar)):
+def moves_of(code, begin, end, d, result, low, first, bar):
+    """What one result moves by with every register that is no result, left in ``bar``.
+
+    Args:
+        code: As for :func:`evaluate`.
+        begin: As there.
+        end: As there.
+        d: As :func:`partials` leaves it.
+        result: The register asked for.
+        low: The program's first register.
+        first: As for :func:`evaluate`.
+        bar: A number a register; those of this program are written.
+    """
+    stands_apart()
+    for i in range(low, first + end - begin):
         bar[i] = 0.0
     bar[result] = 1.0
-    for i in range(len(code) - 1, -1, -1):
-        g = bar[first + i]
+    for i in range(end - 1, begin - 1, -1):
+        g = bar[first + i - begin]
         if g != 0.0:
             if d[i, 0] != 0.0:
                 bar[code[i, 1]] += g * d[i, 0]
@@ -273,7 +304,7 @@ def values(program, theta, path, u, widths, places, table, y):
     at = len(constants) + len(theta)
     for t in range(len(u)):
         _fill(v, at, path[t], u[t])
-        evaluate(code, v, at + n + m, widths, places, table)
+        evaluate(code, 0, len(code), v, at + n + m, widths, places, table)
         for j in range(len(results)):
             y[t, j] = v[results[j]]
 
@@ -314,12 +345,12 @@ def free_run(programs, theta, x, u, method, substeps, step, widths, places, tabl
         if len(path) > 0:
             copy_numbers(x, path[t])
         _fill(vh, ah, x, u[t])
-        evaluate(outputs[0], vh, ah + n + m, widths, places, table)
+        evaluate(outputs[0], 0, len(outputs[0]), vh, ah + n + m, widths, places, table)
         for j in range(len(outputs[1])):
             y[t, j] = vh[outputs[1][j]]
         if n > n_c:
             _fill(vg, ag, x, u[t])
-            evaluate(updates[0], vg, ag + n + m, widths, places, table)
+            evaluate(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table)
             for i in range(n - n_c):
                 later[i] = vg[updates[1][i]]
         if n_c > 0:
@@ -330,7 +361,7 @@ def free_run(programs, theta, x, u, method, substeps, step, widths, places, tabl
                 for s in range(len(method)):
                     for i in range(n_c):
                         vf[af + i] = stage[i]
-                    evaluate(rates[0], vf, af + n + m, widths, places, table)
+                    evaluate(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table)
                     weight, ahead = method[s, 0], method[s, 1] * step
                     for i in range(n_c):
                         slope[i] = vf[rates[1][i]]
@@ -399,19 +430,19 @@ def sensitivities(programs, theta, p, x, S, u, method, substeps, step, widths, p
             J[t:] = math.nan
             return
         _fill(vh, ah, x, u[t])
-        evaluate(outputs[0], vh, ah + n + m, widths, places, table)
-        _partials(outputs[0], vh, ah + n + m, widths, places, table, dh)
+        evaluate(outputs[0], 0, len(outputs[0]), vh, ah + n + m, widths, places, table)
+        partials(outputs[0], 0, len(outputs[0]), vh, ah + n + m, widths, places, table, dh)
         for j in range(len(outputs[1])):
             y[t, j] = vh[outputs[1][j]]
-            _row(outputs[0], dh, outputs[1][j], ah + n + m, bh)
+            moves_of(outputs[0], 0, len(outputs[0]), dh, outputs[1][j], 0, ah + n + m, bh)
             _moves(bh, len(outputs[2]), ah, S, p, flat_J, (t * len(outputs[1]) + j) * columns)
         if n > n_c:
             _fill(vg, ag, x, u[t])
-            evaluate(updates[0], vg, ag + n + m, widths, places, table)
-            _partials(updates[0], vg, ag + n + m, widths, places, table, dg)
+            evaluate(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table)
+            partials(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table, dg)
             for i in range(n - n_c):
                 later[i] = vg[updates[1][i]]
-                _row(updates[0], dg, updates[1][i], ag + n + m, bg)
+                moves_of(updates[0], 0, len(updates[0]), dg, updates[1][i], 0, ag + n + m, bg)
                 _moves(bg, len(updates[2]), ag, S, p, later_S, i * columns)
         if n_c > 0:
             _fill(vf, af, x, u[t])
@@ -424,13 +455,13 @@ def sensitivities(programs, theta, p, x, S, u, method, substeps, step, widths, p
                 for s in range(len(method)):
                     for i in range(n_c):
                         vf[af + i] = stage[i]
-                    evaluate(rates[0], vf, af + n + m, widths, places, table)
-                    _partials(rates[0], vf, af + n + m, widths, places, table, df)
+                    evaluate(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table)
+                    partials(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table, df)
                     weight, ahead = method[s, 0], method[s, 1] * step
                     for i in range(n_c):
                         slope[i] = vf[rates[1][i]]
                         total[i] += weight * slope[i]
-                        _row(rates[0], df, rates[1][i], af + n + m, bf)
+                        moves_of(rates[0], 0, len(rates[0]), df, rates[1][i], 0, af + n + m, bf)
                         _moves(bf, len(rates[2]), af, S_stage, p, slope_S, i * columns)
                     for i in range(n_c):
                         stage[i] = x[i] + ahead * slope[i]
@@ -470,11 +501,11 @@ def derivatives(program, theta, p, x, u, widths, places, table, r, Jx, Jp):
     at = len(constants) + len(theta)
     first = at + n + m
     _fill(v, at, x, u)
-    evaluate(code, v, first, widths, places, table)
+    evaluate(code, 0, len(code), v, first, widths, places, table)
     d, bar = np.zeros((len(code), 3)), np.zeros(len(v))
-    _partials(code, v, first, widths, places, table, d)
+    partials(code, 0, len(code), v, first, widths, places, table, d)
     for j in range(len(results)):
         r[j] = v[results[j]]
-        _row(code, d, results[j], first, bar)
+        moves_of(code, 0, len(code), d, results[j], 0, first, bar)
         copy_numbers(bar[at : at + n], Jx[j])
         copy_numbers(bar[len(constants) : len(constants) + p], Jp[j])

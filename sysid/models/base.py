@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping as Dict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -201,6 +202,17 @@ class AbstractModel(ABC):
         """
         del steps
         return None
+
+    def over(self, mapping: Mapping) -> Self:
+        """The same model over other channels.
+
+        Args:
+            mapping: As many inputs and outputs, in the same order.
+
+        Returns:
+            The model.
+        """
+        return dataclasses.replace(self, mapping=mapping)  # type: ignore[type-var]  # every model is a dataclass
 
     def with_theta(self, theta: NDArray[np.float64]) -> AbstractModel | None:
         """The same model with other parameters.

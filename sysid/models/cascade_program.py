@@ -10,9 +10,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.kernels.cascade_layout import Program
+from sysid.kernels.cascade_layout import Equations, Program
 from sysid.kernels.neurons import code_of
-from sysid.models.column_recursion import ColumnRecursion
+from sysid.kernels.register_machine import TABLE
+from sysid.models.column_recursion import ColumnEquation, ColumnRecursion
 from sysid.models.ends import Ends
 
 _Number = TypeVar("_Number", np.int64, np.float64)
@@ -92,6 +93,47 @@ def program_of(
         ),
         limits=np.array([values for values, _ in held], dtype=np.float64),
         limit_channel=np.array([indices for _, indices in held], dtype=np.int64),
+        equations=_equations([member.equation for member in members], [len(some) for some in regressors]),
+    )
+
+
+_NONE = ColumnEquation(
+    numbers=np.empty(0),
+    code=np.empty((0, 5), dtype=np.uint64),
+    result=0,
+    places=np.empty((0, 2), dtype=np.int64),
+    table=np.empty((0, 2)),
+)
+
+
+def _equations(given: Sequence[ColumnEquation | None], regressors: Sequence[int]) -> Equations:
+    """Equations side by side: registers, tables and their rows count on from one to the next."""
+    all_ = [one or _NONE for one in given]
+    numbers, code = np.array([len(one.numbers) for one in all_]), np.array([len(one.code) for one in all_])
+    counts = [n + x + c if one else 0 for one, n, x, c in zip(given, numbers, regressors, code, strict=True)]
+    low, tables, rows = (
+        _firsts(some)[:-1] for some in (counts, [len(one.places) for one in all_], [len(one.table) for one in all_])
+    )
+    registers = np.zeros(sum(counts))
+    for at, one in zip(low, all_, strict=True):
+        registers[at : at + len(one.numbers)] = one.numbers
+    codes = [
+        one.code + np.outer(one.code[:, 0] == TABLE, [0, 0, 0, 0, own]).astype(np.uint64)
+        + np.array([0, at, at, at, 0], dtype=np.uint64)
+        for one, at, own in zip(all_, low, tables, strict=True)
+    ]  # fmt: skip
+    return Equations(
+        is_one=np.array([one is not None for one in given], dtype=np.bool_),
+        code=np.concatenate(codes),
+        code_first=_firsts([len(one.code) for one in all_]),
+        registers=registers,
+        low=low,
+        given=low + numbers,
+        first=low + numbers + np.array(regressors, dtype=np.int64),
+        result=low + np.array([one.result for one in all_], dtype=np.int64),
+        widths=np.zeros(1 + max((int(some[:, 4].max()) for some in codes if len(some)), default=0)),
+        places=np.concatenate([one.places + np.array([first, 0]) for one, first in zip(all_, rows, strict=True)]),
+        table=np.concatenate([one.table for one in all_]),
     )
 
 

@@ -22,6 +22,25 @@ class _Lowered(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ColumnEquation:
+    """An expression of the regressors, as the register machine runs it.
+
+    Args:
+        numbers: Constants and parameters: what stands in the first registers, before the regressors.
+        code: Instructions over ``[numbers | regressors | results]``, shape ``(n, 5)``.
+        result: The register that is the output.
+        places: Of each table its first row and its rows, shape ``(n_tables, 2)``.
+        table: Rows of all tables, shape ``(n_rows, 2)``.
+    """
+
+    numbers: NDArray[np.float64]
+    code: NDArray[np.uint64]
+    result: int
+    places: NDArray[np.int64]
+    table: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ColumnRecursion:
     """A recursion over columns, its inputs' and then its outputs'.
 
@@ -36,6 +55,8 @@ class ColumnRecursion:
         low: Lower bound of the outputs in scaled numbers.
         high: Upper bound of the outputs in scaled numbers.
         activation: The kind of its neurons.
+        equation: What is computed in the place of a linear part; ``None`` for none. Such a recursion has a constant of
+            0 for its only parameter.
     """
 
     lags: Lags
@@ -48,6 +69,7 @@ class ColumnRecursion:
     low: float
     high: float
     activation: str
+    equation: ColumnEquation | None = None
 
     @staticmethod
     def of(model: _Lowered) -> ColumnRecursion | None:

@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 from sysid.equations import Lowered
 from sysid.errors import TraceError
 from sysid.kernels import register_machine as machine
+from sysid.models.activations import PLAIN
 from sysid.models.case_search import shown
 from sysid.models.case_values import CaseValues
+from sysid.models.column_recursion import ColumnEquation, ColumnRecursion
+from sysid.models.ends import read_now
 from sysid.models.form import AbstractForm, no_prediction
 from sysid.models.history import History
+from sysid.models.lags import Lags
 from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_search import LARGEST, StateSearch, at_rest
 
@@ -99,6 +103,49 @@ class EquationForm(AbstractForm):
         """Twice as many samples as states and parameters by case, and one more."""
         n_constants = 0 if self.cases is None else len(self.cases.places)
         return 2 * (self.lowered.n_states + n_constants) + 1
+
+    @cached_property
+    def columns(self) -> ColumnRecursion | None:
+        """What it is in the compiled pass of a cascade: one output that is a function of whole lags of the inputs."""
+        low = self.lowered
+        if low.states or self.cases is not None or self.n_outputs > 1 or any(lag % 1 for _, lag in low.lagged):
+            return None
+        program, n_inputs = low.outputs, self.n_inputs
+        lags = [sorted(int(lag) for channel, lag in low.lagged if channel == i) for i in range(n_inputs)]
+        order = [low.lagged.index((i, lag)) for i, own in enumerate(lags) for lag in own]
+        place = np.arange(program.first + len(program.code), dtype=np.uint64)
+        given = program.first - len(order)
+        place[given + np.array(order, dtype=np.int64)] = np.arange(given, program.first)
+        code = program.code.copy()
+        code[:, 1:4] = place[code[:, 1:4]]
+        return ColumnRecursion(
+            lags=Lags(inputs=(*map(tuple, lags), ()), output=()),
+            neurons=0,
+            theta=np.zeros(1),
+            linear=False,
+            gated=False,
+            offset=(0.0,) * (n_inputs + 1),
+            scale=(1.0,) * (n_inputs + 1),
+            low=-math.inf,
+            high=math.inf,
+            activation=PLAIN,
+            equation=ColumnEquation(
+                numbers=np.concatenate([program.constants, self.filled[: program.sizes[0]]]),
+                code=code,
+                result=int(place[program.results[0]]),
+                places=low.places,
+                table=low.table,
+            ),
+        )
+
+    def reads_now(self, inputs: tuple[str, ...]) -> frozenset[str]:
+        """Inputs that are read at the sample of the output; all of equations that remember."""
+        return frozenset(inputs) if self.columns is None else read_now(inputs, self.columns.lags.inputs)
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.scaling.input_scale)
 
     @property
     def constants(self) -> tuple[str, ...]:  # type: ignore[override]  # read only: a form is frozen

@@ -6,12 +6,13 @@ import difflib
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.equations import RUNGE_KUTTA, Lowered
+from sysid.equations.written import renamed
 from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel, SeveralOutputs
 from sysid.models.case_values import CaseValues
@@ -201,6 +202,16 @@ class EquationModel(AbstractModel):
             declared=np.array([one is not None for one in given], dtype=np.bool_),
             fixed=np.array([one is not None and one.fixed for one in given], dtype=np.bool_),
         )
+
+    def over(self, mapping: Mapping) -> Self:
+        """The same model over other channels: its equations have their names; see the base class."""
+        ours, theirs = ((*one.inputs, *one.outputs) for one in (self.mapping, mapping))
+        if ours == theirs:
+            return self
+        names = dict(zip(ours, theirs, strict=True))
+        begins = tuple(replace(one, name=names.get(one.name, one.name)) for one in self.grey.begins.values())
+        equations = renamed(self.grey.system.equations, names)
+        return replace(self, mapping=mapping, grey=replace(self.grey, equations=equations, initial=begins))
 
     def with_theta(self: _ModelT, theta: Array) -> _ModelT:
         """The same model with other parameters."""

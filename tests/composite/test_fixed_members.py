@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from sysid.composite.composite import FixedMember
+from sysid.composite.fixed_equations import fixed_by_equations
 from sysid.composite.fixed_members import fixed_model, with_fixed
 from sysid.errors import ConfigError
 from sysid.models import Mapping
@@ -134,3 +135,38 @@ def test_an_output_that_is_measured_in_another_unit_is_refused():
         with_fixed([fixed("a -> b", gains={"a": 0.1, "b": 1}, low=-500, high=500, unit="mV")], [trace(np.ones((3, 2)))])
     assert caught.value.remedy is not None
     assert "unit: V" in caught.value.remedy
+
+
+def test_an_equation_stands_in_every_instance_over_its_channels():
+    declared = fixed_by_equations(
+        "top = max(a, s)*valve(a[k-2])",
+        unit="psi",
+        instances=("", "9"),
+        shared=("s",),
+        tables={"valve": [[0, 1], [9, 4]]},
+    )
+    values = np.random.default_rng(0).uniform(-2.0, 12.0, (50, 3))
+    channels = tuple(Channel(name=name, unit="psi") for name in ("a", "a9", "s"))
+    (seen,) = with_fixed(declared, [Trace(name="t", sample_time=0.1, channels=channels, values=values)])
+    for name, column in (("top", 0), ("top9", 1)):
+        a, before = values[:, column], np.concatenate([values[:1, column]] * 2 + [values[:-2, column]])
+        expected = np.maximum(a, values[:, 2]) * np.interp(before, [0, 9], [1, 4])
+        assert_allclose(seen[name], expected, rtol=1e-13)
+        assert seen.channel(name).unit == "psi"
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"equation": "a*c"},
+        {"equation": "a"},
+        {"equation": "a*b", "constant": 1.0},
+        {"equation": "a*b", "gains": {"a": 1, "b": 1}},
+        {"equation": "a*b(t - 1)"},
+        {"equation": "relay(a*b, 2, 1)"},
+        {"gains": {"a": 1, "b": 1}, "tables": {"v": [[0, 1], [1, 2]]}},
+    ],
+)
+def test_an_equation_of_other_inputs_or_with_a_memory_is_refused(fields):
+    with pytest.raises(ConfigError, match="a[+]b -> d|nothing says what"):
+        FixedMember(mapping=Mapping.parse("a+b -> d"), rest=0, **fields)

@@ -11,6 +11,8 @@ from sysid.models import (
     NARX,
     Cascade,
     Domain,
+    GreyBox,
+    GreyBoxModel,
     Limit,
     Mapping,
     NARXModel,
@@ -81,6 +83,24 @@ def wired_transfer_function(mapping: str) -> TransferFunctionModel:
     )
 
 
+def wired_equation(text: str, *inputs: str, **tables) -> GreyBoxModel:
+    """A member that is an equation without parameters."""
+    return GreyBoxModel(
+        grey=GreyBox(equations=text, tables=tables),
+        theta=np.empty(0),
+        norms=(),
+        levels=(),
+        spans=(),
+        substeps=1,
+        scaling=Scaling.identity(len(inputs)),
+        mapping=Mapping(inputs=inputs, output=text.split(" = ", maxsplit=1)[0]),
+        sample_time=0.1,
+        input_units=("psi",) * len(inputs),
+        output_unit="psi",
+        rest_output=2.0,
+    )
+
+
 def build_cascade() -> Cascade:
     """Three models: the first computes BP, the second reads it, the third reads both outputs and the command."""
     return Cascade(
@@ -133,6 +153,23 @@ def build_circle() -> Cascade:
     )
 
 
+def build_equations() -> Cascade:
+    """Networks and equations that read each other through the past, with limits that are equations."""
+    structure = NARX(input_delays="0:1", output_delays=1, neurons=4)
+    return Cascade(
+        models=(
+            wired_narx("STP+Q -> BP", NARX(input_delays=[[0, 1], [1, 3]], output_delays=2, neurons=5), 1),
+            wired_narx("BP+STP -> AR", structure, 2),
+            wired_equation("TOP = max(BP, 0.8*AR[k-1] + sqrt(abs(STP - BP[k-2])))", "STP", "AR", "BP"),
+            wired_equation("Q = where(STP > BP[k-1], share(AR)*BC[k-2], 40 - 0.1*STP[k-3])", "BC", "STP", "BP", "AR",
+                           share=[[0, 1], [39, 0.5], [90, 1.5]]),
+            wired_narx("Q -> BC", structure, 3),
+        ),
+        rest={"BP": "STP", "AR": 30.0, "Q": 25.0},
+        limits={"AR": Limit(low=12.0, high="TOP"), "Q": Limit(low=30.0, high="STP")},
+    )  # fmt: skip
+
+
 def build_committee() -> Cascade:
     """Three pairs of models of the same outputs: a channel limits an output in each, and one judges the first."""
     structure = NARX(input_delays="0:1", output_delays=1, neurons=4)
@@ -156,6 +193,7 @@ CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
     "in a circle": (build_circle, None),
     "some outputs, in another order": (build_limited, ("BC", "AR")),
     "one output of a circle": (build_circle, ("ER",)),
+    "equations in a circle": (build_equations, None),
     "a committee": (build_committee, ("BC",)),
 }
 """Models wired, and which outputs leave them."""

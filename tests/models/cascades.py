@@ -10,6 +10,8 @@ from sysid.models import (
     NARX,
     ARXModel,
     Cascade,
+    GreyBox,
+    GreyBoxModel,
     Limit,
     Mapping,
     NARXModel,
@@ -87,6 +89,25 @@ def at_most(text: str, *, above: float) -> ARXModel:
         input_units=("psi",),
         output_unit="psi",
         rest_output=90.0,
+    )
+
+
+def equation(text: str, *inputs: str, **tables) -> GreyBoxModel:
+    """A member that is an equation without parameters."""
+    output = text.split(" = ", maxsplit=1)[0]
+    return GreyBoxModel(
+        grey=GreyBox(equations=text, tables=tables),
+        theta=np.empty(0),
+        norms=(),
+        levels=(),
+        spans=(),
+        substeps=1,
+        scaling=Scaling.identity(len(inputs)),
+        mapping=Mapping(inputs=inputs, output=output),
+        sample_time=0.1,
+        input_units=("psi",) * len(inputs),
+        output_unit="psi",
+        rest_output=RESTS[output],
     )
 
 
@@ -179,6 +200,16 @@ CASCADES = {
         )
         for kind in NEURONS
     },
+    "equations in a circle": Cascade(
+        models=(
+            network("STP+x+BC -> BP", seed=1, inputs=(1, 3)), network("BP -> AR", seed=2),
+            equation("x = sqrt(abs(BP[k-1] - 0.9*AR[k-1]) + 0.1) * max(AR[k-2], ER[k-1])", "AR", "ER", "BP"),
+            equation("ER = where(STP > 75, BP, 0.5*y[k-1]) - filled(x)/30", "STP", "y", "BP", "x",
+                     filled=[[0, 1], [80, 3], [400, -2]]),
+            linear("ER -> y"), network("y+x -> BC", seed=3, spread=0.1),
+        ),
+        limits={"AR": Limit(high="BP", low="y"), "ER": Limit(low=-40.0), "x": Limit(high=500.0)},
+    ),
     "no neurons": Cascade(models=(network("STP -> BP", neurons=0, spread=0.15), linear("STP+BP -> BC"))),
 }  # fmt: skip
 

@@ -48,7 +48,7 @@ class TrainedMembers:
 
         Args:
             cascade: The whole.
-            trained: Outputs of the members that are trained; all members by default.
+            trained: Outputs of the members that are trained; all that have parameters by default.
 
         Returns:
             Them.
@@ -58,6 +58,9 @@ class TrainedMembers:
         """
         run, flags = _to_run(cascade, trained)
         members = [_columns(model) for model in run]
+        for model, columns, yes in zip(run, members, flags, strict=True):
+            if yes and columns.equation is not None:  # it reads and passes on, but its parameters are in its text
+                raise _cannot(model)
         program = program_of(members, [Ends.of(model) for model in run], cascade.wiring.channels, cascade.limits)
         places = _places(members, flags)
         output_of = {int(channel): i for i, channel in enumerate(program.output_channel)}
@@ -115,15 +118,17 @@ def with_theta(member: Member, theta: NDArray[np.float64]) -> Member:
 
 def _to_run(cascade: Cascade, trained: Sequence[str] | None) -> tuple[list[Member], list[bool]]:
     """Members that change while the trained ones do, and which of them are trained."""
+
+    def asked(model: Member) -> bool:
+        return model.n_parameters > 0 if trained is None else bool(set(Ends.of(model).outputs) & set(trained))
+
     if any(cascade.wiring.feeds_back(Ends.of(model)) for model in cascade.models):
-        return list(cascade.models), [
-            trained is None or bool(set(Ends.of(model).outputs) & set(trained)) for model in cascade.models
-        ]
+        return list(cascade.models), [asked(model) for model in cascade.models]
     changing: set[str] = set()
     run, flags = [], []
     for model in cascade.models:
         ends = Ends.of(model)
-        own = trained is None or bool(set(ends.outputs) & set(trained))
+        own = asked(model)
         reads = {*ends.inputs, *(c for n in ends.outputs if n in cascade.limits for c in cascade.limits[n].channels)}
         if own or reads & changing:
             changing |= set(ends.outputs)

@@ -14,20 +14,23 @@ from pydantic import BaseModel, Field
 from sysid.composite import FixedMember, equation_of, fixed_by_equations
 from sysid.errors import ConfigError
 from sysid.field_checks import Loc, Origins, check
+from sysid.workbench.assembly.member_config import TablesField
 from sysid.workbench.old_words import STRICT
 from sysid.yaml_files import yaml_text
 
 
 class FixedEquations(BaseModel):
-    """Members that are declared and not fitted, by equations: weighted sums of channels, held between two bounds.
+    """Members that are declared and not fitted, by equations: expressions of channels, held between two bounds.
 
     Args:
         equations: One a line: ``y = clamp(2*u - x[k-1], -5, 5)``, ``y = switch(u - 3)`` between 0 and 1,
-            ``y = relay(u - x, on=2, off=1, slope=20)``, or a sum without bounds. ``#`` begins a remark.
+            ``y = relay(u - x, on=2, off=1, slope=20)``, or any expression of channels now and whole samples ago.
+            ``#`` begins a remark.
         instances: Suffixes of the channel names, one for each instance of each of them.
         shared: Inputs that have the same name in every instance.
         rest: Values at rest: one for all, or by output; 0 where none is given.
         unit: Units: one for all but switches and relays, or by output; a pure number where none is given.
+        tables: By name the points ``[[x, y], ...]`` of functions that equations call.
     """
 
     model_config = STRICT
@@ -37,6 +40,7 @@ class FixedEquations(BaseModel):
     shared: tuple[str, ...] = ()
     rest: float | dict[str, float] = 0.0
     unit: str | dict[str, str] = "1"
+    tables: TablesField = Field(default_factory=dict)
 
 
 def one_by_one(entries: Sequence[Any], origins: Origins) -> list[tuple[Any, Loc]]:
@@ -67,8 +71,9 @@ def _members(entry: Mapping[str, Any], loc: Loc, origins: Origins) -> list[dict[
     asked = check(FixedEquations, entry, where=Origins(file=origins.file, parts=parts))
     try:
         members = fixed_by_equations(
-            asked.equations, rest=asked.rest, unit=asked.unit, instances=asked.instances, shared=asked.shared
-        )
+            asked.equations, rest=asked.rest, unit=asked.unit, instances=asked.instances, shared=asked.shared,
+            tables=asked.tables,
+        )  # fmt: skip
     except ConfigError as error:
         place = origins.place((*loc, "equations"))
         raise ConfigError(
@@ -93,6 +98,8 @@ def plain_words(fixed: FixedMember) -> dict[str, Any]:
     words = {
         "mapping": str(fixed.mapping),
         "gains": {name: dict(one) if isinstance(one, Mapping) else one for name, one in fixed.gains.items()},
+        "equation": fixed.equation,
+        "tables": _points(fixed),
         "constant": fixed.constant,
         "low": fixed.low,
         "high": fixed.high,
@@ -101,8 +108,14 @@ def plain_words(fixed: FixedMember) -> dict[str, Any]:
         "instances": list(fixed.instances),
         "shared": list(fixed.shared),
     }
-    usual = {"constant": 0.0, "unit": "1", "instances": [""], "shared": []}
+    usual = {
+        "gains": {}, "equation": "", "tables": {}, "constant": 0.0, "unit": "1", "instances": [""], "shared": [],
+    }  # fmt: skip
     return {name: value for name, value in words.items() if name not in usual or value != usual[name]}
+
+
+def _points(fixed: FixedMember) -> dict[str, list[list[float]]]:
+    return {name: [list(point) for point in points] for name, points in fixed.points.items()}
 
 
 def equations_text(members: Sequence[FixedMember]) -> str:
@@ -121,10 +134,13 @@ def equations_text(members: Sequence[FixedMember]) -> str:
         words = {
             "instances": list(group[0].instances),
             "shared": list(group[0].shared),
+            "tables": {name: points for one in group for name, points in _points(one).items()},
             "unit": units if len(set(units.values())) > 1 else next(iter(units.values()), "1"),
-            "rest": {one.output: int(one.rest) if one.rest.is_integer() else one.rest for one in group if one.rest},
+            "rest": {
+                one.output: int(one.rest) if float(one.rest).is_integer() else one.rest for one in group if one.rest
+            },
         }
-        usual: dict[str, Any] = {"instances": [""], "shared": [], "unit": "1", "rest": {}}
+        usual: dict[str, Any] = {"instances": [""], "shared": [], "tables": {}, "unit": "1", "rest": {}}
         given = {name: value for name, value in words.items() if value != usual[name]}
         head = yaml_text({**given, "equations": []}).splitlines()[:-1]  # what holds a list is never put on one line
         entry = [*head, "equations: |", *(f"  {equation_of(one)}" for one in group)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, cast
 
@@ -21,6 +22,9 @@ from sysid.workbench.fields import (
     options_config,
 )
 from sysid.workbench.old_words import STRICT, Words
+
+TablesField = dict[str, list[tuple[float, float]]]
+"""Functions by their points."""
 
 
 class StandingConfig(Words):
@@ -126,23 +130,29 @@ class MemberConfig(StandingConfig):
 
 
 class FixedConfig(StandingConfig):
-    """A member that is declared and not fitted: a weighted sum of its inputs, held between two bounds.
+    """A member that is declared and not fitted: an expression of its inputs, held between two bounds.
 
     Args:
         gains: The weight of each input, in the output's unit per the input's, or its weights by lag (``{0: 2, 1: -1}``
             looks one sample ahead); under the output's own name the weight of its last value: 1 sums up, more is a
             relay with hysteresis.
+        equation: In the place of gains any expression of the inputs: ``max(BP, AR[k-1])*RL``.
+        tables: By name the points ``[[x, y], ...]`` of functions that it calls.
         constant: What is added, in the output's unit.
-        low: Least value.
-        high: Greatest value.
+        low: Least value; none where it is left out.
+        high: Greatest value; none where it is left out.
         rest: Value at rest.
         unit: Of the output; a pure number by default.
     """
 
-    gains: dict[str, float | Annotated[dict[Annotated[int, Field(ge=0)], float], Field(min_length=1)]]
+    gains: dict[str, float | Annotated[dict[Annotated[int, Field(ge=0)], float], Field(min_length=1)]] = Field(
+        default_factory=dict
+    )
+    equation: str = ""
+    tables: TablesField = Field(default_factory=dict)
     constant: float = 0.0
-    low: float
-    high: float
+    low: float = -math.inf
+    high: float = math.inf
     rest: float
     unit: str = "1"
 
@@ -165,5 +175,6 @@ class FixedConfig(StandingConfig):
         """
         return FixedMember(
             **self.standing(),
-            gains=self.gains, constant=self.constant, low=self.low, high=self.high, rest=self.rest, unit=self.unit,
+            gains=self.gains, equation=self.equation, tables=self.tables, constant=self.constant,
+            low=self.low, high=self.high, rest=self.rest, unit=self.unit,
         )  # fmt: skip

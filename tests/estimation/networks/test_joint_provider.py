@@ -53,6 +53,17 @@ def test_some_members_alone_are_trained(trained):
     check(one)
 
 
+def test_what_an_equation_has_for_parameters_is_not_trained_with_the_others():
+    whole = CASCADES["equations in a circle"]
+    known = whole.member("x")
+    assert {member.mapping.output for member in provider(whole).members} == {"BP", "AR", "y", "BC"}
+    scaled = replace(known.grey, equations=f"{known.grey.equations} * k", parameters={"k": 1.0})
+    free = replace(known, grey=scaled, theta=[1.0])
+    for one, trained in ((whole, ("x",)), (whole.with_member(free), None)):
+        with pytest.raises(ConfigError, match="cannot be trained with the others"):
+            provider(one, trained=trained)
+
+
 def test_a_target_upstream_of_what_is_trained_does_not_move():
     one = provider(service(), trained=("AR",), errors={"BP": 1.0, "BC": 2.0})
     J = one.jacobian(one.theta)

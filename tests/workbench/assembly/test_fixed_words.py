@@ -57,7 +57,12 @@ def test_who_extends_replaces_one_of_them(tmp_path):
 @pytest.mark.parametrize(
     ("edit", "line", "field", "says"),
     [
-        (("*upper - upper", "*upper*lower - upper"), 4, "equations: equations, line 2, column 21", "no weighted sum"),
+        (
+            ("*upper - upper", "*upper*net(lower, neurons=2) - upper"),
+            4,
+            "equations: equations, line 2, column 22",
+            "net within",
+        ),
         (("0, 9)", "0, -9)"), 4, "equations: low, high", "bounds of near"),
         (("rest: {open: 1}", "rest: {shut: 1}"), 4, "equations: rest", "rest names shut"),
         (("unit: cm", "units: cm"), 2, "units", "did you mean unit"),

@@ -362,3 +362,30 @@ def test_the_report_says_what_was_exported_and_how_far_it_is_from_the_whole(work
         (f"bundle/{one.name}", "torchscript", "cm") for one in bundle.files
     ]
     assert all(one.largest_difference <= one.tolerance == 1e-6 for one in exports)
+
+
+def test_what_is_known_may_be_any_equation(workspace: Path) -> None:
+    """The flow by its law: what is left to fit is linear, and the whole is exact but for rounding."""
+    file = workspace / "pipelines" / "tanks.yaml"
+    text = file.read_text()
+    start, end = text.index("members:"), text.index("monte_carlo")
+    declared = """\
+fixed:
+  - unit: cm
+    equations: |
+      head = max(upper[k-1] - 0.3*lower[k-1], 0)
+      down = min(0.15*sqrt(head), head)
+members:
+  - {mapping: pump+down -> upper, structure: {kind: NARX, input_delays: [0], output_delays: 1, neurons: 0}, rest: 0}
+  - {mapping: down -> lower, structure: {kind: NARX, input_delays: [0], output_delays: 1, neurons: 0}, rest: 0}
+together: {targets: {upper: 0.1, lower: 0.1}, training: {max_iterations: 4, stride: 2}}
+"""
+    text = text[:start] + declared + text[end:]
+    file.write_text(text.replace("export: null", "export: {formats: [c], tolerance: 1.0e-4}"))
+    assert run(workspace) == 0
+    results = assembly_results(workspace / "runs" / "tanks")
+    assert [one.equation for one in results.equations] == [
+        "head = max(upper[k-1] - 0.3 * lower[k-1], 0)", "down = min(0.15 * sqrt(head), head)",
+    ]  # fmt: skip
+    for output in ("upper", "lower"):
+        assert max(results.stages[-1].mse[output].values()) < 1e-5
