@@ -168,5 +168,5 @@ def test_an_equation_stands_in_every_instance_over_its_channels():
     ],
 )
 def test_an_equation_of_other_inputs_or_with_a_memory_is_refused(fields):
-    with pytest.raises(ConfigError, match="a[+]b -> d|nothing says what"):
+    with pytest.raises(ConfigError, match=r"a[+]b -> d|nothing says what"):
         FixedMember(mapping=Mapping.parse("a+b -> d"), rest=0, **fields)
