@@ -17,7 +17,7 @@ __version__ = "0.2.0"
 
 WORDS = (
     *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
-    *("advise", "excite", "frequency_response", "impulse_response"),
+    *("advise", "excite", "frequency_response", "impulse_response", "step", "bode", "poles"),
     *("OrderSearch", "ARX", "ARMAX", "OE", "BJ", "LinearStateSpace", "VectorStateSpace", "TransferFunction"),
     *("NARX", "NeuralStateSpace", "VectorNARX", "VectorNeuralStateSpace", "GreyBox", "VectorGreyBox"),
     *("HammersteinWiener", "WienerHammerstein", "PolynomialNARX"),

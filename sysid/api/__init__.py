@@ -22,6 +22,7 @@ from sysid.api.fits import Fit, SystemFit
 from sysid.api.fitting import fit, load
 from sysid.api.looking import advise, excite, frequency_response, impulse_response
 from sysid.api.orders import OrderSearch, search_orders
+from sysid.api.responses import bode, poles, step
 from sysid.api.saving import read_bundle, save
 from sysid.estimation import (
     JointTraining,
@@ -68,5 +69,5 @@ __all__ = [
 __all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining", "VectorStateSpace"]
 __all__ += ["HammersteinWiener", "PolynomialNARX", "VectorGreyBox", "VectorNeuralStateSpace", "WienerHammerstein"]
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
-__all__ += ["advise", "excite", "frequency_response", "impulse_response"]
+__all__ += ["advise", "bode", "excite", "frequency_response", "impulse_response", "poles", "step"]
 __all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]

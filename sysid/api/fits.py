@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sysid.api.comparison import compare
 from sysid.api.given import TracesLike, traces_of
+from sysid.api.responses import Bode, Poles, StepResponse, bode, poles, step
 from sysid.api.saving import save
 from sysid.errors import ChannelError, TraceError
 from sysid.estimation import FitResult
@@ -168,6 +169,18 @@ class Fit(FitResult):
             A figure of matplotlib's, to restyle, show or save.
         """
         return compare(traces or self.traces, self, start=self.start).plot()
+
+    def step(self, *, seconds: float | None = None) -> StepResponse:
+        """Its step responses with their intervals; see :func:`sysid.step`."""
+        return step(self, seconds=seconds)
+
+    def bode(self, *, frequency: Any = None) -> Bode:
+        """Its Bode diagram with its intervals; see :func:`sysid.bode`."""
+        return bode(self, frequency=frequency)
+
+    def poles(self) -> Poles:
+        """Its poles with their intervals; see :func:`sysid.poles`."""
+        return poles(self)
 
     def plot_curves(self, traces: TraceSet | None = None) -> Figure:
         """The static curves of a block-oriented model, over what the records range over, and where these lie.
@@ -331,6 +344,18 @@ class SystemFit:
         columns = np.asarray(y, dtype=np.float64).reshape(-1, len(self.fits)).T
         found = [fit.predict(column, u, steps=steps) for fit, column in zip(self.fits.values(), columns, strict=True)]
         return np.column_stack(found)
+
+    def step(self, *, seconds: float | None = None) -> StepResponse:
+        """The step responses of all outputs with their intervals; see :func:`sysid.step`."""
+        return step(self, seconds=seconds)
+
+    def bode(self, *, frequency: Any = None) -> Bode:
+        """The Bode diagrams of all outputs with their intervals; see :func:`sysid.bode`."""
+        return bode(self, frequency=frequency)
+
+    def poles(self) -> Poles:
+        """The poles of all models with their intervals; see :func:`sysid.poles`."""
+        return poles(self)
 
     def plot(self, traces: TraceSet | None = None) -> Figure:
         """The free run of each output over its measurement, case by case."""

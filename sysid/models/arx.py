@@ -134,8 +134,8 @@ class ARXModel(LinearForms):
     @property
     def b(self) -> tuple[NDArray[np.float64], ...]:
         """For each input the coefficients of its past values, shapes ``(nb_j,)``."""
-        ends = np.cumsum(self.orders.nb)
-        return tuple(np.split(self.coefficients[: ends[-1]], ends[:-1]))
+        ends = np.cumsum(self.orders.nb, dtype=np.intp)
+        return tuple(np.split(self.coefficients[: ends[-1]], ends[:-1])) if len(ends) else ()
 
     @property
     def poles(self) -> NDArray[np.complex128]:

@@ -45,8 +45,8 @@ from sysid.models.innovations import Innovations
 from sysid.models.linear_state_space import polynomials
 from sysid.models.polynomial import AbstractPolynomial
 from sysid.models.ratio import Ratio
-from sysid.reporting.figures.linear_figures import band
 from sysid.reporting.linear_view import LinearView, linear_views
+from sysid.reporting.step_responses import band
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 

@@ -70,7 +70,19 @@ def modes(model: AbstractModel, uncertainty: Uncertainty | None, probability: fl
         shared = sum(other.of_denominator == ratio.of_denominator for other in ratios.values())
         several = len(ratios) > 1 and shared == 1
         found += _modes(ratio, model.sample_time, uncertainty, probability, model.mapping.inputs[j] if several else "")
-    return tuple(found)
+    own = None if ratios else _of_series(model, uncertainty)
+    return tuple(found if own is None else _modes(own, model.sample_time, uncertainty, probability, ""))
+
+
+def _of_series(model: AbstractModel, uncertainty: Uncertainty | None) -> Ratio | None:
+    """The denominator of a model without inputs, which only innovations drive; ``None`` where it has none."""
+    poles: NDArray[np.complex128] | None = getattr(model, "poles", None)
+    if poles is None or model.mapping.inputs or not len(poles):
+        return None
+    names = () if uncertainty is None else uncertainty.names
+    begins = next((start for start in ("a(", "A(", "F(") if any(name.startswith(start) for name in names)), "A(")
+    F = np.real(np.poly(poles))
+    return Ratio(B=np.ones(1), F=F, delay=0, discrete=True, of_numerator="", of_denominator=begins)
 
 
 def _modes(ratio: Ratio, T: float, uncertainty: Uncertainty | None, probability: float, of: str) -> Iterator[Mode]:

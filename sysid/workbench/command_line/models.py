@@ -101,6 +101,22 @@ def worst(
     worst_command(bundle, like=like, case=case, seeds=seeds, output=output, keep=keep, into=into)
 
 
+@commands.command(epilog="Example: sysid response runs/dryer --fit ARX")
+def response(
+    model: Annotated[Path, typer.Argument(help="Folder of a run, whose fits have intervals; or a bundle, without.")],
+    *,
+    fit: Annotated[str | None, typer.Option(help="Name of a fit of the run; the best by default.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Length of the step response; until it has settled.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for pictures and tables; the current one by default.")
+    ] = None,
+) -> None:
+    """Step response, Bode diagram and poles of a linear model: numbers, tables and pictures, with intervals."""
+    from sysid.workbench.commands.response import response_command
+
+    response_command(model, fit=fit, seconds=seconds, out=out)
+
+
 @commands.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')
 def export(
     pipeline: Annotated[

@@ -10,8 +10,9 @@ from scipy import signal
 
 from sysid.estimation import FitResult, TransferFunctionTraining, fit_transfer_function
 from sysid.models import Mapping, TransferFunction
-from sysid.reporting.figures.linear_figures import _filter_step, band, bode_figure, pole_zero_figure, step_figure
+from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.svg import svg
+from sysid.reporting.step_responses import band, filter_step
 from tests.estimation.linear_systems import steps, trace_of
 
 
@@ -74,7 +75,7 @@ def test_all_draws_at_once_are_filtered_as_each_alone(n_b: int, n_f: int, n: int
     b, f = rng.standard_normal((7, n_b)), 0.2 * rng.standard_normal((7, n_f))
     f[:, 0] = 2.0
     found = np.zeros((7, n))
-    _filter_step(b, f, found)
+    filter_step(b, f, found)
     alone = [signal.lfilter(*one, np.ones(n)) for one in zip(b, f, strict=True)]
     np.testing.assert_allclose(found, np.reshape(alone, (7, n)), rtol=1e-12, atol=1e-12)
 

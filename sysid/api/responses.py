@@ -1,0 +1,163 @@
+"""Step responses, Bode diagrams and poles of linear fits, with their intervals, in the words that people know."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult
+from sysid.export.own_figures import side_by_side
+from sysid.models import AbstractModel, Cascade
+from sysid.reporting import responses as room
+from sysid.reporting.responses import Known, bode_of, check_linear, poles_of, step_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class StepResponse(room.StepResponse):
+    """Step responses that draw themselves."""
+
+    def plot(self) -> Figure:
+        """The responses with their bands.
+
+        Returns:
+            A figure of matplotlib's, one panel a pair.
+        """
+        from sysid.reporting.figures.linear_figures import draw_step
+
+        return draw_step(self)
+
+
+class Bode(room.Bode):
+    """Frequency responses that draw themselves."""
+
+    def plot(self) -> Figure:
+        """Gain and phase with their bands.
+
+        Returns:
+            A figure of matplotlib's, one column a pair.
+        """
+        from sysid.reporting.figures.linear_figures import draw_bode
+
+        return draw_bode(self)
+
+
+class Poles(room.Poles):
+    """Poles that draw themselves."""
+
+    def plot(self) -> Figure:
+        """Poles and zeros of every input, with the cloud of poles that the uncertainty allows, of the first model.
+
+        Returns:
+            A figure of matplotlib's.
+        """
+        from sysid.reporting.figures.linear_figures import pole_zero_figure
+
+        return pole_zero_figure(*self.models[0])
+
+
+def _fields(found: Any) -> dict[str, Any]:
+    return {one.name: getattr(found, one.name) for one in fields(found)}
+
+
+def step(fit: Any, *, seconds: float | None = None) -> StepResponse:
+    """Change of the outputs after a step of one unit in each input, with 95 % intervals.
+
+    Args:
+        fit: A linear fit, of one output or of several; a bundle or a model, which have no intervals.
+        seconds: Length; by default until the slowest pole has settled.
+
+    Returns:
+        The responses: printed they say gain, rise time, settling time and overshoot, ``plot()`` draws them,
+        ``to_frame()`` and ``info()`` give the numbers.
+
+    Raises:
+        ConfigError: If it is not linear, no input moves it, or the length is none.
+    """
+    known = known_of(fit)
+    check_linear(known)
+    if seconds is None:
+        return StepResponse(**_fields(step_of(known)))
+    T = known[0][0].sample_time
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not T <= seconds <= LONGEST * T:
+        raise ConfigError(
+            "not a length of a step response",
+            where="seconds",
+            expected=f"a number from {T:g} to {LONGEST * T:g}, as of 1 to {LONGEST:,} samples",
+            got=seconds,
+            remedy="leave it out for the time until the slowest pole has settled",
+        )
+    samples = int(np.floor(seconds / T * (1.0 + 1e-12))) + 1
+    return StepResponse(**_fields(step_of(known, samples=samples)))
+
+
+LONGEST = 100_000
+"""Samples of a step response at most."""
+
+
+def bode(fit: Any, *, frequency: Any = None) -> Bode:
+    """Gain and phase from each input to each output, with 95 % intervals.
+
+    Args:
+        fit: As for :func:`step`.
+        frequency: In rad/s; by default four decades up to the Nyquist frequency.
+
+    Returns:
+        The responses: ``plot()`` draws them, ``to_frame()`` gives the numbers.
+
+    Raises:
+        ConfigError: If it is not linear, no input moves it, or a frequency is none.
+    """
+    return Bode(**_fields(bode_of(known_of(fit), frequency=frequency)))
+
+
+def poles(fit: Any) -> Poles:
+    """The poles with time constants, natural frequencies and damping, and 95 % intervals of these.
+
+    Args:
+        fit: As for :func:`step`.
+
+    Returns:
+        The poles, the slowest first: they are printed, iterated, drawn, or made a frame.
+
+    Raises:
+        ConfigError: If it is not linear.
+    """
+    return Poles(**_fields(poles_of(known_of(fit))))
+
+
+def known_of(fit: Any) -> Known:
+    """The models of what was given, each with the uncertainty of its parameters.
+
+    Args:
+        fit: A fit, several as one or in a list, a bundle, or a model.
+
+    Returns:
+        They.
+
+    Raises:
+        ConfigError: If it is something else, or a chain of models that read each other.
+    """
+    if isinstance(fit, FitResult):
+        return [(fit.model, fit.uncertainty)]
+    fits = list(getattr(fit, "fits", {}).values()) or fit
+    if isinstance(fits, list) and fits and all(isinstance(one, FitResult) for one in fits):
+        return [(one.model, one.uncertainty) for one in fits]
+    model = getattr(fit, "model", fit)
+    if isinstance(model, Cascade) and side_by_side(model):
+        return [(one, None) for one in model.models]
+    if isinstance(model, AbstractModel):
+        return [(model, None)]
+    raise ConfigError(
+        "there is nothing here that responds to a step",
+        where="fit",
+        expected="a linear fit, a bundle of one, or a model",
+        got=type(fit).__name__,
+        remedy="of models that read each other, model.to_control() is the whole"
+        if isinstance(model, Cascade)
+        else "give what sysid.fit or sysid.read_bundle gives",
+    )

@@ -1,0 +1,86 @@
+"""``sysid response``: what a linear fit of a run, or a bundle, answers to a step and to sines, and its poles."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from sysid.api.responses import Bode, StepResponse, bode, poles, step
+from sysid.errors import ConfigError
+from sysid.estimation import FitResult
+from sysid.export.bundle import Bundle
+from sysid.export.reading import read_bundle
+from sysid.names import slug
+from sysid.reporting.figures.style import styled
+from sysid.reporting.figures.svg import as_file, svg
+from sysid.reporting.results import read_results
+from sysid.workbench.fits.record import read_fit
+from sysid.workbench.runner.console import console
+from sysid.workbench.runner.naming import nearby
+from sysid.workbench.runner.store import RunFolder, write_bytes
+
+RESULTS = "results.json"
+
+
+def response_command(model: Path, *, fit: str | None, seconds: float | None, out: Path | None) -> None:
+    """Print poles, gains and times, and write tables and pictures.
+
+    Args:
+        model: A run folder, or a bundle's folder or zip.
+        fit: Name of a fit of the run; the best by default.
+        seconds: Length of the step response.
+        out: Folder of what is written.
+
+    Raises:
+        ConfigError: If there is no such fit, or it is not linear.
+    """
+    model = model if model.exists() else Path("runs") / model
+    run = (model / RESULTS).is_file()
+    asked, title = (_fits(model, fit), fit or model.name) if run else (_bundle(model, fit), model.stem)
+    # What has no response at all is told before anything is written.
+    shown: dict[str, StepResponse | Bode] = {"step": step(asked, seconds=seconds), "bode": bode(asked)}
+    target = console()
+    target.print(f"Poles\n{poles(asked)}", soft_wrap=True)
+    folder = out or Path()
+    folder.mkdir(parents=True, exist_ok=True)
+    for kind, found in shown.items():
+        target.print(f"{kind.capitalize()}\n{found}", soft_wrap=True)
+        with styled():
+            drawing = svg(found.plot(), title=kind.capitalize(), description=f"{kind} of {title}", name=kind)
+        table, picture = (folder / f"{slug(title)}.{kind}.{ending}" for ending in ("csv", "svg"))
+        write_bytes(picture, as_file(drawing))
+        write_bytes(table, found.to_frame().to_csv(index=False).encode())
+        target.print(f"written: {nearby(table)}, {nearby(picture)}", soft_wrap=True)
+
+
+def _fits(folder: Path, name: str | None) -> list[FitResult]:
+    """The models of a fit of a run, the best by default."""
+    results = read_results(folder)
+    if name is None and results.best is None:
+        raise ConfigError("no fit was chosen", where=folder, remedy="name one with --fit")
+    best = results.best_fit
+    wanted = name or (best.system or best.name if best is not None else "")
+    known = dict.fromkeys(one for fit in results.fits for one in (fit.system, fit.name) if one)
+    if wanted not in known:
+        near = difflib.get_close_matches(wanted, list(known), n=1)
+        raise ConfigError(
+            f"there is no fit named {wanted}",
+            where=folder,
+            expected=f"one of {'; '.join(known)}",
+            got=wanted,
+            remedy=f"did you mean {near[0]}?" if near else "name one of them with --fit",
+        )
+    slugs = dict.fromkeys(one.model_slug or one.slug for one in results.fits if wanted in {one.system, one.name})
+    return [read_fit(RunFolder(path=folder).fit(place)) for place in slugs]
+
+
+def _bundle(path: Path, fit: str | None) -> Bundle:
+    if fit is not None:
+        raise ConfigError(
+            "a bundle has one model",
+            where=path,
+            expected="the folder of a run, with --fit",
+            got=f"--fit {fit}",
+            remedy="leave --fit out, or give the run's folder, such as runs/NAME",
+        )
+    return read_bundle(path)
