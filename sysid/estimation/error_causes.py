@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.informative import by_chance, informative, unit, with_past
-from sysid.estimation.input_features import CURVES, LINEAR, PLAYS, features
+from sysid.estimation.input_features import CURVES, LINEAR, features
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.models import AbstractModel
 
@@ -47,6 +47,7 @@ in its sample before from which it is told in any case; and its part of the outp
 STRAIGHT, STEEP = 0.4, 0.5
 """What a line in time must leave of an output's squares beside its inputs, and how far it must go, in deviations."""
 OWN_PAST = 5
+TINY = float(np.finfo(np.float64).tiny)
 
 
 def causes(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> list[str]:
@@ -142,11 +143,7 @@ def _standing(y: Array, s: Array, usable: Mask) -> str:
 
 def _of_inputs(groups: dict[str, Array], target: Array, usable: Mask) -> str:
     """A sentence where the inputs explain a signal, on halves of the record that did not choose how."""
-    found: dict[str, float] = {}
-    columns = np.empty((len(target), 0))
-    for kind in (LINEAR, CURVES, PLAYS):
-        columns = np.column_stack([columns, groups[kind]])
-        found[kind] = _explained(columns, target, usable)
+    found = {kind: _explained(columns, target, usable) for kind, columns in groups.items()}
     most = max(found.values())
     if not most > 0.0:
         return ""
@@ -177,27 +174,40 @@ def _explained(columns: Array, target: Array, usable: Mask) -> float:
     halves = places[: len(places) // 2], places[len(places) // 2 :]
     best = 0.0
     for part, (least, in_each) in ((own, (EXPLAINED, IN_EACH)), (0.0, (PLAINLY, PLAINLY_IN_EACH))):
-        x, y = columns[1:] - part * columns[:-1], centred[1:] - part * centred[:-1]
-        found = [_of_half(x, y, here, there) for here, there in (halves, halves[::-1])]
+        news = _news(columns, part), _news(centred, part)
+        found = [_of_half(*news, here, there) for here, there in (halves, halves[::-1])]
+        del news
         if min(found) >= in_each and np.mean(found) >= least:
             best = max(best, float(np.mean(found)))
     return best
 
 
+def _news(signals: Array, part: float) -> Array:
+    """Signals from their second sample on, less a part of the one before."""
+    if not part:
+        return signals[1:]
+    news: Array = -part * signals[:-1]
+    news += signals[1:]
+    return news
+
+
 def _of_half(columns: Array, target: Array, here: NDArray[np.int64], there: NDArray[np.int64]) -> float:
-    chosen, weights = _pursued(columns[here] - columns[here].mean(axis=0), target[here] - target[here].mean())
+    own = columns[here]
+    own -= own.mean(axis=0)
+    chosen, weights = _pursued(own, target[here] - target[here].mean())
     other = target[there] - target[there].mean()
-    left = other - (columns[there][:, chosen] - columns[there][:, chosen].mean(axis=0)) @ weights
+    taken = columns[np.ix_(there, chosen)]
+    left = other - (taken - taken.mean(axis=0)) @ weights
     return 1.0 - float(left @ left) / max(float(other @ other), 1e-300)
 
 
 def _pursued(columns: Array, target: Array) -> tuple[list[int], Array]:
     """The few columns that explain a signal best, one after the other (orthogonal matching pursuit), and weights."""
-    directions, chosen = unit(columns), list[int]()
+    lengths, chosen = np.maximum(np.sqrt(np.einsum("ij,ij->j", columns, columns)), TINY), list[int]()
     weights: Array = np.empty(0, dtype=np.float64)
     left: Array = target
     for _ in range(min(TERMS, columns.shape[1])):
-        products = np.abs(directions.T @ left)
+        products = np.abs(columns.T @ left) / lengths
         products[chosen] = 0.0
         chosen.append(int(np.argmax(products)))
         weights = np.asarray(np.linalg.lstsq(columns[:, chosen], target, rcond=None)[0], dtype=np.float64)
@@ -237,7 +247,7 @@ def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[st
 
 def _drift(groups: dict[str, Array], y: Array, usable: Mask, name: str) -> str:
     """A sentence where a straight line in time is what the inputs leave of the output."""
-    columns = np.column_stack([groups[LINEAR], groups[CURVES]])[usable]
+    columns = groups[CURVES][usable]
     columns, target = columns - columns.mean(axis=0), y[usable] - y[usable].mean()
     line = np.linspace(-0.5, 0.5, len(y))[usable]
     line = (line - line.mean()) / np.linalg.norm(line - line.mean())

@@ -49,8 +49,8 @@ class FreeRun:
         window = slice(begun.first, begun.first + MOST_SAMPLES)
         shape = (-1, len(model.mapping.outputs))
         return cls(
-            inputs=inputs[window],
-            output=output[window].reshape(shape),
+            inputs=inputs[window].copy(),  # the rest of a long record is not kept for it
+            output=output[window].reshape(shape).copy(),
             simulated=model.simulate(inputs[window], begun.history).reshape(shape),
             usable=usable[window],
             history=begun.history,

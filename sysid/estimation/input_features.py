@@ -30,7 +30,7 @@ def features(inputs: Array, simulated: Array) -> dict[str, Array]:
         simulated: Free run of one output, shape ``(n_samples,)``, for curves behind it.
 
     Returns:
-        By kind the columns, shape ``(n_samples, n)``.
+        By kind the columns of it and of all simpler kinds before it, shape ``(n_samples, n)``: of one array.
     """
     u = inputs[:, :MOST_INPUTS]
     u = (u - u.mean(axis=0)) / np.maximum(u.std(axis=0), np.finfo(np.float64).tiny)
@@ -50,7 +50,9 @@ def features(inputs: Array, simulated: Array) -> dict[str, Array]:
             linear.append(slow)
         curves += [_slowed(bent, memory), *(_curves(one) for one in _slowed(u, memory).T)]
         plays += [_slowed(held, memory)]
-    return {kind: np.column_stack(parts) for kind, parts in ((LINEAR, linear), (CURVES, curves), (PLAYS, plays))}
+    whole = np.column_stack([*linear, *curves, *plays])
+    ends = np.cumsum([sum(part.shape[1] for part in parts) for parts in (linear, curves, plays)])
+    return {kind: whole[:, :end] for kind, end in zip((LINEAR, CURVES, PLAYS), ends, strict=True)}
 
 
 def _late(x: Array) -> Array:

@@ -18,13 +18,15 @@ def test_columns_are_settled_and_depend_on_nothing_that_comes_later() -> None:
         assert columns.shape[0] == 200
         assert np.isfinite(columns).all()
     still = features(np.full((200, 1), 3.0), np.zeros(200))
-    for kind in (CURVES, PLAYS):
-        assert np.allclose(still[kind], still[kind][0])
+    at = still[LINEAR].shape[1]
+    assert np.allclose(still[PLAYS][:, at:], still[PLAYS][0, at:])
+    assert found[PLAYS].base is found[LINEAR].base  # each kind has all simpler ones before it, and none is copied
 
 
 def test_a_play_follows_only_what_pushes_it() -> None:
     u = np.r_[np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.0, 50)]
-    held = features(u[:, np.newaxis], u)[PLAYS][:, 0]
+    found = features(u[:, np.newaxis], u)
+    held = found[PLAYS][:, found[CURVES].shape[1]]
     turn = held[49:56]
     assert np.allclose(turn, turn[0])  # nothing moves while it crosses the gap
     assert held[-1] < turn[0]

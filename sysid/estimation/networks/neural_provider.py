@@ -189,7 +189,7 @@ class NeuralProvider(AbstractProvider):
         gradient, matrix = np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
         loss, correlated = 0.0, 0.0
         for record in self._records:
-            residuals = []
+            residuals = np.empty((len(record.u), self.template.sizes.outputs))
             raw_gradient, raw_matrix = np.zeros(self._n_raw), np.zeros((self._n_raw, self._n_raw))
             for rows, y, raw in self._raw(record, theta):
                 residual = record.weighted(y - record.target[rows], rows)
@@ -197,9 +197,9 @@ class NeuralProvider(AbstractProvider):
                 loss += 0.5 * float(residual @ residual)
                 raw_gradient += weighted.T @ residual
                 raw_matrix += weighted.T @ weighted  # one array twice: NumPy calls syrk, half the flops
-                residuals.append(residual)
+                residuals[rows] = residual.reshape(-1, residuals.shape[1])
             self._add(record, raw_gradient, raw_matrix, gradient, matrix)
-            for whole in np.concatenate(residuals).reshape(-1, self.template.sizes.outputs).T:
+            for whole in residuals.T:
                 correlated += len(whole) * correlation_time(whole)
         return Linearisation(
             loss=loss,

@@ -11,6 +11,8 @@ from scipy import linalg
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.segments import columns_of_lags
 
+BLOCK = 2**15
+"""Samples whose lags are laid side by side at a time."""
 MOST, NEEDED = 40, 4
 """Orders that are looked for, and below which nothing can be fitted."""
 SEEN = 1e-4
@@ -44,7 +46,12 @@ def excitation_order(
     """
     n = min(most, largest_order(parts))
     mean = np.concatenate(parts).mean()
-    blocks = [columns_of_lags(part - mean, range(n), slice(n - 1, None)) for part in parts if len(part) >= n]
+    rows = (
+        (part, slice(first, min(first + BLOCK, len(part))))
+        for part in parts
+        for first in range(n - 1, len(part), BLOCK)
+    )
+    blocks = (columns_of_lags(part, range(n), at) - mean for part, at in rows)
     R = triangle((np.column_stack([b, b[:, 0]]) for b in blocks), free=0).R[:n, :n]
     best, condition = 0, np.inf
     for order in range(1, n + 1):
