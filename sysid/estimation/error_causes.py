@@ -196,7 +196,7 @@ def _of_half(columns: Array, target: Array, here: NDArray[np.int64], there: NDAr
     own -= own.mean(axis=0)
     chosen, weights = _pursued(own, target[here] - target[here].mean())
     other = target[there] - target[there].mean()
-    taken = columns[np.ix_(there, chosen)]
+    taken = columns[there[:, np.newaxis], chosen]
     left = other - (taken - taken.mean(axis=0)) @ weights
     return 1.0 - float(left @ left) / max(float(other @ other), 1e-300)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,13 @@ from sysid.estimation.linear.refined_iv import refined_sections
 from sysid.estimation.linear.regression import solve
 from sysid.estimation.linear.sanathanan_koerner import sk_poles
 from sysid.estimation.linear.variable_projection import Sections
+from sysid.estimation.nonparametric.evidence import triangle
+from sysid.estimation.nonparametric.segments import columns_of_lags
 from sysid.models.orthonormal_basis import Domain, basis_of
 from sysid.models.realisation import realise
 
+BLOCK = 2**14
+"""Rows of the long ARX model that are laid side by side at a time."""
 LONGEST_ARX = 40
 """Lags of each channel in the long ARX model, at most; fewer where the records are short."""
 _GRID = 300
@@ -73,26 +77,33 @@ def long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> Lo
     Returns:
         The model.
     """
-    tables, targets = [], []
-    for record in records:
-        n, m = record.inputs.shape
-        y, level = record.target, record.target[0]
-        past = [_delayed(y, lag, level) for lag in range(1, n_lags + 1)]
-        drive = [_delayed(record.inputs[:, j], lag, record.past[j]) for j in range(m) for lag in range(n_lags + more)]
-        root = record.root_weights * _known(record, n_lags + more)
-        tables.append(np.column_stack([*past, *drive, np.ones(n)]) * root[:, np.newaxis])
-        targets.append(y * root)
-    X, y = np.concatenate(tables), np.concatenate(targets)
-    few = len(X) < X.shape[1]  # a start all the same: the shortest of all that fit
-    solution = linalg.lstsq(X, y, cond=1e-10)[0] if few else solve(X, y).coefficients
     m, width = records[0].inputs.shape[1], n_lags + more
+    samples, columns = sum(len(record.target) for record in records), n_lags + m * width + 1
+    blocks = (block for record in records for block in _blocks(record, n_lags, width))
+    if samples < columns:  # a start all the same: the shortest of all that fit
+        whole = np.concatenate([*blocks])
+        solution = linalg.lstsq(whole[:, :-1], whole[:, -1], cond=1e-10)[0]
+    else:
+        reduced = triangle(blocks, free=0)
+        solution = solve(reduced.R, reduced.z, samples=samples).coefficients
     b = tuple(solution[n_lags + width * j : n_lags + width * (j + 1)] for j in range(m))
     return LongArx(a=solution[:n_lags], b=b)
 
 
-def _delayed(signal: NDArray[np.float64], lag: int, before: float) -> NDArray[np.float64]:
-    """The signal so many samples later, which may be more than it has."""
-    return np.concatenate([np.full(min(lag, len(signal)), before), signal[: max(len(signal) - lag, 0)]])
+def _blocks(record: TimeRecord, n_lags: int, width: int) -> Iterator[NDArray[np.float64]]:
+    """Rows of the long model, its target last, some thousand at a time."""
+    y, depth = record.target, max(n_lags, width)
+    past = np.concatenate([np.full(depth, y[0]), y])
+    drive = [
+        np.concatenate([np.full(depth, before), u]) for u, before in zip(record.inputs.T, record.past, strict=True)
+    ]
+    root = record.root_weights * _known(record, width)
+    for first in range(0, len(y), BLOCK):
+        rows = slice(depth + first, min(depth + first + BLOCK, depth + len(y)))
+        tables = [columns_of_lags(past, range(1, n_lags + 1), rows)]
+        tables += [columns_of_lags(one, range(width), rows) for one in drive]
+        here = slice(first, rows.stop - depth)
+        yield np.column_stack([*tables, np.ones(rows.stop - rows.start), y[here]]) * root[here, np.newaxis]
 
 
 def _known(record: TimeRecord, n_lags: int) -> NDArray[np.bool_]:
