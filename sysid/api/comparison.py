@@ -20,6 +20,7 @@ from sysid.models import Cascade, Start, StartKind, StartLike
 from sysid.traces import Role, TraceSet
 from sysid.validation import Evaluation, evaluate_cascade, evaluate_outputs
 from sysid.validation.beyond import beyond
+from sysid.validation.first_state import first_states
 from sysid.validation.metrics import percent
 from sysid.validation.repeated import repeated
 from sysid.validation.still import still
@@ -144,7 +145,7 @@ def compare(traces: TracesLike, *fits: Compared | Sequence[Compared], start: Sta
             label = judged.label if judged.label not in evaluations else f"{judged.label} ({len(evaluations) + 1})"
             evaluations[label], outputs[label] = judged.evaluation, (judged.output, judged.unit)
         for fit in [one] if isinstance(one, FitResult) else [*getattr(one, "fits", {}).values()]:
-            notes |= dict.fromkeys(_beyond(fit, traces))
+            notes |= dict.fromkeys((*_beyond(fit, traces), *_begun(fit, traces, start)))
     return Comparison(evaluations=evaluations, outputs=outputs, notes=tuple(notes))
 
 
@@ -199,6 +200,11 @@ def _fits(given: Sequence[Any]) -> list[Compared]:
             "sysid.read_bundle(folder)",
         )
     return found
+
+
+def _begun(fit: FitResult, traces: TraceSet, start: Start) -> tuple[str, ...]:
+    """What is said of cases whose first state is known too badly."""
+    return first_states(fit.model, [one for one in traces if traces.roles[one.name] is not Role.ESTIMATION], start)
 
 
 def _beyond(fit: FitResult, traces: TraceSet) -> tuple[str, ...]:

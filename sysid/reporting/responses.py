@@ -301,9 +301,10 @@ def step_of(known: Known, *, samples: int | None = None, seed: int = 0) -> StepR
         ends.append(band(drawn) if len(drawn) else np.full((2, n), np.nan))
         found.append(gains(view))
     low, high = (np.column_stack([one[side] for one in ends]) for side in (0, 1))
+    time = known[0][0].sample_time * np.arange(n, dtype=np.float64)
     return StepResponse(
-        **_names(pairs), time=known[0][0].sample_time * np.arange(n, dtype=np.float64), values=np.column_stack(values), low=low,
-        high=high, **dict(zip(("gain", "gain_low", "gain_high"), np.array(found).T, strict=True)),
+        **_names(pairs), time=time, values=np.column_stack(values), low=low, high=high,
+        **dict(zip(("gain", "gain_low", "gain_high"), np.array(found).T, strict=True)),
     )  # fmt: skip
 
 

@@ -190,6 +190,8 @@ HEADERS = {
     "a title with numbers": ("Test 12, 2024, Rig 3\nt,u,y\n", ["t", "u", "y"]),
     "titles over names": ("Engine,Engine,Pump\nt,u,y\n", ["t", "u", "y"]),
     "titles over names that come again": (",Inlet,Outlet\nt,p,p\n", ["t", "Inlet p", "Outlet p"]),
+    "a head on two lines": ("t,Druck [bar],\n,ein,aus\n", ["t", "Druck ein", "Druck aus"]),
+    "a head on two lines, with units below": ("t,Druck,\n,ein,aus\ns,bar,bar\n", ["t", "Druck ein", "Druck aus"]),
     "a line of units": ("load,pump,level\nt,V,m\n", ["load", "pump", "level"]),
 }
 
@@ -202,6 +204,14 @@ def test_the_header_is_the_line_of_names(write: Write, case: str) -> None:
     table = read_table(write("run.csv", head + rows))
     assert list(table.names) == names
     assert len(table) == 15 + head.count("\n0.")
+
+
+def test_a_title_over_columns_gives_them_its_unit(write: Write) -> None:
+    """Merged cells of a sheet leave blanks; the second name had been taken for a unit, attoseconds among them."""
+    head = "Zeit [s];Druck [bar];;Weg [mm]\n;ein;aus [kPa];\n"
+    rows = "".join(f"{k / 10};{k % 3}.5;{k * k};{k}\n" for k in range(15))
+    found = {column.name: column.unit for column in inspect_file(write("run.csv", head + rows)).columns}
+    assert found == {"Druck ein": "bar", "Druck aus": "kPa", "Weg": "mm"}
 
 
 def test_signals_that_stand_one_after_the_other_are_a_long_table(write: Write) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from sysid.ingest import read_trace
 from sysid.models import ARX, ARXModel, Cascade, Limit, Mapping, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.cli import run_cli
+from sysid.workbench.commands.simulate import _of_cases
 
 
 @pytest.fixture(scope="module")
@@ -272,3 +275,12 @@ def test_the_records_of_a_data_set_of_the_workspace_are_simulated(run, tmp_path,
     ):
         assert run_cli(["simulate", str(run), *words]) == 2
         assert says in " ".join(capsys.readouterr().err.split())
+
+
+def test_cases_whose_names_fit_alike_have_a_file_each() -> None:
+    """The second had overwritten the first, and on some disks capitals do not tell files apart."""
+    found = _of_cases(Path("run.csv"), ["a/b", "a b", "A_B", "a-b", "Größe 1"])
+    assert [path.name for path in found.values()] == [
+        "run.a-b.csv", "run.a-b-2.csv", "run.A_B.csv", "run.a-b-3.csv", "run.Größe-1.csv",
+    ]  # fmt: skip
+    assert [path.name for path in _of_cases(Path("run.csv"), ["A", "a"]).values()] == ["run.A.csv", "run.a-2.csv"]

@@ -38,6 +38,7 @@ MOST_COLUMNS = 4096
 _SEP_LINE = re.compile(r'"?sep=(?P<mark>.)"?\s*', re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?[0-9]*(?:[.' ][0-9]{3})*,[0-9]+(?:[eEdD][+-]?[0-9]+)?")
 _POINT = re.compile(r"[+-]?[0-9]*(?:[,' ][0-9]{3})*\.[0-9]+(?:[eEdD][+-]?[0-9]+)?")
+_BRACKET = re.compile(r"(?P<name>.*?)\s*(?P<unit>[\[(<][^\])>]*[\])>])")
 _MARKS = "#%!;/*'\" \t"
 
 
@@ -350,7 +351,7 @@ def _header(split: _Split, first: int, comments: list[tuple[int, str]], options:
     found = _Header()
     if options.header is False:
         return found
-    above = list(split.rows[:first])
+    above = _heads_joined(list(split.rows[:first]), split)
     if options.units_line is None and len(above) > 1 and _units_above(above, split):
         found.units_line = above[-2].line
         found.units = _to_width(above.pop(-2), split)
@@ -390,6 +391,37 @@ def _header(split: _Split, first: int, comments: list[tuple[int, str]], options:
             found.names, found.line = [cell.strip(_MARKS) for cell in cells], line
             found.notes.append(f"names from the comment in line {line}")
     return found
+
+
+def _heads_joined(above: list[Row], split: _Split) -> list[Row]:
+    """Two lines that are one head, as merged cells leave them, made one: titles over some columns, names over others.
+
+    Of such a pair each column has a name in one line or in both, and some have it in only one of them, either way.
+    """
+    for last in (len(above), len(above) - 1):  # a line of units may stand below
+        if last < 2:
+            break
+        upper, lower = (_to_width(row, split) for row in above[last - 2 : last])
+        joined = None if upper is None or lower is None else _one_head(upper, lower)
+        if joined is not None:
+            return [*above[: last - 2], replace(above[last - 2], cells=joined), *above[last:]]
+    return above
+
+
+def _one_head(upper: list[str], lower: list[str]) -> list[str] | None:
+    pairs = list(zip(map(_filled, upper), map(_filled, lower), strict=True))
+    if not {(True, False), (False, True), (True, True)} <= set(pairs) or (False, False) in pairs:
+        return None
+    joined, title = list[str](), ""
+    for above, below in zip(upper, lower, strict=True):
+        title = above.strip() or title
+        if not _filled(below):
+            joined, title = [*joined, above], ""
+            continue
+        named = _BRACKET.fullmatch(title)
+        unit = f" {named['unit']}" if named and _BRACKET.fullmatch(below.strip()) is None else ""
+        joined.append(f"{named['name'] if named else title} {below.strip()}{unit}".strip())
+    return joined if len(set(joined)) == len(joined) else None
 
 
 def _in_groups(upper: list[str], cells: list[str]) -> list[str] | None:

@@ -20,6 +20,7 @@ from sysid.export.simulation import Simulation, simulate_bundle
 from sysid.ingest import find_dataset, load_dataset, write_trace
 from sysid.ingest.reading import is_file_of_traces
 from sysid.models import Start, StartKind
+from sysid.names import distinct
 from sysid.traces import Trace
 from sysid.units import squared
 from sysid.validation.metrics import percent
@@ -103,7 +104,7 @@ def simulate_command(wish: Wish) -> None:
         write_trace(replace(simulation.trace, name=place.stem), place)
         _tell(simulation, place)
         if plot is not None:
-            picture = plot if len(given) == 1 else _of_case(plot, record.name)
+            picture = plot if len(given) == 1 else _of_cases(plot, [one.name for _, one in given])[record.name]
             _draw(simulation, picture, title=read.metadata["mapping"])
             console().print(f"drawn in {picture}", soft_wrap=True)
 
@@ -122,10 +123,15 @@ def _records(wish: Wish, read: Bundle, start: Start | None, constants: dict[str,
     return [(out, inputs)]
 
 
-def _of_case(path: Path, case: str) -> Path:
-    """The file of one case among several."""
-    safe = re.sub(r"[^\w+-]+", "-", case)
-    return path.with_name(f"{path.stem}.{safe}{path.suffix}")
+def _of_cases(path: Path, cases: Sequence[str]) -> dict[str, Path]:
+    """The file of each of several cases, none of which is another's, in folders that do not tell capitals either."""
+
+    def fitted(case: str) -> str:
+        return re.sub(r"[^\w+-]+", "-", case).casefold()
+
+    names, plain = distinct(cases, fitted, "-"), {case: re.sub(r"[^\w+-]+", "-", case) for case in cases}
+    shown = {case: plain[case] + name[len(fitted(case)) :] for case, name in names.items()}
+    return {case: path.with_name(f"{path.stem}.{name}{path.suffix}") for case, name in shown.items()}
 
 
 def _of_dataset(wish: Wish, source: Path) -> list[tuple[Path, Trace]]:
@@ -152,7 +158,8 @@ def _of_dataset(wish: Wish, source: Path) -> list[tuple[Path, Trace]]:
     out = wish.written
     if len(traces) == 1:
         return [(out, traces.traces[0])]
-    return [(_of_case(out, trace.name), trace) for trace in traces]
+    places = _of_cases(out, [trace.name for trace in traces])
+    return [(places[trace.name], trace) for trace in traces]
 
 
 def parse_constants(words: Sequence[str]) -> dict[str, float]:

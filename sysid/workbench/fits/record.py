@@ -18,6 +18,7 @@ from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import Role, TraceSet
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
 from sysid.validation.beyond import beyond
+from sysid.validation.first_state import first_states
 from sysid.validation.metrics import mean_fit
 from sysid.validation.repeated import repeated
 from sysid.validation.still import still
@@ -171,7 +172,7 @@ def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: Tr
     scored = [trace for trace in traces if traces.roles[trace.name] is not Role.ESTIMATION]
     channels = (*model.mapping.inputs, *model.mapping.outputs)
     further = *beyond(model, fitted, scored), *repeated(channels, fitted, scored)
-    further = *further, *still(model.mapping, fitted, scored)
+    further = *further, *still(model.mapping, fitted, scored), *first_states(model, scored, ready.pipeline.start)
     return {
         "name": ready.config.name,
         "slug": ready.config.slug,
