@@ -31,9 +31,9 @@ from sysid.kernels.cascade_layout import (
     LOW,
     LOW_CHANNEL,
     SUM_HEAD,
+    Layout,
     Program,
     from_a_line,
-    laid_out,
 )
 from sysid.kernels.neurons.table import activate
 from sysid.kernels.register_machine import evaluate
@@ -128,7 +128,8 @@ def _walk(p, layout, values, past, kept, held):
     order_y, level_first_y = _u(layout.order_y), _u(layout.level_first_y)
     fixed, fixed_limits, fixed_codes = layout.fixed, layout.fixed_limits, layout.fixed_codes
     weights_first, blocks, gate_blocks = _u(layout.weights_first), _u(layout.blocks), _u(layout.gate_blocks)
-    neuron_first, member, g = _u(layout.neuron_first), _u(layout.member), layout.readout
+    neuron_first, member, g = _u(layout.neuron_first), _u(layout.member), from_a_line(len(layout.readout))
+    copy_numbers(layout.readout, g)  # of its own: gates write theirs anew, and several threads run one layout
     sum_first, numbers, codes = _u(layout.sums.first), layout.sums.numbers, layout.sums.codes
     first_x_of, channel_y = _u(p.regressor_first), _u(p.output_channel)
     # Where all are of one kind, a level's neurons are run through side by side.
@@ -198,14 +199,15 @@ def _walk(p, layout, values, past, kept, held):
             _keep(kept[t], h, p.neurons, neuron_first)
 
 
-def run(p: Program, depth: int, rest: Array, values: Array, kept: Array, held: Held) -> None:
+@njit(cache=True, nogil=True, error_model="numpy")
+def run(p: Program, layout: Layout, depth: int, rest: Array, values: Array, kept: Array, held: Held) -> None:
     """Run all members over all samples, writing the outputs into ``values``.
 
-    The layout is handed from one compiled function to the other: in one with the passes it was compiled again for each
-    of them, a third of what the first run of a cascade waits for, and to hand it over takes as long as ten samples.
+    Samples whose past reaches before the first are run in an array of their own, then the others.
 
     Args:
         p: The members.
+        layout: Theirs, with their parameters (``sysid/kernels/cascade_plan.py``).
         depth: Past samples before sample 0: the longest lag.
         rest: Value of every channel before sample 0, in its unit, shape ``(n_channels,)``.
         values: Shape ``(n_samples, n_channels)``, in units; inputs are read, outputs written.
@@ -213,25 +215,6 @@ def run(p: Program, depth: int, rest: Array, values: Array, kept: Array, held: H
             where nobody needs them.
         held: What held each output at each sample, shape ``(n_samples, n_outputs)``, written.
     """
-    _run(p, laid_out(p), depth, rest, values, kept, held)
-
-
-def go_on(p: Program, past: int, values: Array, kept: Array, held: Held) -> None:
-    """Run all members from a row on, whatever stands in the rows before it.
-
-    Args:
-        p: The members.
-        past: The first row that is run, at least the longest lag.
-        values: As for :func:`run`; its first ``past`` rows are the history.
-        kept: As for :func:`run`.
-        held: As for :func:`run`, from row ``past`` on.
-    """
-    _walk(p, laid_out(p), values, past, kept, held)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _run(p, layout, depth, rest, values, kept, held):
-    """Run over all samples: those whose past reaches before the first in an array of their own, then the others."""
     first = min(depth, len(values))
     room = np.empty((depth + first, values.shape[1]))
     for row in range(depth):
@@ -240,3 +223,17 @@ def _run(p, layout, depth, rest, values, kept, held):
     _walk(p, layout, room, depth, kept, held)
     copy_rows(room[depth:], values)
     _walk(p, layout, values, first, kept[first:], held[first:])
+
+
+def go_on(p: Program, layout: Layout, past: int, values: Array, kept: Array, held: Held) -> None:
+    """Run all members from a row on, whatever stands in the rows before it.
+
+    Args:
+        p: The members.
+        layout: As for :func:`run`.
+        past: The first row that is run, at least the longest lag.
+        values: As for :func:`run`; its first ``past`` rows are the history.
+        kept: As for :func:`run`.
+        held: As for :func:`run`, from row ``past`` on.
+    """
+    _walk(p, layout, values, past, kept, held)

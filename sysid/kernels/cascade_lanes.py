@@ -13,7 +13,7 @@ from numba import njit
 
 from sysid.kernels.arrays import copy_numbers, copy_rows
 from sysid.kernels.cascade import _bounded, _limited
-from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, gates_at, in_units
+from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, gates_at
 from sysid.kernels.neurons.table import activate
 from sysid.kernels.register_machine import evaluate
 
@@ -121,11 +121,13 @@ def _sizes(p):
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def run(p, depth, rest, lanes, values, held):
+def run(p, theta, bounds, depth, rest, lanes, values, held):
     """Run all members over all samples of some records, writing the outputs into ``values``.
 
     Args:
         p: The members.
+        theta: Their parameters as they act between channels in their units, as a layout has them.
+        bounds: Of each output in its unit, likewise.
         depth: Past samples before sample 0: the longest lag.
         rest: Value of every channel before sample 0 in each record, in its unit, shape ``(n_records, n_channels)``.
         lanes: At least as many as records; a multiple of four leaves no remainder beside the registers.
@@ -137,7 +139,6 @@ def run(p, depth, rest, lanes, values, held):
     x, hidden = np.zeros((width, lanes)), np.zeros(most * lanes)
     h, g = hidden.reshape(most, lanes), np.zeros((most, lanes))
     low, high, codes = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes, dtype=np.int8)
-    theta, bounds = in_units(p)
     registers = p.equations.registers.copy()
     # Lanes without a record of their own repeat the last one.
     record = np.minimum(np.arange(lanes), records - 1)

@@ -97,10 +97,12 @@ def simulate_records(
     groups = workers * -(-n // (workers * MAX_LANES))
     ends = [round(n * i / groups) for i in range(groups + 1)]
 
+    acting = stage.layout.theta, stage.layout.bounds
+
     def work(group: int) -> None:
         own = slice(ends[group], ends[group + 1])
         lanes = -(-(own.stop - own.start) // 4) * 4
-        kernel.run(stage.program, stage.depth, levels[own], lanes, values[own], held[own])
+        kernel.run(stage.program, *acting, stage.depth, levels[own], lanes, values[own], held[own])
 
     with ThreadPoolExecutor(workers) as pool:
         for future in [pool.submit(work, group) for group in range(groups)]:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.kernels import cascade as kernel
-from sysid.kernels.cascade_layout import Program
+from sysid.kernels.cascade_layout import Layout, Program
+from sysid.kernels.cascade_plan import Plan
 from sysid.kernels.neurons import NEURONS
 from sysid.models.activations import PLAIN
 from sysid.models.cascade_program import Limit, program_of
@@ -110,6 +111,10 @@ class VectorRecursion(AbstractForm):
         limits = {f"y{i}": Limit(low=low, high=high) for i, (low, high) in enumerate(self.between)}
         return program_of([self.columns], [ends], (*inputs, *outputs), limits)
 
+    @cached_property
+    def _layout(self) -> Layout:
+        return Plan.of(self._program).laid_out(self.theta)
+
     def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
         """Free run; see the base class."""
         depth = self.lags.depth
@@ -193,7 +198,7 @@ class VectorRecursion(AbstractForm):
     def _walk(self, room: NDArray[np.float64], past: int) -> None:
         """Run over the rows from ``past`` on, in units."""
         held = np.empty((len(room) - past, self.n_outputs), dtype=np.int8)
-        kernel.go_on(self._program, past, room, _NOTHING, held)
+        kernel.go_on(self._program, self._layout, past, room, _NOTHING, held)
 
     def _checked(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         inputs = np.asarray(inputs, dtype=np.float64)

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ChannelError, ConfigError, TraceError
-from sysid.kernels.cascade_layout import laid_out
+from sysid.kernels import cascade as kernel
 from sysid.models import (
     Cascade,
     Domain,
@@ -117,7 +117,7 @@ def test_limits_that_are_whole_numbers_run_what_is_compiled_already():
     runs, compiled = [], []
     for limits in ({"BP": Limit(low=0.0, high=50.0)}, {"BP": Limit(low=0, high=50)}):
         runs.append(Cascade(models=service().models[:1], limits=limits).simulate(command()).values)
-        compiled.append(len(laid_out.signatures))
+        compiled.append(len(kernel.run.signatures))
     assert compiled[0] == compiled[1]
     assert_array_equal(runs[0], runs[1])
 

@@ -269,7 +269,8 @@ class CascadeProvider(AbstractProvider):
             np.empty((n, int(program.neurons.sum()))) if keep else np.empty((0, 0)),
             np.empty((n, len(program.output_channel)), dtype=np.int8),
         )
-        kernel.go_on(program, depth, passed.values, passed.kept, passed.held)
+        layout = self._trained.plan.laid_out(program.theta)
+        kernel.go_on(program, layout, depth, passed.values, passed.kept, passed.held)
         return passed
 
     def _counted_values(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.kernels.cascade_layout import Program
+from sysid.kernels.cascade_plan import Plan
 from sysid.models import Cascade, Ends, Member
 from sysid.models.cascade_program import program_of
 from sysid.models.column_recursion import ColumnRecursion
@@ -24,6 +25,7 @@ class TrainedMembers:
     Args:
         members: The trained members, in the order of the parameters.
         program: The members that are run, with all their parameters.
+        plan: How they are laid out.
         depth: Rows of regressors that the program holds before the first sample.
         places: For each trained member where its parameters stand among those of the program, and among those that are
             trained.
@@ -35,6 +37,7 @@ class TrainedMembers:
 
     members: tuple[Member, ...]
     program: Program
+    plan: Plan
     depth: int
     places: tuple[tuple[slice, slice], ...]
     own_first: NDArray[np.int64]
@@ -70,6 +73,7 @@ class TrainedMembers:
         return cls(
             members=tuple(m for m, yes in zip(run, flags, strict=True) if yes),
             program=program,
+            plan=Plan.of(program),
             depth=max(columns.lags.depth for columns in members),
             places=places,
             own_first=own_first,

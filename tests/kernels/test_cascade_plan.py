@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from sysid.kernels.cascade import _bounded, _limited
-from sysid.kernels.cascade_layout import FREE, HIGH, LOW, SUM_HEAD, Program, laid_out
+from sysid.kernels.cascade_layout import FREE, HIGH, LOW, SUM_HEAD, Layout, Program
+from sysid.kernels.cascade_plan import Plan
 from sysid.models.cascade_stages import CompiledStage
-from tests.models.cascades import CASCADES
+from tests.models.cascades import CASCADES, command
 
 NUMBERS = st.integers(-3, 3).map(float)
 PAIRS = st.tuples(NUMBERS, NUMBERS).map(sorted)
+
+
+def laid_out(one: Program) -> Layout:
+    return Plan.of(one).laid_out(one.theta)
 
 
 def program(name: str) -> Program:
@@ -77,3 +84,24 @@ def test_bounds_and_limits_at_once_are_first_the_one_and_then_the_other(bounds, 
     assert layout.fixed[0] == (max(bounds[0], limits[0]) <= min(bounds[1], limits[1]))
     if layout.fixed[0]:
         assert _limited(value, FREE, *layout.fixed_limits[0], *layout.fixed_codes[0]) == expected
+
+
+def test_a_plan_lays_out_other_parameters_and_leaves_former_layouts_as_they_were():
+    one = program("gates")
+    plan, other = Plan.of(one), one.theta[::-1].copy()
+    before, after = plan.laid_out(one.theta), plan.laid_out(other)
+    for name, expected in laid_out(one._replace(theta=other))._asdict().items():
+        if name != "sums":
+            assert_array_equal(getattr(after, name), expected)
+    assert_array_equal(before.weights, laid_out(one).weights)
+    assert (before.weights != after.weights).any()
+
+
+def test_runs_in_several_threads_share_a_layout():
+    """Gates write their readouts anew at every sample: each run has its own."""
+    cascade = CASCADES["gates"]
+    inputs = [command(400, len(cascade.inputs), seed) for seed in range(8)]
+    expected = [cascade.simulate(one).values for one in inputs]
+    with ThreadPoolExecutor(4) as pool:
+        for found, alone in zip(pool.map(lambda one: cascade.simulate(one).values, inputs), expected, strict=True):
+            assert_array_equal(found, alone)
