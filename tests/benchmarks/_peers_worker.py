@@ -208,7 +208,7 @@ def pyrenn(task):
     import pyrenn as tool
 
     delays = list(range(1, task.lags + 1))
-    np.random.seed(0)  # noqa: NPY002 - the tool draws from the global generator
+    np.random.seed(task.seed)  # noqa: NPY002 - the tool draws from the global generator
     net = tool.CreateNN([task.u.shape[1], task.neurons, 1], dIn=delays, dIntern=[], dOut=delays)
     original, curve, best = tool.calc_error, [(0.0, np.inf)], {}
     began = time.process_time()

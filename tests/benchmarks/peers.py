@@ -13,8 +13,8 @@ nothing is fitted to or chosen on.
 Times are processor times, one thread each, so that a machine with other work gives the same answer. A peer gets the
 cap at most. Two comparisons: the time to an error that was fixed beforehand (the tank: 3.6 % of the output's standard
 deviation; the cylinder: 7e-3 psi^2), and the time in which ours undercuts the peer's best, beside the time that this
-took the peer. Ours is the median over three seeds, the preparation of the fit included; a seed that never gets there
-counts as infinite. Imports count for nobody. Our kernels are compiled once per installation, jax's functions in each
+took the peer. Ours and theirs are medians over three seeds, the preparation of the fit included; a seed that never gets
+there counts as infinite. fastcan leaves nothing to chance and runs once. Imports count for nobody. Our kernels are compiled once per installation, jax's functions in each
 process: that difference is part of what is measured, and of the order of some seconds.
 """
 
@@ -47,6 +47,7 @@ from tests.benchmarks._findings import found, read, scored
 PINNED = ("jax-sysid==1.1.0", "fastcan==0.6.0", "pyrenn==0.1")
 WORKER = Path(__file__).with_name("_peers_worker.py")
 TOOLS = ("jax-sysid", "fastcan, degree 2", "fastcan, degree 3", "pyrenn", "jax-sysid, state space")
+CERTAIN = {"fastcan, degree 2", "fastcan, degree 3"}
 SEEDS = (0, 1, 2)
 PATIENCE = 30.0
 """Wall time that a peer is given, in units of its cap and two minutes: the machine may have other work."""
@@ -136,7 +137,7 @@ def tank() -> Problem:
         lags=2,
         neurons=10,
         target=float((0.036 * y.std()) ** 2),
-        ahead=3.0,
+        ahead=15.0,
     )
 
 
@@ -222,55 +223,66 @@ def compare(problem: Problem, python: Path, cap: float, folder: Path, workers: i
         note=f"single seeds {each}; least mse within {max(curve[0][-1] for curve in curves):.0f} s: {least}",
     )
     stored = problem.store(folder)
+    jobs = [(tool, seed) for tool in TOOLS for seed in (SEEDS if tool not in CERTAIN else SEEDS[:1])]
     with ThreadPoolExecutor(workers) as pool:  # each peer is a process; what is compared is processor time
-        for learned in pool.map(lambda tool: peer(python, tool, stored, cap), TOOLS):
-            if learned is not None:
-                judge(problem, learned, curves, cap)
+        done = list(pool.map(lambda job: peer(python, job[0], stored, cap, job[1]), jobs))
+    for tool in TOOLS:
+        runs = [learned for (name, _), learned in zip(jobs, done, strict=True) if name == tool and learned]
+        if runs:
+            judge(problem, runs, curves, cap)
 
 
-def judge(problem: Problem, learned: Learned, curves: list[tuple[np.ndarray, np.ndarray]], cap: float) -> None:
-    """Say how a peer compares."""
-    ours = statistics.median(reached(curve, problem.target) for curve in curves)
-    errors = learned.errors * problem.scale**2
-    theirs, best = reached((learned.seconds, errors), problem.target), float(errors.min())
-    at_best = reached((learned.seconds, errors), best)
+def judge(problem: Problem, runs: list[Learned], curves: list[tuple[np.ndarray, np.ndarray]], cap: float) -> None:
+    """Say how a peer compares, by its seeds."""
+    tool, ours = runs[0].tool, statistics.median(reached(curve, problem.target) for curve in curves)
+    learned = [(run.seconds, run.errors * problem.scale**2) for run in runs]
+    theirs = statistics.median(reached(run, problem.target) for run in learned)
+    bests = [float(errors.min()) for _, errors in learned]
+    best = statistics.median_low(bests)
+    at_best = reached(learned[bests.index(best)], best)
     undercut = statistics.median(reached(curve, best) for curve in curves)
-    arrived = bool(np.isfinite(theirs))
-    elsewhere = {name: value * problem.scale**2 for name, value in learned.unseen.items()}
-    unseen = [f"{name} {value:.3g}" if np.isfinite(value) else f"{name} diverges" for name, value in elsewhere.items()]
-    if elsewhere:
-        scored(
-            Score(
-                mapping=str(problem.mapping),
-                unit=problem.trace.channel(problem.mapping.output).unit,
-                model=f"{learned.tool}, {cap:g} s of training on {problem.trace.name}",
-                mse={problem.trace.name: best, **elsewhere},
-            )
-        )
-    note = f"on unseen records: {', '.join(unseen)}" if unseen else ""
-    if arrived:
+    note = elsewhere(problem, runs[bests.index(best)], best, cap)
+    if np.isfinite(theirs):
+        each = ", ".join(f"{reached(run, problem.target):.1f} s" for run in learned)
         found(
-            f"{problem.name}: time of {learned.tool} to {problem.target:.3g} {problem.unit}, divided by ours",
+            f"{problem.name}: time of {tool} to {problem.target:.3g} {problem.unit}, divided by ours",
             theirs / ours,
             "x",
             target=problem.ahead,
             at_least=True,
-            peer=f"{theirs:.1f} s",
+            peer=each,
             note=note,
         )
     else:
         # How far behind, nobody knows: a ratio to the end of the trial would grow with our choice of the target.
-        print(f"  {learned.tool} did not get to {problem.target:.3g} {problem.unit} within {cap:g} s", flush=True)
+        print(f"  {tool} did not get to {problem.target:.3g} {problem.unit} within {cap:g} s", flush=True)
     if best < float(np.var(problem.trace[problem.mapping.output])):  # worse than the mean is no best
         found(
-            f"{problem.name}: time of {learned.tool} to its own best, divided by ours to that error",
+            f"{problem.name}: time of {tool} to its own best, divided by ours to that error",
             at_best / undercut if np.isfinite(undercut) else math.nan,
             "x",
             target=problem.ahead,
             at_least=True,
-            peer=f"{best:.3g} {problem.unit} in {at_best:.1f} s",
+            peer=f"{best:.3g} {problem.unit} in {at_best:.1f} s, the median of its seeds' best",
             note="; ".join(filter(None, ("" if np.isfinite(undercut) else "ours does not get there", note))),
         )
+
+
+def elsewhere(problem: Problem, learned: Learned, best: float, cap: float) -> str:
+    """Keep what a peer's best parameters give on records that it did not see, and say it."""
+    values = {name: value * problem.scale**2 for name, value in learned.unseen.items()}
+    if not values:
+        return ""
+    scored(
+        Score(
+            mapping=str(problem.mapping),
+            unit=problem.trace.channel(problem.mapping.output).unit,
+            model=f"{learned.tool}, {cap:g} s of training on {problem.trace.name}",
+            mse={problem.trace.name: best, **values},
+        )
+    )
+    told = [f"{name} {value:.3g}" if np.isfinite(value) else f"{name} diverges" for name, value in values.items()]
+    return f"on unseen records: {', '.join(told)}"
 
 
 if __name__ == "__main__":
