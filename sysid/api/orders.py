@@ -232,7 +232,7 @@ def search_orders(
     max_nb: int | None = None,
     max_nk: int | None = None,
     start: StartLike = ESTIMATED,
-    structures: Sequence[str] = (ARX_KIND,),
+    structures: str | Sequence[str] = (ARX_KIND,),
     most: int = MOST,
     selection: Sequence[Trace] | None = None,
     workers: int = 2,

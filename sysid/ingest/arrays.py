@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -35,7 +36,7 @@ def data(
     *,
     inputs: Names = None,
     outputs: Names = None,
-    sample_time: float | None = None,
+    sample_time: float | datetime.timedelta | None = None,
     units: Mapping[str, str] | Sequence[str] | str | None = None,
     split: Split = None,
     repairs: Mapping[str, str] | None = None,
@@ -53,8 +54,8 @@ def data(
             for a record without input.
         outputs: Names of the output channels; for arrays ``y``, or ``y1``, ``y2`` ... where none is given. Of a frame
             the channels that are named are taken, all of them where none is.
-        sample_time: Seconds between samples. Not needed where a column or an index holds time; where it is given
-            beside one, the record must have it, or ``grid`` says how it is resampled.
+        sample_time: Seconds between samples, or a duration. Not needed where a column or an index holds time; where it
+            is given beside one, the record must have it, or ``grid`` says how it is resampled.
         units: Units by channel, one for all, or in the order of inputs and outputs. A column named ``level [cm]`` has
             its unit with it. A channel that nothing is said of counts as a pure number.
         split: Roles: a share (``0.7`` fits the first 70 % and validates on the rest), two or three shares (fitted,
@@ -84,7 +85,8 @@ def data(
     check_distinct([*(wanted_inputs or ()), *(wanted_outputs or ())], where="inputs and outputs")
     repaired = check(RepairOptions, {"constant": "accept", **_options(repairs, "repairs")}, where="repairs")
     gridded = check(GridOptions, {"fewest_samples": 2, **_options(grid, "grid")}, where="grid")
-    step = None if sample_time is None else check(TimeOptions, {"step": sample_time}, where="sample_time").step
+    given = _seconds(sample_time)
+    step = None if given is None else check(TimeOptions, {"step": given}, where="sample_time").step
     experiments = _experiments(values, wanted_inputs if wanted_outputs is None else wanted_outputs)
     whole: list[Trace] = []
     marks: list[NDArray[Any] | None] = []
@@ -283,6 +285,13 @@ def level_of(initial: Any) -> float:
         got=repr(initial)[:60],
         remedy="samples before the first are a pair: initial=(u_before, y_before); several outputs are a dict by name",
     )
+
+
+def _seconds(value: Any) -> Any:
+    """A duration in seconds; of anything else itself."""
+    if isinstance(value, np.timedelta64):
+        return float(value / np.timedelta64(1, "s"))
+    return value.total_seconds() if isinstance(value, datetime.timedelta) else value
 
 
 def _check_step(step: float, sample_time: float | None, *, where: str) -> None:

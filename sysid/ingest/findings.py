@@ -29,6 +29,7 @@ class ColumnFinding:
         missing: How many values are empty, NaN or infinite.
         problem: Why it cannot be a channel, or the empty text.
         aside: Why it is not proposed as one, or the empty text.
+        far: Values far from all others, which may mark missing ones, in words; or the empty text.
     """
 
     name: str
@@ -43,6 +44,7 @@ class ColumnFinding:
     problem: str = ""
     aside: str = ""
     said: str = ""
+    far: str = ""
 
     @property
     def constant(self) -> bool:
@@ -101,27 +103,39 @@ class FileFinding:
         return tuple(column for column in self.columns if not column.problem and not column.aside)
 
     @property
+    def of_time(self) -> list[str]:
+        """What is the matter with the time stamps, one phrase each."""
+        timing = self.timing
+        if timing is None:
+            return []
+        found = [counted(len(timing.backward), "backward time stamp")] if len(timing.backward) else []
+        after = ", as of events: the value after each counts" if self.needed.duplicates == "last" else ""
+        found += [counted(len(timing.duplicates), "duplicate time stamp") + after] if len(timing.duplicates) else []
+        gaps = counted(len(timing.gaps), "gap")
+        found += [f"{counted(timing.missing, 'sample')} missing in {gaps}"] if timing.missing else []
+        found += [f"uneven time stamps, up to {timing.jitter:.3g} s off"] if self.needed.jitter else []
+        if timing.missing > self.samples:
+            found.append("a gap is longer than what was recorded: a clock that was set anew, or records of their own")
+        return found
+
+    @property
     def problems(self) -> tuple[str, ...]:
         """What a data set of this file has to deal with, one phrase each."""
         found = list(self.notes)
         given = self.files.model_dump(exclude_none=True)
         found += [_guess(name, given[name]) for name in sorted(self.guessed - {"zone", "format"}) if name in given]
         found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
-        timing = self.timing
-        if timing is None:
+        if self.timing is None:
             found += [self.time_told if self.table.time else "no time stamps"] if self.time_guessed else []
-        else:
-            found += [counted(len(timing.backward), "backward time stamp")] if len(timing.backward) else []
-            after = ", as of events: the value after each counts" if self.needed.duplicates == "last" else ""
-            found += [counted(len(timing.duplicates), "duplicate time stamp") + after] if len(timing.duplicates) else []
-            gaps = counted(len(timing.gaps), "gap")
-            found += [f"{counted(timing.missing, 'sample')} missing in {gaps}"] if timing.missing else []
-            found += [f"uneven time stamps, up to {timing.jitter:.3g} s off"] if self.needed.jitter else []
+        found += self.of_time
+        for case in self.cases[1:]:  # the first is this one
+            found += [f"{case.name}: {one}" for one in case.finding.of_time if one not in self.of_time]
         for column in self.columns:
             if column.problem:
                 found.append(f"{column.name}: {column.problem}")
                 continue
             found += [f"{column.name}: {counted(column.missing, 'missing value')}"] if column.missing else []
+            found += [f"{column.name}: {column.far}"] if column.far and not column.aside else []
             found += [f"{column.name}: never changes"] if column.constant and not column.aside else []
             unknown = f"{column.name}: the file says {column.said}, which is no unit that is known"
             found += [unknown] if column.said else []

@@ -28,6 +28,7 @@ from sysid.units import Reference, atmosphere_in, is_pressure
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
 _EMPTY_SHARE = 0.8  # of a column, above which its missing values are no reason to leave samples out
+_FAR, _FEW = 20.0, 0.2  # spans of all other values, and the share of samples that a mark of missing ones may have
 _STEP_NAMES = frozenset({"ts", "dt", "sample_time", "sampling_time", "sampletime"})
 
 
@@ -52,7 +53,7 @@ def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileF
     if (
         not attempt.table.records
         and found.timing is not None
-        and len(found.timing.backward)
+        and (len(found.timing.backward) or found.timing.missing > found.samples)
         and attempt.files.rows is None
     ):
         stamps = stamps_in_seconds(attempt.table, attempt.files.model_copy(update={"time": found.time}))
@@ -314,6 +315,24 @@ def _column(column: RawColumn) -> ColumnFinding:
         problem=problem,
         aside=column.aside or _nearly_empty(column.values),
         said="" if in_file is not None or column.unit is None else column.unit,
+        far=_far(finite),
+    )
+
+
+def _far(values: NDArray[np.float64]) -> str:
+    """That a value at an end of a column is far from all others, as those are that mark missing ones; or nothing."""
+    found = []
+    for end in (values.min(), values.max()) if len(values) else ():
+        rest = values[values != end]
+        count = len(values) - len(rest)
+        span = float(np.ptp(rest)) if len(rest) else 0.0
+        if span > 0 and _FAR * span < float(np.abs(rest - end).min()) and count <= _FEW * len(values):
+            found.append(f"{end:g} ({counted(count, 'sample')})")
+    if not found:
+        return ""
+    said = "is" if len(found) == 1 else "are"
+    return (
+        f"{' and '.join(found)} {said} far from all other values: a mark of missing ones, or a fault of the recording"
     )
 
 

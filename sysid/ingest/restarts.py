@@ -13,11 +13,12 @@ from sysid.ingest.timing import Timing, round_step
 
 _MOST_RECORDS = 200
 _FEWEST_ROWS = 8
+_BACK, _EVEN, _IN_ORDER = 1.5, 0.25, 0.95  # steps that a clock is set back, and how even what is only out of order is
 _CLOSE = 0.02  # of the time that a record lasts: so near to the first start is the start of each record
 
 
 def records_by_clock(table: RawTable, stamps: NDArray[np.float64]) -> tuple[RecordChoice, ...]:
-    """The records of a file that holds one below the other, each with a clock that begins anew.
+    """The records of a file that holds one below the other, each with a clock that begins anew or was set.
 
     Sorted by time, samples of one experiment would stand between those of another; that no stamp steps back is what
     one experiment means.
@@ -27,15 +28,17 @@ def records_by_clock(table: RawTable, stamps: NDArray[np.float64]) -> tuple[Reco
         stamps: Its time stamps in seconds, shape ``(n_rows,)``.
 
     Returns:
-        One choice of rows a record; empty where the clock does not begin anew.
+        One choice of rows a record; empty where the clock does neither.
     """
-    if not np.isfinite(stamps).all():
+    if not np.isfinite(stamps).all() or len(stamps) < 2:
         return ()
-    begins = np.concatenate([[0], np.flatnonzero(np.diff(stamps) < 0.0) + 1, [len(stamps)]])
+    steps = np.diff(stamps)
+    forward = steps[steps > 0.0]
+    step = float(np.median(forward)) if len(forward) else 0.0
+    begins = _anew(stamps, step)
     if not 2 <= len(begins) - 1 <= _MOST_RECORDS or np.diff(begins).min() < _FEWEST_ROWS:
-        return ()
-    spans = stamps[begins[1:] - 1] - stamps[begins[:-1]]
-    if (np.abs(stamps[begins[:-1]] - stamps[0]) > _CLOSE * spans).any():
+        begins = _set(stamps, step)
+    if not 2 <= len(begins) - 1 <= _MOST_RECORDS or np.diff(begins).min() < _FEWEST_ROWS:
         return ()
     return tuple(
         RecordChoice(
@@ -45,6 +48,30 @@ def records_by_clock(table: RawTable, stamps: NDArray[np.float64]) -> tuple[Reco
         )
         for index, (first, end) in enumerate(itertools.pairwise(begins), 1)
     )
+
+
+def _anew(stamps: NDArray[np.float64], step: float) -> NDArray[np.int64]:
+    """Where records begin, and the end, of a clock that begins each of them near the same time."""
+    begins = np.concatenate([[0], np.flatnonzero(np.diff(stamps) < 0.0) + 1, [len(stamps)]])
+    # By their usual step: a clock that is set within a record would make it last as long as it jumps.
+    spans = step * (np.diff(begins) - 1)
+    near = np.abs(stamps[begins[:-1]] - stamps[0]) <= _CLOSE * spans
+    return begins if near.all() else np.zeros(1, dtype=np.int64)
+
+
+def _set(stamps: NDArray[np.float64], step: float) -> NDArray[np.int64]:
+    """Where a clock was set, back by some steps or on by more than was recorded, and the end.
+
+    Sorted by time, what came after would stand between what was before. Where it does not, rows were only written in
+    another order than they were taken in.
+    """
+    steps = np.diff(stamps)
+    back, on = steps < -_BACK * step, steps > step * len(stamps)
+    ordered = np.diff(np.sort(stamps))
+    even = np.mean(np.abs(ordered - step) <= _EVEN * step) if len(ordered) else 1.0
+    if not on.any() and even >= _IN_ORDER:
+        return np.zeros(1, dtype=np.int64)
+    return np.concatenate([[0], np.flatnonzero(back | on) + 1, [len(stamps)]])
 
 
 def finer_than_clock(known: NDArray[np.float64], timing: Timing) -> tuple[float, str] | None:

@@ -192,7 +192,7 @@ class Start:
             pass
         raise ConfigError(
             "not a way to start a free run",
-            expected="estimated, rest, first-sample, or {measured: 50} for 50 measured samples",
+            expected="estimated, rest, first-sample, {measured: 50} for 50 measured samples, or {estimated: 200}",
             got=shortened(value),
             remedy="choose one of the four, or leave start out: it is then estimated",
         )

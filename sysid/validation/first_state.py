@@ -25,7 +25,7 @@ def first_states(model: AbstractModel, scored: Sequence[Trace], start: Start) ->
     """Records whose free run is worse for a first state that was estimated on too few samples.
 
     Args:
-        model: The model; of one that is not linear nothing is said.
+        model: The model; of one that is not linear, or not stable, nothing is said.
         scored: The records that are scored.
         start: How each free run begins.
 
@@ -33,7 +33,7 @@ def first_states(model: AbstractModel, scored: Sequence[Trace], start: Start) ->
         One sentence for each such record.
     """
     radius = model.pole_radius
-    if start.kind is not StartKind.ESTIMATED or radius is None or not 0.0 < radius < 2.0:
+    if start.kind is not StartKind.ESTIMATED or radius is None or not 0.0 < radius <= 1.0:
         return ()
     told = []
     for trace in scored:
@@ -67,7 +67,7 @@ def _told(model: AbstractModel, trace: Trace, start: Start) -> str:
             return (
                 f"{trace.name}: {model.structure.label} does not forget how a run begins (its slowest pole is "
                 f"{model.pole_radius:.5g}). With the first state estimated on {first} samples the fit of {output} is "
-                f"{fits[0]} %, on {longer} samples {fits[1]} %, over the same samples: write start: {{kind: estimated, "
-                f"n_measured: {longer}}}."
+                f"{fits[0]} %, on {longer} samples {fits[1]} %, over the same samples: write start: "
+                f"{{estimated: {longer}}}."
             )
     return ""

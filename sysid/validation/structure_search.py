@@ -49,11 +49,11 @@ class Found:
     notes: tuple[str, ...]
 
 
-def check_kinds(kinds: Sequence[str]) -> tuple[str, ...]:
+def check_kinds(kinds: str | Sequence[str]) -> tuple[str, ...]:
     """The kinds as they are written here.
 
     Args:
-        kinds: As they were asked for.
+        kinds: As they were asked for; a text has commas between.
 
     Returns:
         Each once, in the given order.
@@ -62,6 +62,7 @@ def check_kinds(kinds: Sequence[str]) -> tuple[str, ...]:
         ConfigError: If one is not known.
     """
     known = {name.lower(): name for name in (ARX_KIND, *KINDS)}
+    kinds = [one.strip() for one in kinds.split(",")] if isinstance(kinds, str) else kinds
     for kind in kinds:
         if kind.lower() not in known:
             raise ConfigError(
@@ -101,6 +102,11 @@ def run_structures(
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
     """
+    if isinstance(most, bool) or not isinstance(most, int) or most < 1:
+        raise ConfigError(
+            "not a largest order", where="most", expected="a whole number, 1 or more", got=most,
+            remedy=f"leave it out for {MOST}",
+        )  # fmt: skip
     asked = [kind for kind in kinds if kind in KINDS and (mapping.inputs or kind in WITHOUT_INPUT)]
     finalists, notes, largest = [], [], set()
     for kind in asked:

@@ -7,7 +7,6 @@ import pytest
 from scipy.signal import lfilter
 
 import sysid
-from sysid.models import Start
 
 
 @pytest.mark.parametrize(("pole", "told"), [(0.9998, True), (0.95, False)])
@@ -23,9 +22,8 @@ def test_what_a_slow_pole_does_with_a_poor_first_state_is_told(pole: float, told
     assert bool(found) is told
     if told:
         (note,) = found
-        assert "n_measured: 400}" in note
-        longer = Start(kind=fit.start.kind, n_measured=400)
-        score = sysid.compare(traces, fit, start=longer)
+        assert "start: {estimated: 400}" in note
+        score = sysid.compare(traces, fit, start={"estimated": 400})
         assert f"on 400 samples {score.to_frame()['fit'][1]:.2f} %" in note
         assert not [note for note in score.notes if "does not forget" in note]
         assert not [note for note in sysid.compare(traces, fit, start="rest").notes if "does not forget" in note]

@@ -461,6 +461,16 @@ def _rises(split: _Split) -> bool:
     return len(values) > 2 and all(after > before for before, after in pairwise(values))
 
 
+def _counts(split: _Split) -> bool:
+    """Whether the first column numbers the rows in quotes, as R writes names of rows and gives them no head."""
+    rows = split.run()[:100]
+    numbers = [row.cells[0].strip() for row in rows]
+    if len(rows) < 2 or not numbers[0].isdecimal():
+        return False
+    quoted = all(split.lines[row.line - 1].lstrip().startswith('"') for row in rows)
+    return quoted and numbers == [str(int(numbers[0]) + k) for k in range(len(rows))]
+
+
 def _units_above(above: list[Row], split: _Split) -> bool:
     """Whether the line of units stands above the names: names as short as t and u are units too."""
     names, units = (_to_width(row, split) for row in (above[-1], above[-2]))
@@ -473,6 +483,8 @@ def _units_above(above: list[Row], split: _Split) -> bool:
 def _to_width(row: Row, split: _Split) -> list[str] | None:
     """A header brought to the width of the numbers, or ``None`` if it does not fit them."""
     cells, width = trimmed(row.cells, split.width), split.width
+    if len(cells) == width - 1 > 1 and _counts(split):
+        return ["row", *cells]
     if split.separator == BLANKS and len(cells) != width:
         text = split.lines[row.line - 1].strip().strip(_MARKS)
         for cut in (

@@ -7,7 +7,7 @@ for a missing one (``_FillValue``, ``missing_value``). netCDF 3 is read by SciPy
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -161,9 +161,15 @@ def _dataset(name: str, item: Any, notes: list[str]) -> Any:
         return None
     attributes = {key: item.attrs[key] for key in item.attrs if _is_said(key)}
     leaf = _leaf(name, np.asarray(item[()]), attributes, notes)
-    names = next((np.ravel(attributes[key]) for key in _COLUMN_NAMES if key in attributes), ())
-    texts = [_text(text) for text in names]
-    return leaf if None in texts else replace(leaf, names=tuple(map(str, texts)))
+    names, units = _texts(attributes, _COLUMN_NAMES), _texts(attributes, ("units", "unit"))
+    return replace(leaf, names=names, units=units if len(units) > 1 else ())
+
+
+def _texts(attributes: Mapping[str, Any], keys: Sequence[str]) -> tuple[str, ...]:
+    """The texts of the first attribute of some names; none where they are no texts."""
+    found = next((np.ravel(attributes[key]) for key in keys if key in attributes), ())
+    texts = [_text(text) for text in found]
+    return () if None in texts else tuple(map(str, texts))
 
 
 def _is_said(key: str) -> bool:

@@ -28,6 +28,7 @@ class Leaf:
         reference: As found in the file.
         description: As found in the file.
         names: Names of its columns, where the file says them.
+        units: Units of its columns, where the file says one of each.
         step: Sample time in seconds, where the file says one of it alone.
         aside: Why it is no channel unless it is asked for.
         problem: Why it cannot be used.
@@ -38,6 +39,7 @@ class Leaf:
     reference: Reference | None = None
     description: str = ""
     names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
     step: float | None = None
     aside: str = ""
     problem: ReaderError | None = None

@@ -233,8 +233,9 @@ class _Walk:
         for number, (suffix, values) in enumerate(parts):
             stem = names[number] if names else f"{base}{suffix}"
             full = names[number] if names else f"{base}{cell}{suffix}"
+            own = leaf.units[number] if len(leaf.units) == len(parts) else unit
             column = array_column(
-                full, values, where=self.where, unit=unit, reference=reference, description=leaf.description
+                full, values, where=self.where, unit=own, reference=reference, description=leaf.description
             )
             column = replace(column, problem=column.problem or leaf.problem, aside=leaf.aside)
             yield Found(path=path, stem=stem, cell=index, column=column, step=leaf.step or step, whole=whole)

@@ -121,7 +121,7 @@ def _show_file(found: FileFinding, propose: Path | None, split: Sequence[float] 
         reference = "" if column.reference is Reference.NONE else f" {column.reference.value}"
         guess = "?" if column.unit_guessed or column.reference_guessed else ""
         said = f"the file says {column.said}, which is no unit that is known" if column.said else ""
-        remark = column.problem or column.aside or said or ("never changes" if column.constant else "")
+        remark = column.problem or column.aside or said or column.far or ("never changes" if column.constant else "")
         unit = f"{column.unit}{reference}{guess}"
         span = (f"{column.minimum:.6g}", f"{column.maximum:.6g}")
         table.add_row(column.name, unit, *span, str(column.missing), remark)
