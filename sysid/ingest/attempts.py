@@ -68,6 +68,8 @@ def read_somehow(path: Path, files: FileOptions) -> Attempt:
         given = set(files.model_fields_set)
         if not more or given & set(more) - {"time", "states", "missing"}:
             continue
+        if "missing" in more:
+            more["missing"] = tuple(dict.fromkeys([*best.files.missing, *more["missing"]]))
         attempt = _with(best, more, path)
         if attempt is not None:
             best = attempt
@@ -253,6 +255,7 @@ def _digits_of(known: NDArray[np.float64]) -> str | None:
 SUGGESTIONS: tuple[Callable[[RawTable], dict[str, Any] | None], ...] = (
     _thousands,
     _missing,
+    _missing,  # numbers that stand for none, in a column whose words do
     _states,
     _zone,
     _packed,

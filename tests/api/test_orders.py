@@ -151,3 +151,13 @@ def test_dead_times_beyond_the_usual_ones_are_searched_where_they_explain_more()
     early = sysid.search_orders(traces, "u -> y", max_na=2, max_nb=2, max_nk=10)
     assert early.grid.max_nk == 10
     assert [note for note in early.fit.warnings if "dead time is too short" in note]
+
+
+def test_structures_are_named_in_a_text_too_and_an_order_is_a_number_above_0() -> None:
+    """A text had been taken letter by letter, and no order had left the structures out without a word."""
+    traces, small = sysid.data(record(200), sample_time=1.0), {"max_na": 1, "max_nb": 1, "max_nk": 1}
+    found = sysid.search_orders(traces, "u -> y", structures="ARX, OE", most=1, **small)
+    assert "OE [1; 1; " in str(found)
+    for most in (0, True, 1.5):
+        with pytest.raises(ConfigError, match="not a largest order"):
+            sysid.search_orders(traces, "u -> y", structures="OE", most=most, **small)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Callable
 from typing import Any
 
@@ -219,3 +220,10 @@ def test_columns_are_named_by_their_numbers_and_by_their_levels() -> None:
         "rig.u",
         "rig.y",
     )
+
+
+@pytest.mark.parametrize(
+    "step", [datetime.timedelta(milliseconds=100), np.timedelta64(100, "ms"), pd.Timedelta("0.1s")]
+)
+def test_a_sample_time_may_be_a_duration(step: object) -> None:
+    assert data((np.arange(9.0), np.arange(9.0)), sample_time=step).traces[0].sample_time == 0.1

@@ -206,6 +206,14 @@ def test_the_header_is_the_line_of_names(write: Write, case: str) -> None:
     assert len(table) == 15 + head.count("\n0.")
 
 
+def test_names_of_rows_have_no_head_in_tables_of_r(write: Write) -> None:
+    """``write.table`` quotes them; the head, a name short, had been left out, and they had been time."""
+    rows = "".join(f'"{k + 1}" {k / 10} {k % 3} {k * k}\n' for k in range(15))
+    found = inspect_file(write("run.txt", '"t" "u" "y"\n' + rows))
+    assert [column.name for column in found.channels] == ["u", "y"]
+    assert (found.time.column, found.sample_time) == ("t", 0.1)
+
+
 def test_a_title_over_columns_gives_them_its_unit(write: Write) -> None:
     """Merged cells of a sheet leave blanks; the second name had been taken for a unit, attoseconds among them."""
     head = "Zeit [s];Druck [bar];;Weg [mm]\n;ein;aus [kPa];\n"

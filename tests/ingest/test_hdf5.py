@@ -41,7 +41,9 @@ def test_attributes_say_sample_time_and_names_of_columns(tmp_path: Path) -> None
     with h5py.File(tmp_path / "run.h5", "w") as file:
         item = file.create_dataset("x", data=np.column_stack([TIME, VOLT]))
         item.attrs["columns"], item.attrs["fs"] = ["u", "y"], 20.0
+        item.attrs["units"] = ["mV", "V"]
     table = read_table(tmp_path / "run.h5")
+    assert [column.unit for column in table.columns] == ["mV", "V"]
     assert (table.names, table.step) == (("u", "y"), 0.05)
 
 

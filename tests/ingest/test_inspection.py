@@ -129,6 +129,15 @@ def test_a_column_of_remarks_is_left_out_and_told(write: Write) -> None:
     assert proposed(path).channels[0].name == "u"
 
 
+def test_a_value_far_from_all_others_is_told(write: Write) -> None:
+    """What no list of usual marks has: 1e308 had been a value like any other."""
+    path = write("run.csv", "t [s],u [V]\n" + rows(40, lambda k: f"{k / 10},{'1e308' if k == 7 else k % 5}"))
+    found = inspect_file(path)
+    assert "u: 1e+308 (1 sample) is far from all other values" in " ".join(found.problems)
+    spiky = write("spiky.csv", "t [s],u [V]\n" + rows(40, lambda k: f"{k / 10},{50 if k == 7 else k % 5}"))
+    assert not [one for one in inspect_file(spiky).problems if "far from" in one]
+
+
 def test_a_short_file_is_still_described(write: Write) -> None:
     path = write("run.csv", "t [s],u [V]\n0,1\n1,2\n2,4\n")
     assert proposed(path)["run"]["u"].tolist() == [1.0, 2.0, 4.0]

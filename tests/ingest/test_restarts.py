@@ -36,6 +36,30 @@ def test_a_clock_that_begins_anew_makes_a_case_of_each_record(tmp_path: Path) ->
     assert np.array_equal(traces.traces[1]["y"], Y[25:])
 
 
+@pytest.mark.parametrize(
+    ("at", "by", "lengths"),
+    [
+        pytest.param(30, -1.37, [30, 30], id="set back"),
+        pytest.param(30, 3600.0, [30, 30], id="set on by more than was recorded"),
+        pytest.param(30, 1.0, [70], id="a gap"),
+    ],
+)
+def test_a_clock_that_was_set_parts_the_record(tmp_path: Path, at: int, by: float, lengths: list[int]) -> None:
+    """Sorted, what came after stood between what was before, and the sample time was another one."""
+    times = [f"{0.1 * k + by * (k >= at):.2f}" for k in range(60)]
+    traces = proposed(tmp_path, "t [s],u [V],y [m]\n" + rows(times))
+    assert [len(trace) for trace in traces.traces] == lengths
+    assert {trace.sample_time for trace in traces.traces} == {0.1}
+    assert np.array_equal(traces.traces[-1]["y"][-30:], Y[30:])
+
+
+def test_blocks_that_were_only_written_in_another_order_are_sorted(tmp_path: Path) -> None:
+    order = [*range(20), *range(40, 60), *range(20, 40)]
+    (trace,) = proposed(tmp_path, "t [s],u [V],y [m]\n" + rows([f"{0.1 * k:.1f}" for k in order])).traces
+    assert len(trace) == 60
+    assert np.array_equal(trace["y"][20:40], Y[40:])
+
+
 def test_one_stamp_that_steps_back_is_no_new_record(tmp_path: Path) -> None:
     times = [f"{0.1 * k:.1f}" for k in range(60)]
     times[30], times[31] = times[31], times[30]
@@ -60,8 +84,9 @@ def test_a_stamp_that_stands_twice_now_and_then_is_still_a_duplicate(tmp_path: P
 @pytest.mark.parametrize("mark", ["-9999", "-9999.00", "1e30"])
 def test_a_number_that_stands_for_none_is_masked(tmp_path: Path, mark: str) -> None:
     y = [mark if k in {20, 21} else str(value) for k, value in enumerate(Y)]
+    y[22] = "n/a"  # beside words that stand for none
     (trace,) = proposed(tmp_path, "t [s],u [V],y [m]\n" + rows([f"{0.1 * k:.1f}" for k in range(60)], y)).traces
-    assert np.flatnonzero(~trace.usable).tolist() == [20, 21]
+    assert np.flatnonzero(~trace.usable).tolist() == [20, 21, 22]
     assert np.abs(trace["y"]).max() < 5.0
 
 

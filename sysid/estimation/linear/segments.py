@@ -86,6 +86,31 @@ class Segment:
         return found
 
 
+TORN = 0.05
+"""Part of the samples that first states of stretches between masked samples may take before it is told."""
+
+
+def torn(segments: Sequence[Segment], states: int) -> tuple[str, ...]:
+    """What many masked samples do to a model of the noise, each stretch between them having a first state of its own.
+
+    Args:
+        segments: The stretches.
+        states: Of the model.
+
+    Returns:
+        One sentence where these states are many beside the samples; none elsewhere.
+    """
+    count, free = sum(map(len, segments)), sum(one.rest is None for one in segments)
+    if free < 2 or free * states <= TORN * count * segments[0].outputs.shape[1]:
+        return ()
+    return (
+        f"Masked samples part these records into {free} stretches of some {count / free:.3g} samples, and each has "
+        f"{states} numbers of its own for its first state: coefficients lean by more than their intervals say. Fill "
+        "single samples (repairs: {nan: interpolate}), or fit a structure without a model of the noise (OE, TF), whose "
+        "run goes on through masked samples.",
+    )
+
+
 def delayed_inputs(inputs: Array, held: Array, shifts: Sequence[int]) -> Array:
     """Inputs that come later.
 

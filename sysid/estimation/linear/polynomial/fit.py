@@ -22,7 +22,7 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start
-from sysid.estimation.linear.segments import Segment, scaling_of, segments_of
+from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.state_space.search import flat_prior
@@ -133,7 +133,11 @@ def fit_polynomial(
         },
         train_time_s=now() - began,
         uncertainty=_uncertainty(model, at, hang, errors.n_samples, variance * unit),
-        notes=(*slow_poles.notes(model.pole_radius, lengths, told), slow_poles.stability(model.pole_radius)),
+        notes=(
+            *slow_poles.notes(model.pole_radius, lengths, told),
+            *(torn(errors.segments, system.n_state) if orders.noise else ()),
+            slow_poles.stability(model.pole_radius),
+        ),
     )
 
 

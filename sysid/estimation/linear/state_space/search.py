@@ -22,7 +22,7 @@ from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
-from sysid.estimation.linear.segments import Segment
+from sysid.estimation.linear.segments import Segment, torn
 from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.free_runs import free_run_error
@@ -178,6 +178,7 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         if iterations:
             found = problem.with_colour(found)
     told = slow_poles.notes(found.system.radius, problem.lengths, errors)
+    told = (*told, *(torn(problem.segments, orders.states) if orders.noise else ()))
     return replace(found, singular_values=subspace.singular_values(), notes=told)
 
 
