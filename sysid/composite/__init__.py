@@ -10,8 +10,9 @@ Nothing here knows a run folder, a screen or a tracker: a :class:`Keeper` is giv
 from sysid.composite.active_learning import ActiveLearned, Assessment, learn_actively, sequence_errors
 from sysid.composite.candidates import Candidate, Candidates, fit_candidates
 from sysid.composite.committee import DoubtFigures, committee, doubt_figures, doubt_threshold
-from sysid.composite.composite import Composite, FixedMember, Member, Standing
+from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_equations import equation_of, fixed_by_equations
+from sysid.composite.fixed_member import FixedMember, Standing
 from sysid.composite.fixed_members import fixed_model, with_fixed
 from sysid.composite.keeper import Keeper, MakeAll, Task
 from sysid.composite.limit_check import LimitCheck, check_limits

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from sysid.composite.composite import FixedMember
 from sysid.composite.fixed_expressions import expression_of, reads_nothing, words_of
+from sysid.composite.fixed_member import FixedMember
 from sysid.equations.functions import CONSTANTS
 from sysid.equations.parser import DEEPEST, parse
 from sysid.equations.syntax import (
@@ -90,6 +90,22 @@ def fixed_by_equations(
     _check_known("tables", list(tables or {}), [node.function for one in equations for node in _calls(one)])
     _check_known("shared", list(shared), [name for one in equations for name in _read(one)])
     return tuple(members)
+
+
+def bounds_in(text: str) -> tuple[float, float]:
+    """Between which numbers the right side of an equation is held; infinite where it is not.
+
+    Args:
+        text: One equation.
+
+    Returns:
+        Least and greatest value.
+
+    Raises:
+        ConfigError: If it cannot be read.
+    """
+    (equation,) = parse(text)
+    return _Reader(text=text, shift=0).bounded(equation.right)[1:]
 
 
 def equation_of(fixed: FixedMember) -> str:

@@ -31,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.composite.composite import FixedMember
+from sysid.composite.fixed_member import FixedMember
 from sysid.composite.members import bounds_of, placed
 from sysid.errors import ConfigError
 from sysid.models import NARX, Cascade, GreyBoxModel, NARXModel, Scaling
@@ -60,7 +60,7 @@ def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = 
         "mapping": fixed.mapping,
         "sample_time": like.sample_time,
         "input_units": tuple((units or {}).get(name) or like.channel(name).unit for name in inputs),
-        "output_unit": fixed.unit,
+        "output_unit": fixed.unit_in(like),
         "rest_output": fixed.rest,
     }
     if fixed.equation:
@@ -92,9 +92,10 @@ def with_fixed(fixed: Sequence[FixedMember], traces: Sequence[Trace]) -> list[Tr
         ConfigError: If the submodels cannot be wired, or an output is measured in another unit than is declared.
         ChannelError: If a trace lacks an input.
     """
-    bounds, units = bounds_of(fixed), {name: one.unit for one in fixed for name in one.outputs}
+    bounds = bounds_of(fixed)
 
     def one(trace: Trace) -> Trace:
+        units = {name: member.unit_in(trace) for member in fixed for name in member.outputs}
         first = [(member, fixed_model(member, trace, units)) for member in fixed]
         declared = tuple(placed(member, model, there) for member, model in first for there in member.instances)
         run = Cascade(models=declared, limits=bounds).simulate_trace(trace)

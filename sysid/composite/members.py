@@ -12,7 +12,8 @@ from typing import TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sysid.composite.composite import Composite, FixedMember, Member, Standing
+from sysid.composite.composite import Composite, Member
+from sysid.composite.fixed_member import FixedMember, Standing
 from sysid.estimation.estimators import JOINING
 from sysid.models import AbstractModel, Cascade, Limit, Mapping, NARXModel
 from sysid.traces import Trace

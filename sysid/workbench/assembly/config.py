@@ -27,7 +27,7 @@ from sysid.workbench.stability import ExcursionConfig
 
 
 class LimitConfig(BaseModel):
-    """Values between which an output is held: a number in its unit, or the name of a channel."""
+    """Values between which an output is held: a number in its unit, a channel, or an expression of channels."""
 
     model_config = STRICT
 

@@ -119,7 +119,7 @@ def assembly_results(
         else [_active_learning(trained.active_learning, found.unseen)],
         "ablation": [asdict(one) for one in found.ablation],
         "monte_carlo": None if found.stressed is None else _stress(found.stressed),
-        "equations": [_equation(one) for one in config.composite.fixed],
+        "equations": [_equation(one, found.whole) for one in config.composite.fixed],
         "limits": [_holding(one) for one in found.holding],
         "limit_check": asdict(trained.limits) if trained.limits.limits else None,
         "interpolation": None if found.interpolation is None else _line(found.interpolation),
@@ -129,8 +129,9 @@ def assembly_results(
     return parse_record(AssemblyResults, strict(document), where=context.store.path / RESULTS_FILE)
 
 
-def _equation(one: FixedMember) -> dict[str, Any]:
-    return {"output": one.output, "unit": one.unit, "equation": equation_of(one), "instances": list(one.instances)}
+def _equation(one: FixedMember, whole: Cascade) -> dict[str, Any]:
+    unit = whole.units.get(one.outputs[0], one.unit)
+    return {"output": one.output, "unit": unit, "equation": equation_of(one), "instances": list(one.instances)}
 
 
 def write_signals(folder: Path, found: Outcome, outputs: Sequence[str], cases: TraceSet) -> None:

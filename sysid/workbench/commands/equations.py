@@ -26,7 +26,8 @@ def equations_command(pipeline: str) -> None:
     path = find_pipeline(pipeline)
     joined = read_joined(path)
     kind = joined.data.get("kind", DEFAULT)
-    fixed = check(AssemblyConfig, joined.data, where=joined.origins).composite.fixed if kind == "assembly" else ()
+    declared = check(AssemblyConfig, joined.data, where=joined.origins).composite.fixed if kind == "assembly" else ()
+    fixed = [one for one in declared if not one.bounds]  # what limits says stands there
     if not fixed:
         raise ConfigError(
             "nothing is fixed in the pipeline",

@@ -381,11 +381,13 @@ members:
 together: {targets: {upper: 0.1, lower: 0.1}, training: {max_iterations: 4, stride: 2}}
 """
     text = text[:start] + declared + text[end:]
+    text = text.replace("lower: {low: 0}", 'lower: {low: 0, high: "max(upper, 20) + 5"}')
     file.write_text(text.replace("export: null", "export: {formats: [c], tolerance: 1.0e-4}"))
     assert run(workspace) == 0
     results = assembly_results(workspace / "runs" / "tanks")
-    assert [one.equation for one in results.equations] == [
-        "head = max(upper[k-1] - 0.3 * lower[k-1], 0)", "down = min(0.15 * sqrt(head), head)",
+    assert [(one.equation, one.unit) for one in results.equations] == [
+        ("head = max(upper[k-1] - 0.3 * lower[k-1], 0)", "cm"), ("down = min(0.15 * sqrt(head), head)", "cm"),
+        ('"lower high" = max(upper, 20) + 5', "cm"),
     ]  # fmt: skip
     for output in ("upper", "lower"):
         assert max(results.stages[-1].mse[output].values()) < 1e-5
