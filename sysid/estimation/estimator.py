@@ -60,6 +60,7 @@ class Estimator:
         joins: Whether its models can be members of a whole that are trained together.
         of_residuals: What a reader of its residuals should know; empty for nothing.
         starts: Starts of a network's fit that asks for none.
+        unites: Whether an ensemble is of starts that are trained to their end.
     """
 
     structure: type[AbstractStructure]
@@ -75,6 +76,7 @@ class Estimator:
     joins: bool = False
     of_residuals: str = ""
     starts: int = 1
+    unites: bool = False
 
     @cached_property
     def knows(self) -> frozenset[str]:

@@ -114,6 +114,7 @@ ESTIMATORS: dict[str, Estimator] = {
                 initial=check_neural_initial,
                 no_posterior=ENDED,
                 starts=STARTS,
+                unites=True,
             )
             for structure, name, fit_by in (
                 (NeuralStateSpace, "a neural state space", fit_neural_state_space),

@@ -49,7 +49,7 @@ def price(point: Point, folds: int = 1) -> int:
     if row.training is not Training:
         return folds
     training = Training(**dict(point.training)).with_starts(row.starts)
-    return folds * round(planned_iterations(training))
+    return folds * round(planned_iterations(training, training.ensemble if row.unites else 1))
 
 
 @dataclass(kw_only=True, eq=False)

@@ -38,6 +38,9 @@ half of four are dropped early: they take a fifth more iterations than one."""
 LAST = {"starts": 12}
 """How the chosen one is trained in the end, where that is another fit, beside what it was tried with: on a short record
 minima that fit it alike are far apart on another."""
+ENSEMBLE = {"ensemble": 8, "starts": 12}
+"""How an ensemble is trained, beside what its structure was tried with: where the last fit has these starts anyway, the
+mean of the best owes less to luck than any of them."""
 FURTHER = {"starts": 1, "max_iterations": 2000}
 """How the chosen one is trained on from where its trial had ended, where selection traces chose."""
 

@@ -15,6 +15,7 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import LINEAR, Budget, size_of
 from sysid.workbench.auto.families import FAMILIES, Family, Try, suggested
 from sysid.workbench.auto.look import Looked
+from sysid.workbench.auto.parts import ENSEMBLE
 from sysid.workbench.runner.store import digest
 from sysid.workbench.sweep.search_space import Point
 
@@ -29,6 +30,8 @@ PATIENCE = 2
 FINALISTS, AGAIN = 5, 2
 """The best nonlinear models, and how often each is trained again before the choice: the least of many errors
 owes something to luck, and the chosen one is trained from other starts too."""
+ENSEMBLES = 3
+"""Of them those whose starts are united, too, where that can be."""
 ALIKE = 0.03
 """Part of the least error within which another one counts as no worse; of those the smallest is chosen."""
 
@@ -94,6 +97,8 @@ class Plan:
     _repeats: dict[int, int] = field(default_factory=dict)
     """By the number of a repeated point, the place of its trial."""
     _told_again: list[int] = field(default_factory=list)
+    _united: set[int] = field(default_factory=set)
+    """Numbers of points that are ensembles of those."""
     _rounds: Iterator[list[Try]] | None = None
     _asked: int = 0
 
@@ -158,15 +163,20 @@ class Plan:
 
     @property
     def candidates(self) -> list[Trial]:
-        """What may be chosen: nonlinear models that were trained again, where some were, and linear ones."""
+        """What may be chosen: linear models, and the nonlinear ones that were trained again, where some were, or united."""
         kinds = {family.kind for family in self.families if family.linear}
         again = set(self._told_again)
-        return [t for n, t in enumerate(self.trials) if n in again or not again or t.structure["kind"] in kinds]
+        return [
+            t
+            for n, t in enumerate(self.trials)
+            if n in again or not again or t.number in self._united or t.structure["kind"] in kinds
+        ]
 
     def _all_rounds(self) -> Iterator[list[Try]]:
         yield from self._search()
         self.budget.kept = 0.0
         yield from self._finals()
+        yield from self._ensembles()
 
     def _finals(self) -> Iterator[list[Try]]:
         """The best nonlinear models once more, from other starts."""
@@ -182,6 +192,19 @@ class Plan:
                 self._repeats[self._asked + len(finals)] = place
         if finals:
             yield finals
+
+    def _ensembles(self) -> Iterator[list[Try]]:
+        """The best of those once more, the mean of several starts each."""
+        able = [n for n in self._told_again if estimator_of(self._tries[n].structure).unites]
+        best = sorted(
+            (n for n in able if math.isfinite(self.error(self.trials[n]))), key=lambda n: self._rank(self.trials[n])
+        )
+        found = [
+            replace(one, training={**one.training, **ENSEMBLE}) for one in (self._tries[n] for n in best[:ENSEMBLES])
+        ]
+        self._united |= {self._asked + k + 1 for k in range(len(found))}
+        if found:
+            yield found
 
     def _search(self) -> Iterator[list[Try]]:
         nonlinear_first = sorted(self.families, key=lambda family: family.linear)

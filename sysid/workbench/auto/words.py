@@ -32,6 +32,7 @@ class Choice:
         more_within: Over how many of the traces that choose it stays within the tolerance, in words, where that is
             why it comes before one of less error; empty elsewhere.
         stable: The best stable one, where that was passed over for one whose training goes on.
+        alone: Of an ensemble the best trial of its structure without one.
     """
 
     chosen: Trial
@@ -41,6 +42,7 @@ class Choice:
     nonlinear: int
     more_within: str = ""
     stable: Trial | None = None
+    alone: Trial | None = None
 
 
 def choose(
@@ -85,7 +87,9 @@ def choose(
     more = tolerance is not None and min(map(error, usable[refused:])) < error(chosen)
     smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
     nonlinear = sum(not ESTIMATORS[t.structure["kind"]].linear for t in trials)
+    alone = [t for t in usable if t.structure == smallest.structure and "ensemble" not in t.values]
     found = Choice(
+        alone=alone[0] if alone and "ensemble" in smallest.values else None,
         chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=nonlinear,
         more_within=f"{1.0 - outside(chosen):.0%} of what chose within {tolerance:.0%} of its range" if more else "",
     )  # fmt: skip
@@ -143,6 +147,9 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit
     finals = f", {best} again from other starts" if again else ""
     finals += f", the {raced} best networks trained on side by side before that" if raced else ""
     parts = [f"{why}, of {tried} tried{finals}"]
+    if choice.alone is not None and error(choice.alone):
+        less, more = 1.0 - root / math.sqrt(error(choice.alone)), choice.chosen.operations / choice.alone.operations
+        parts.append(f"{less:.0%} less than one start of it, for {more:.2g} times the multiplications a step")
     if choice.linear is not None and not ESTIMATORS[choice.chosen.structure["kind"]].linear:
         linear = math.sqrt(error(choice.linear))
         share = 1.0 - root / linear if linear else 0.0  # what is met exactly has no error to better

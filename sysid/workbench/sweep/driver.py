@@ -345,7 +345,7 @@ def as_trial(outcome: Mapping[str, Any]) -> Trial:
         The trial, without a place in the ranges.
     """
     kept = {name: value for name, value in outcome.items() if name not in {"fit", "checkpoint", "further"}}
-    label = structure_from_dict(outcome["structure"]).label
+    label = kept.get("label") or structure_from_dict(outcome["structure"]).label  # of results before it was stored
     # A warm start that is no point of the grid has the number 0, which no trial has.
     return Trial.model_validate({**kept, "number": max(1, kept["number"]), "label": label})
 

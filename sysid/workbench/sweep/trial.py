@@ -22,6 +22,7 @@ from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, part_of
 from sysid.estimation.tolerance import spans_of
 from sysid.models import AbstractModel, Start, beginning
+from sysid.models.store import structure_from_dict
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.resolution import parts_of
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
@@ -113,6 +114,12 @@ class Job:
     cost: float = 1.0
     fold: int = 0
 
+    @property
+    def label(self) -> str:
+        """The structure, and how many members an ensemble of it has at most."""
+        members = int(self.training.get("ensemble", 1))
+        return structure_from_dict(self.structure).label + (f", ensemble of {members}" if members > 1 else "")
+
 
 def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[str, Any]:
     """Train and score one point.
@@ -127,7 +134,12 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     """
     began, cpu = time.perf_counter(), time.process_time()
     bench = bench.fold(job.fold)
-    outcome: dict[str, Any] = {"key": job.key, "number": job.number, "structure": dict(job.structure)}
+    outcome: dict[str, Any] = {
+        "key": job.key,
+        "number": job.number,
+        "structure": dict(job.structure),
+        "label": job.label,
+    }
     try:
         with threadpool_limits(1), processor_time() if bench.processor_time else nullcontext():
             watch = _watch(bench, job)

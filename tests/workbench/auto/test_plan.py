@@ -13,7 +13,8 @@ from sysid.models import ARX, HammersteinWiener, NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import Budget, price
 from sysid.workbench.auto.look import Looked
-from sysid.workbench.auto.plan import FINALISTS, PATIENCE, Plan, with_repeats
+from sysid.workbench.auto.parts import ENSEMBLE
+from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, PATIENCE, Plan, with_repeats
 from sysid.workbench.auto.search import error
 from sysid.workbench.sweep.search_space import Point
 
@@ -178,19 +179,34 @@ def test_the_best_networks_are_trained_again_and_luck_does_not_choose() -> None:
         return 9.0 if str(point.structure) == lucky[0] else 1.0
 
     plan, rounds = searched(worth, again=2)
+    *rounds, ensembles = rounds
+    assert 0 < len(ensembles) <= ENSEMBLES
+    assert all(point.training.items() >= ENSEMBLE.items() for point in ensembles)
     seeds = [point.training["seed"] for point in rounds[-1]]
     assert len(seeds) == 2 * FINALISTS
     assert len(set(seeds)) == 2
     assert plan.n_again == FINALISTS
-    assert len(plan.trials) == sum(len(one) for one in rounds[:-1])
+    assert len(plan.trials) == sum(len(one) for one in rounds[:-1]) + len(ensembles)
     best = min(plan.candidates, key=error)
     assert str(best.structure) not in lucky
     assert error(best) == pytest.approx(1.0)
 
 
+def test_the_mean_of_several_starts_of_the_best_may_be_chosen_too() -> None:
+    def worth(point: Point) -> float:
+        return 0.5 * by_size(point) if "ensemble" in point.training else by_size(point)
+
+    plan, rounds = searched(worth, again=2)
+    best = min(plan.candidates, key=error)
+    assert best.number in {point.number for point in rounds[-1]}
+    assert [point.structure for point in rounds[-1]] == [point.structure for point in rounds[-2][::2]][:ENSEMBLES]
+    assert price(rounds[-1][0]) > price(rounds[-2][0])
+    assert not [one for points in searched(worth)[1] for one in points if "ensemble" in one.training]
+
+
 def test_iterations_are_kept_for_that() -> None:
     plan, rounds = searched(by_size, iterations=2000, again=2)
-    assert "seed" in rounds[-1][0].training
+    assert any("seed" in point.training for one in rounds[-2:] for point in one)
     assert plan.n_again > 0
     assert sum(price(point) for one in rounds for point in one) <= 2000
 

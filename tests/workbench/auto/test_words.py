@@ -38,6 +38,19 @@ def test_the_smallest_of_those_that_are_as_good_is_chosen() -> None:
     assert found.linear.number == 1
 
 
+def test_an_ensemble_is_chosen_where_it_gains_and_says_its_price() -> None:
+    one = network(2, 1.0, 20)
+
+    def ensemble(rms: float) -> Trial:
+        return network(9, rms, 100).model_copy(update={"structure": one.structure, "values": {"ensemble": 5}})
+
+    assert choose([one, ensemble(0.98)], error, stable).chosen.number == 2
+    found = choose([one, ensemble(0.8)], error, stable)
+    assert found.chosen.number == 9
+    said = sentence(found, 2, unit="V", ended="", error=error)
+    assert "20% less than one start of it, for 5 times the multiplications a step" in said
+
+
 def test_a_linear_model_that_is_as_good_is_chosen() -> None:
     found = choose([arx(1, 1.01), network(2, 1.0, 60)], error, stable)
     assert found.chosen.number == 1
