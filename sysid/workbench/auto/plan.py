@@ -163,7 +163,7 @@ class Plan:
 
     @property
     def candidates(self) -> list[Trial]:
-        """What may be chosen: linear models, and the nonlinear ones that were trained again, where some were, or united."""
+        """What may be chosen: linear models, and nonlinear ones that were trained again, where some were, or united."""
         kinds = {family.kind for family in self.families if family.linear}
         again = set(self._told_again)
         return [
