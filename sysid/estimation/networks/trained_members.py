@@ -60,6 +60,14 @@ class TrainedMembers:
             ConfigError: If a member that would have to pass on sensitivities cannot.
         """
         run, flags = _to_run(cascade, trained)
+        if not any(flags):
+            raise ConfigError(
+                "nothing is left to train",
+                where="trained",
+                expected="a member that has parameters",
+                got=", ".join(str(model.mapping) for model in cascade.models),
+                remedy="a whole of equations alone is complete: run it, or fit a GreyBox with free parameters",
+            )
         members = [_columns(model) for model in run]
         for model, columns, yes in zip(run, members, flags, strict=True):
             if yes and columns.equation is not None:  # it reads and passes on, but its parameters are in its text

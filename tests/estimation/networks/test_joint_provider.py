@@ -64,6 +64,12 @@ def test_what_an_equation_has_for_parameters_is_not_trained_with_the_others():
             provider(one, trained=trained)
 
 
+def test_a_whole_of_equations_alone_has_nothing_to_train():
+    whole = CASCADES["equations in a circle"].upstream_of(["x"], given=("AR", "ER", "BP"))
+    with pytest.raises(ConfigError, match="nothing is left to train"):
+        provider(whole)
+
+
 def test_a_target_upstream_of_what_is_trained_does_not_move():
     one = provider(service(), trained=("AR",), errors={"BP": 1.0, "BC": 2.0})
     J = one.jacobian(one.theta)
