@@ -27,6 +27,9 @@ from sysid.traces import Trace
 
 _Found = TypeVar("_Found")
 _Rows = tuple[NDArray[Any], NDArray[np.float64]]
+_Moving = tuple[NDArray[np.bool_] | slice, NDArray[np.float64]]
+_EVERY = slice(None)
+"""All rows of a block: they are taken as they stand."""
 
 BLOCK, MOST = 256, 1024
 """Rows of each target's Jacobian that are alive at a time at least, and at most: powers of two."""
@@ -315,8 +318,10 @@ class CascadeProvider(AbstractProvider):
                 if measure[j] != measure[0]:
                     square *= measure[j] / measure[0]
                 matrix[:reach, :reach] += square
+                del square  # so that the next one stands where it stood: fresh memory is slower than the sum itself
                 held.clear()
-        return loss, gradient, measure[0] * matrix, residual
+        matrix *= measure[0]
+        return loss, gradient, matrix, residual
 
     def _per_error(self, program: Program) -> NDArray[np.float64]:
         """What a change of each target by one in its scaled numbers is over its error, shape ``(n_targets,)``."""
@@ -364,7 +369,7 @@ class CascadeProvider(AbstractProvider):
 
     def _blocks(
         self, program: Program, record: _Record, passed: _Passed, n: int
-    ) -> Iterator[tuple[slice, list[_Rows]]]:
+    ) -> Iterator[tuple[slice, list[_Moving]]]:
         """Block by block which counted rows of every target's Jacobian move, and these, in its scaled numbers.
 
         They go up to where all are zero, and stand there until the next block.
@@ -382,17 +387,19 @@ class CascadeProvider(AbstractProvider):
                 trained.own_first, trained.extent, trained.source, room,
             )  # fmt: skip
             picked = record.rows[slice(*np.searchsorted(record.rows, (first, first + rows)))]
-            blocks = []
+            blocks: list[_Moving] = []
             for output in self._outputs:
                 if output < 0:
                     blocks.append((np.zeros(len(picked), dtype=np.bool_), np.zeros((0, 0))))
                     continue
-                places = room.first[output] + (picked & room.mask[output])
-                moving, reach = room.moves[places], trained.extent[output]
+                reach, own = trained.extent[output], room.first[output] + (first & room.mask[output])
                 # A block stands in one piece: both its length and that of the room are powers of two.
-                whole = len(picked) == rows and moving.all()
-                own = slice(places[0], places[0] + rows) if whole else places[moving]
-                blocks.append((moving, room.J[own, :reach]))
+                if len(picked) == rows and room.moves[own : own + rows].all():
+                    blocks.append((_EVERY, room.J[own : own + rows, :reach]))
+                    continue
+                places = room.first[output] + (picked & room.mask[output])
+                moving = room.moves[places]
+                blocks.append((moving, room.J[places[moving], :reach]))
             yield slice(at, at + len(picked)), blocks
             at += len(picked)
 
