@@ -16,7 +16,7 @@ from sysid.airbrake.machine import QUANTITIES, Probe
 from sysid.airbrake.radio import Radio
 from sysid.airbrake.sequences import RandomCommand
 from sysid.airbrake.simulate import AirBrakeRecord, simulate
-from sysid.airbrake.variant import VARIANTS
+from sysid.airbrake.variant import USUAL_VARIANT, VARIANTS
 from sysid.errors import ConfigError
 from sysid.excitation import excite
 from sysid.traces import Channel, Trace
@@ -187,7 +187,7 @@ def _equipment(options: _Options) -> Equipment:
     if options.equipment is not None:
         row = EQUIPMENT[options.equipment]
     else:
-        row = Equipment(variant=VARIANTS[options.variant or "physical"], about="as the variant has it")
+        row = Equipment(variant=VARIANTS[options.variant or USUAL_VARIANT], about="as the variant has it")
     return dataclasses.replace(row, variant=row.variant.with_options(options.switches))
 
 
@@ -215,9 +215,10 @@ def generate(
             ``{random: {seed: 7, duration: 900, ...}}`` (limits: :class:`sysid.airbrake.sequences.RandomCommand`), or
             ``{excitation: {kind: ramps, seed: 7, duration: 900, low: 66, high: 90, options: {rise: 50}}}`` (a kind of
             :func:`sysid.excitation.excite`; from 66 psi to the running pressure by default).
-        options: ``variant`` or ``equipment`` (a row of :data:`sysid.airbrake.equipment.EQUIPMENT`), ``switches``
-            (fields of :class:`sysid.airbrake.variant.Variant`), ``pairs``, ``locomotives``, ``radio`` (how these hear
-            of the handle: :class:`sysid.airbrake.radio.Radio`), ``loads`` and ``retainers`` (one number or one a pair:
+        options: ``variant`` (``acoustic`` by default) or ``equipment`` (a row of
+            :data:`sysid.airbrake.equipment.EQUIPMENT`), ``switches`` (fields of
+            :class:`sysid.airbrake.variant.Variant`), ``pairs``, ``locomotives``, ``radio`` (how these hear of the
+            handle: :class:`sysid.airbrake.radio.Radio`), ``loads`` and ``retainers`` (one number or one a pair:
             :class:`sysid.airbrake.consist.Consist`), ``running_pressure`` in psi gauge, ``speed`` in m/s, ``time_step``
             in s, ``node``, and ``quantities``: what each channel is, ``command``, a quantity at ``node``, or
             ``{quantity: node}``.
@@ -266,7 +267,7 @@ def generate(
         radio=None if options_.radio is None else Radio(**options_.radio.model_dump()),
     )
     columns = [_column(channel, probe, record) for channel, probe in zip(channels, probes, strict=True)]
-    kind = f"equipment {options_.equipment}" if options_.equipment else f"variant {options_.variant or 'physical'}"
+    kind = f"equipment {options_.equipment}" if options_.equipment else f"variant {options_.variant or USUAL_VARIANT}"
     switches = "".join(f", {name}={value}" for name, value in options_.switches.items())
     return Trace(
         name=case,

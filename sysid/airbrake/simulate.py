@@ -12,7 +12,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.flow import FlowTable
 from sysid.airbrake.machine import BrakedTrain, Probe, all_probes
 from sysid.airbrake.radio import Radio
-from sysid.airbrake.variant import PHYSICAL, Variant
+from sysid.airbrake.variant import USUAL_VARIANT, VARIANTS, Variant
 from sysid.errors import ConfigError
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
 
@@ -67,7 +67,7 @@ def simulate(
     command: Command,
     *,
     consist: Consist | None = None,
-    variant: Variant = PHYSICAL,
+    variant: Variant = VARIANTS[USUAL_VARIANT],
     probes: tuple[Probe, ...] | None = None,
     time_step: float = 1e-3,
     sample_time: float = 0.1,
@@ -81,7 +81,7 @@ def simulate(
     Args:
         command: The driver's handle.
         consist: The train; 50 wagon pairs if not given.
-        variant: The reading of the model.
+        variant: The reading of the model; that with momentum of the air if not given.
         probes: Pressures to record; all of them if not given.
         time_step: Step of the explicit scheme in s.
         sample_time: Output step in s; each sample is the mean over its steps.

@@ -208,11 +208,14 @@ PHYSICAL = Variant(
     laminar_ratio=0.995,
     speed_gates=False,
 )
-"""What a real ABDX valve does; the default of every shipped data set. Its pipe has no inertia, as the print's."""
+"""What a real ABDX valve does; every shipped data set names it. Its pipe has no inertia, as the print's."""
 
 ACOUSTIC = dataclasses.replace(PHYSICAL, pipe_momentum=True)
-"""``PHYSICAL`` with the momentum of the air: no wave is faster than sound. For data sets that are made anew: those that
-are shipped, and all published figures, rest on ``PHYSICAL``."""
+"""``PHYSICAL`` with the momentum of the air: no wave is faster than sound. What is made anew has it unless it says
+otherwise; the data sets that are shipped, and all published figures, name ``PHYSICAL``."""
 
 VARIANTS: Mapping[str, Variant] = {"listing": LISTING, "physical": PHYSICAL, "acoustic": ACOUSTIC}
 """The presets by name."""
+
+USUAL_VARIANT = "acoustic"
+"""The preset of what does not name one."""

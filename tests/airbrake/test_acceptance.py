@@ -3,7 +3,7 @@
 Textbook figures are those of freight-brake manuals and of 49 CFR 232: 26 psi make 64 psi in the cylinder, an emergency
 some 20 % more (77 psi), 2.5 psi per psi of reduction, 6 to 8 psi the least application, an emergency that runs at
 900 to 1,000 ft/s, a vent that holds for some two minutes. The listing must meet A1, A2, A6, A11, A13 and A14 only:
-tests named "as printed" record what it does instead, because that is why the physical variant is the default.
+tests named "as printed" record what it does instead, because that is why no data set takes it unasked.
 """
 
 from functools import cache
@@ -14,7 +14,7 @@ import pytest
 from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.simulate import AirBrakeRecord, simulate
-from sysid.airbrake.variant import ACOUSTIC, LISTING, PHYSICAL, Variant
+from sysid.airbrake.variant import ACOUSTIC, LISTING, PHYSICAL, USUAL_VARIANT, VARIANTS, Variant
 from sysid.errors import StabilityError
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
 
@@ -159,6 +159,10 @@ def test_a7_with_momentum_no_wave_is_faster_than_sound() -> None:
     assert release_front(PHYSICAL) > 1.1 * SOUND
     assert 800.0 <= release_front(ACOUSTIC) < SOUND
     assert 500.0 <= service_front(ACOUSTIC) < SOUND
+
+
+def test_a7_what_names_no_variant_has_no_wave_faster_than_sound() -> None:
+    assert VARIANTS[USUAL_VARIANT] == ACOUSTIC
 
 
 def test_with_momentum_the_cylinders_hold_what_they_hold_without() -> None:

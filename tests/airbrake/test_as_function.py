@@ -15,17 +15,21 @@ COMMAND = [[0, 90], [2, 80], [6, 90], [12, 90]]
 NODES = {"BP": {"pipe": 3}, "ER": {"emergency": 3}, "BC2": {"cylinder": 5}}
 
 
-def test_it_gives_what_the_generator_gives() -> None:
+@pytest.mark.parametrize(("variant", "momentum"), [({}, {}), ({"variant": "physical"}, {"momentum": 0.0})])
+def test_it_gives_what_the_generator_gives(variant: dict[str, str], momentum: dict[str, float]) -> None:
     trace = generate(
-        case="one", recipe={"command": COMMAND}, options={"pairs": 2, "quantities": {"STP": "command", **NODES}},
+        case="one", recipe={"command": COMMAND},
+        options={**variant, "pairs": 2, "quantities": {"STP": "command", **NODES}},
         channels=tuple(Channel(name=name, unit="psi", reference=Reference.GAUGE) for name in ("STP", *NODES)),
         sample_time=0.1,
     )  # fmt: skip
-    found = service_brake(trace.time, trace.columns(["STP"]), {"pairs": 2.0, "behind": 2.0})
+    found = service_brake(trace.time, trace.columns(["STP"]), {"pairs": 2.0, "behind": 2.0, **momentum})
     np.testing.assert_array_equal(found[:, [0, 2, 7]], trace.columns(list(NODES)))
 
 
-@pytest.mark.parametrize("parameters", [{"pears": 2.0}, {"pairs": 2.0}, {"pairs": 2.5, "behind": 1.0}])
+@pytest.mark.parametrize(
+    "parameters", [{"pears": 2.0}, {"pairs": 2.0}, {"pairs": 2.5, "behind": 1.0}, {"momentum": 0.5}]
+)
 def test_a_valve_that_is_not_there_or_a_parameter_that_is_none_is_refused(parameters: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match="no such parameter, or no such valve"):
         service_brake(np.arange(9) * 0.1, np.full((9, 1), 90.0), parameters)

@@ -25,7 +25,7 @@ def test_a_trace_has_the_channels_asked_for() -> None:
     assert trace["STP"][[0, 19, 20, -1]].tolist() == [90.0, 90.0, 70.0, 70.0]
     assert trace["BP"][0] == pytest.approx(90.0)
     assert trace["BC"][-1] == pytest.approx(49.0, abs=2.0)
-    assert "variant physical" in trace.provenance[0]
+    assert "variant acoustic" in trace.provenance[0]
 
 
 def test_other_units_are_the_same_pressures() -> None:
