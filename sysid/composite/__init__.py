@@ -19,6 +19,7 @@ from sysid.composite.limit_check import LimitCheck, check_limits
 from sysid.composite.limits_held import Holding, holding
 from sysid.composite.members import assembled, dealt, own_traces, simulated_inputs, whole_score
 from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
+from sysid.composite.perturbed import perturbed
 from sysid.composite.plan import ActiveLearning, OneStep, Retraining, RoundPlan, TrainingPlan
 from sysid.composite.rehearsal import rehearse
 from sysid.composite.round import JointRound, TrainedRound, train_round
@@ -70,6 +71,7 @@ __all__ = [
     "model_of",
     "one_step_of",
     "own_traces",
+    "perturbed",
     "reading_more",
     "rehearse",
     "retrain",

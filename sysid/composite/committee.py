@@ -8,11 +8,14 @@ at a sample where
 
 query by committee (Seung, Opper and Sompolinsky 1992; ensemble variance of Krogh and Vedelsby 1995) at run time. The
 difference is a channel of the whole like any other, held between :math:`\pm d`, so that every export computes it and
-raises the flag ``IN_DOUBT``. The threshold is found on sequences that trained nothing: :func:`doubt_threshold`.
+raises the flag ``IN_DOUBT``. With ``each`` it is in doubt where it is as far from any one of them: the others may then
+be the first itself, what its switches compare moved up and down (:func:`sysid.composite.perturbed`), whose mean says
+nothing. The threshold is found on sequences that trained nothing: :func:`doubt_threshold`.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,16 +33,19 @@ APART = "_apart"
 """Behind the name of an output: the channel of its difference."""
 
 
-def committee(wholes: Sequence[Cascade | AbstractModel], thresholds: Dict[str, float]) -> Cascade:
+def committee(
+    wholes: Sequence[Cascade | AbstractModel], thresholds: Dict[str, float], *, each: bool = False
+) -> Cascade:
     """Surrogates of the same outputs as one, which the first of them answers and the others doubt.
 
     Args:
         wholes: Two or more with the same inputs, units and sample time.
         thresholds: By output, in its unit: the difference from the mean of the others from which an answer is in doubt.
+        each: Whether it is the difference from any one of the others.
 
     Returns:
         The channels of the first under their names; of the others with their number behind them (``BC_2``); and for
-        each judged output the difference (``BC_apart``).
+        each judged output the difference (``BC_apart``), or those from each of the others (``BC_apart_2``).
 
     Raises:
         ConfigError: If there are fewer than two, they have not the same inputs, one of them does not compute a judged
@@ -51,16 +57,19 @@ def committee(wholes: Sequence[Cascade | AbstractModel], thresholds: Dict[str, f
     names = [{name: name for name in cascades[0].outputs}]
     for number, one in enumerate(cascades[1:], 2):
         names.append({name: _free(f"{name}_{number}", taken) for name in one.outputs})
-    models = [_renamed(model, own) for one, own in zip(cascades, names, strict=True) for model in one.models]
+    models = [renamed(model, own) for one, own in zip(cascades, names, strict=True) for model in one.models]
     rest: dict[str, Any] = {}
     limits: dict[str, Limit] = {}
     for one, own in zip(cascades, names, strict=True):
         rest |= {own.get(name, name): level for name, level in one.rest.items()}
         limits |= {own[name]: _limit(limit, own) for name, limit in one.limits.items()}
     for output, threshold in thresholds.items():
-        judged = [own[output] for own in names]
-        models.append(_difference(judged, _free(f"{output}{APART}", taken), cascades[0], output))
-        limits[models[-1].mapping.output] = Limit(low=-float(threshold), high=float(threshold), doubt=True)
+        first, *others = (own[output] for own in names)
+        groups = {f"_{k}": [other] for k, other in enumerate(others, 2)} if each else {"": others}
+        for behind, group in groups.items():
+            name = _free(f"{output}{APART}{behind}", taken)
+            models.append(_difference([first, *group], name, cascades[0], output))
+            limits[name] = Limit(low=-float(threshold), high=float(threshold), doubt=True)
     return Cascade(models=tuple(models), rest=rest, limits=limits)
 
 
@@ -93,13 +102,19 @@ def _free(name: str, taken: set[str]) -> str:
     return name
 
 
-def _renamed(model: Member, names: Dict[str, str]) -> Member:
-    """A model over other channels."""
+def renamed(model: Member, names: Dict[str, str]) -> Member:
+    """A model over other channels.
+
+    Args:
+        model: The model.
+        names: New names by old ones; channels that are not named keep theirs.
+
+    Returns:
+        The model.
+    """
     mapping = model.mapping
-    other = Mapping(
-        inputs=(names.get(name, name) for name in mapping.inputs), outputs=(names[name] for name in mapping.outputs)
-    )
-    return model.over(other)
+    inputs, outputs = ([names.get(name, name) for name in own] for own in (mapping.inputs, mapping.outputs))
+    return model.over(Mapping(inputs=inputs, outputs=outputs))
 
 
 def _limit(limit: Limit, names: Dict[str, str]) -> Limit:
@@ -151,6 +166,7 @@ def doubt_threshold(
     *,
     error: float,
     false: float = 0.05,
+    each: bool = False,
 ) -> float:
     """The smallest threshold at which hardly any right answer is in doubt.
 
@@ -161,6 +177,7 @@ def doubt_threshold(
         output: The output.
         error: Largest error of a right answer, in its unit.
         false: Share of the right answers that may be in doubt.
+        each: As in :func:`committee`.
 
     Returns:
         In the output's unit.
@@ -168,7 +185,7 @@ def doubt_threshold(
     Raises:
         ConfigError: If no answer is right, or they cannot be a committee.
     """
-    apart, errors = _apart(committee(wholes, {output: 1.0}), traces, output)
+    apart, errors = _apart(committee(wholes, {output: 1.0}, each=each), traces, output)
     right = apart[errors <= error]
     if not len(right):
         raise ConfigError(
@@ -196,7 +213,7 @@ def doubt_figures(whole: Cascade, traces: Sequence[Trace], output: str, *, error
     Raises:
         ConfigError: If the output is not judged.
     """
-    limit = whole.limits.get(f"{output}{APART}", Limit()).high
+    limit = whole.limits[judging[0]].high if (judging := _judging(whole, output)) else None
     if not isinstance(limit, float):
         raise ConfigError(
             f"{output} is not judged by this committee",
@@ -218,12 +235,20 @@ def doubt_figures(whole: Cascade, traces: Sequence[Trace], output: str, *, error
 
 
 def _apart(whole: Cascade, traces: Sequence[Trace], output: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """At every sample how far the answer is from the mean of the others, and from the measured output."""
-    judged = whole.member(f"{output}{APART}").mapping.inputs
+    """At every sample how far the answer is from the others, and from the measured output."""
+    groups = [whole.member(name).mapping.inputs[1:] for name in _judging(whole, output)]
     apart, errors = [], []
     for trace in traces:
         run = whole.simulate_trace(trace)
         answer = run[output]
-        apart.append(np.abs(answer - np.mean([run[name] for name in judged[1:]], axis=0)))
+        apart.append(
+            np.max([np.abs(answer - np.mean([run[name] for name in group], axis=0)) for group in groups], axis=0)
+        )
         errors.append(np.abs(answer - trace[output]))
     return np.concatenate(apart), np.concatenate(errors)
+
+
+def _judging(whole: Cascade, output: str) -> list[str]:
+    """The channels that say how far apart the answers are: one, or one for each of the others."""
+    pattern = re.compile(re.escape(output + APART) + r"(_\d+)?")
+    return [name for name in whole.outputs if pattern.fullmatch(name) and whole.limits.get(name, Limit()).doubt]

@@ -3,6 +3,7 @@
     python -m tests.benchmarks doubt
     python -m tests.benchmarks doubt --count=8 --first=100 --error=1
     python -m tests.benchmarks doubt --wholes=service-cascade-any,combined-brake-grown,combined-brake-held
+    python -m tests.benchmarks doubt --wholes=service-cascade-any --perturb=0.3
 
 * Each published whole of the service brake (``WHOLES``, or those of ``--wholes=``) alone on ``abdx-kinds-unseen``: per
   kind the share of the sequences within 1 psi rms, and how many diverge. ``--count=`` takes so many of each kind from
@@ -11,6 +12,7 @@
   ``abdx-kinds-calibration`` (``--calibrate=`` sequences of each of its three kinds) so that 5 % of the right answers
   are doubted there; then per unseen kind the share of samples with an error over ``--error=`` psi, how many of these
   are in doubt, and how many of the others.
+* With ``--perturb=`` psi each of them with itself, what its relay reads of the pipe moved up and down by so much.
 
 Making the traces takes some 2 s of processor time each, once.
 """
@@ -18,9 +20,12 @@ Making the traces takes some 2 s of processor time each, once.
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
-from sysid.composite import committee, doubt_figures, doubt_threshold, run_monte_carlo
+import numpy as np
+
+from sysid.composite import DoubtFigures, committee, doubt_figures, doubt_threshold, perturbed, run_monte_carlo
 from sysid.export import read_bundle
 from sysid.ingest import load_dataset
 from sysid.models import Cascade
@@ -52,7 +57,7 @@ def sequences(data: str, kinds: tuple[str, ...], first: int, count: int) -> dict
     }
 
 
-def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: float) -> None:
+def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: float, by: float) -> None:
     """Print both tables."""
     wholes: dict[str, Cascade] = {}
     for name in named():
@@ -66,13 +71,32 @@ def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: f
             print(f"  {kind:<10} {100 * one.within:5.1f} %  median {one.quantiles[0.5]:.2f} psi, {one.lost} diverge")
     calibration = [trace for traces in known.values() for trace in traces]
     for name in named():
-        members = [wholes[name], *(whole for other, whole in wholes.items() if other != name)]
-        threshold = doubt_threshold(members, calibration, OUTPUT, error=error)
-        both = committee(members, {OUTPUT: threshold})
+        others = [whole for other, whole in wholes.items() if other != name]
+        if by:
+            others = [perturbed(wholes[name], "BP", one, readers=["RL"]) for one in (by, -by)]
+        members, each = [wholes[name], *others], bool(by)
+        threshold = doubt_threshold(members, calibration, OUTPUT, error=error, each=each)
+        both = committee(members, {OUTPUT: threshold}, each=each)
         print(f"{name} first, in doubt from {threshold:.2f} psi: wrong, of these in doubt, of the others in doubt, %")
-        for kind, traces in {**{f"({kind})": of for kind, of in known.items()}, **unseen, "all unseen": every}.items():
-            of = doubt_figures(both, traces, OUTPUT, error=error)
-            print(f"  {kind:<12} {100 * of.wrong:5.1f} {100 * of.flagged:5.1f} {100 * of.false:5.1f}")
+        known_kinds = {f"({kind})": traces for kind, traces in known.items()}
+        of = {
+            kind: doubt_figures(both, traces, OUTPUT, error=error) for kind, traces in {**known_kinds, **unseen}.items()
+        }
+        for kind, one in {**of, "all unseen": together([of[kind] for kind in unseen])}.items():
+            print(f"  {kind:<12} {100 * one.wrong:5.1f} {100 * one.flagged:5.1f} {100 * one.false:5.1f}")
+
+
+def together(parts: list[DoubtFigures]) -> DoubtFigures:
+    """The figures of several sets of samples as those of one."""
+    samples = np.array([part.samples for part in parts])
+    wrong = samples * [part.wrong for part in parts]
+    return replace(
+        parts[0],
+        samples=int(samples.sum()),
+        wrong=float(wrong.sum() / samples.sum()),
+        flagged=float(np.sum(wrong * [part.flagged for part in parts]) / max(wrong.sum(), 1.0)),
+        false=float(np.average([part.false for part in parts], weights=samples - wrong)),
+    )
 
 
 if __name__ == "__main__":
@@ -80,4 +104,5 @@ if __name__ == "__main__":
         sequences("abdx-kinds-unseen", UNSEEN, int(option("first", 100)), int(option("count", 8))),
         sequences("abdx-kinds-calibration", CALIBRATION, 0, int(option("calibrate", 10))),
         option("error", 1.0),
+        option("perturb", 0.0),
     )
