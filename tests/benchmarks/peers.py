@@ -14,8 +14,9 @@ Times are processor times, one thread each, so that a machine with other work gi
 cap at most. Two comparisons: the time to an error that was fixed beforehand (the tank: 3.6 % of the output's standard
 deviation; the cylinder: 7e-3 psi^2), and the time in which ours undercuts the peer's best, beside the time that this
 took the peer. Ours and theirs are medians over three seeds, the preparation of the fit included; a seed that never gets
-there counts as infinite. fastcan leaves nothing to chance and runs once. Imports count for nobody. Our kernels are compiled once per installation, jax's functions in each
-process: that difference is part of what is measured, and of the order of some seconds.
+there counts as infinite. fastcan leaves nothing to chance and runs once. Imports count for nobody. Our
+kernels are compiled once per installation, jax's functions in each process: that difference is
+part of what is measured, and of the order of some seconds.
 """
 
 from __future__ import annotations
