@@ -82,8 +82,8 @@ def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: f
         of = {
             kind: doubt_figures(both, traces, OUTPUT, error=error) for kind, traces in {**known_kinds, **unseen}.items()
         }
-        for kind, one in {**of, "all unseen": together([of[kind] for kind in unseen])}.items():
-            print(f"  {kind:<12} {100 * one.wrong:5.1f} {100 * one.flagged:5.1f} {100 * one.false:5.1f}")
+        for kind, figures in {**of, "all unseen": together([of[kind] for kind in unseen])}.items():
+            print(f"  {kind:<12} {100 * figures.wrong:5.1f} {100 * figures.flagged:5.1f} {100 * figures.false:5.1f}")
 
 
 def together(parts: list[DoubtFigures]) -> DoubtFigures:
