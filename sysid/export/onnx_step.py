@@ -75,6 +75,8 @@ def _together(nodes: Nodes, form: WideForm, scaled: str, state: str) -> str:
         return ""
     (line,), size = form.input_lines, form.surrogate.state_length(nodes.dtype)
     shifted = sum(one.length for one in form.lines)
+    if shifted == len(form.lines):  # nothing of them is moved, and the input's line would be left behind
+        return ""
     if (line.first, line.length + shifted) != (0, size) or form.memory != (*range(line.length, size),):
         return ""
     if len({reader(one) for one in (*form.inputs, *form.input_lines)}) != 1:

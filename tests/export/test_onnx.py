@@ -131,6 +131,17 @@ def test_a_step_moves_its_lines_by_one_slice_and_lays_its_first_readings_by_one_
     np.testing.assert_allclose(run.output[:, 0], surrogate.simulate(u), rtol=0.0, atol=1e-11)
 
 
+def test_lines_of_one_sample_leave_that_of_the_input_in_its_place(tmp_path):
+    """Nothing of them is moved, so that the state cannot be moved whole."""
+    filled = wired_narx("STP+AR -> BP", NARX(input_delays=[[0, 1], [1]], output_delays=1, neurons=3), 1)
+    whole = Cascade(models=(filled, wired_narx("BP -> AR", NARX(input_delays=[[0]], output_delays=1, neurons=3), 2)))
+    surrogate, u = Surrogate.of(whole), np.linspace(0.0, 80.0, 30)[:, np.newaxis]
+    for file in OnnxExporter().write(surrogate, tmp_path):
+        run = OnnxExporter().load(file, tmp_path)(u[:, np.newaxis], surrogate.at_rest(u[0])[np.newaxis])
+        slack = 1e-10 if file.dtype == "float64" else 1e-3
+        np.testing.assert_allclose(run.output[:, 0], surrogate.simulate(u), rtol=0.0, atol=slack)
+
+
 def test_many_lines_take_their_newest_numbers_row_by_row(tmp_path):
     """A table with one number in each of many rows takes longer than to take, to scale and to shift them."""
     lags = {"output_delays": [1, 2], "neurons": 1}
