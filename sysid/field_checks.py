@@ -118,6 +118,9 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
             shortened(first["input"]),
         )
         expected, remedy = _CHANGES.get(first["type"], (expected, remedy))
+        if first["type"] in {"too_short", "too_long"}:  # its own words are Python's
+            least, most = (first.get("ctx", {}).get(f"{end}_length") for end in ("min", "max"))
+            expected = f"at least {_counted(least)}" if most is None else f"at most {_counted(most)}"
         if expected == _NAMES:
             expected = _names_at(model, loc, _NAMES)
         if first["type"] in {"enum", "literal_error"}:
@@ -125,6 +128,11 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
     if others:
         remedy += f" (also at fault: {', '.join(sorted({_beside(loc, item['loc'], origins) for item in others}))})"
     return ConfigError(what, where=origins.place(loc), expected=expected, got=got, remedy=remedy)
+
+
+def _counted(entries: object) -> str:
+    """So many entries of a list, in words."""
+    return f"{entries} {'entry' if entries == 1 else 'entries'}"
 
 
 _LIST = ("a list", "write a list: [..., ...], or one entry a line with - before it")

@@ -157,7 +157,7 @@ def parse_yaml(text: str, *, where: object) -> dict[str, Any]:
             "the file does not hold a mapping",
             where=where,
             expected="'key: value' lines at the top level",
-            got="an empty file" if data is None else f"a {type(data).__name__}",
+            got="an empty file" if data is None else "a list" if isinstance(data, list) else "a single value",
             remedy="start from an example: sysid init DIR writes a data set and a pipeline with comments",
         )
     return data

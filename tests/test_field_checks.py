@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import pytest
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from sysid.errors import ConfigError
 from sysid.field_checks import Origins, check
@@ -24,6 +25,10 @@ class Outer(BaseModel):
     models: dict[str, Inner | None] = {}
 
 
+class Few(BaseModel):
+    steps: Annotated[tuple[int, ...], Field(min_length=1, max_length=2)]
+
+
 @pytest.mark.parametrize(
     ("data", "where", "remedy"),
     [
@@ -40,6 +45,14 @@ def test_a_field_at_fault_is_named_with_its_path(data: dict[str, object], where:
         check(Outer, data, where="x.yaml")
     assert caught.value.where == f"x.yaml, {where}"
     assert str(caught.value.remedy).startswith(remedy)
+
+
+def test_a_list_of_too_few_is_told_in_words_of_lists() -> None:
+    """They had been the words of the library that checks: a tuple, after validation."""
+
+    for given, words in (([], "at least 1 entry"), ([1, 2, 3], "at most 2 entries")):
+        with pytest.raises(ConfigError, match=words):
+            check(Few, {"steps": given}, where="x.yaml")
 
 
 def test_good_data_becomes_the_model() -> None:

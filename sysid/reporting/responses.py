@@ -118,7 +118,7 @@ class StepResponse(_Response):
                 said += (
                     f", rises in {quantity(one['rise_time'], 's')}, settles in {quantity(one['settling_time'], 's')}"
                 )
-                said += f", overshoots by {number(one['overshoot'])} %" if one["overshoot"] > SETTLED else ""
+                said += f", overshoots by {number(one['overshoot'])} %" if one["overshoot"] > 100.0 * SETTLED else ""
             else:
                 said += ", does not settle" if not np.isfinite(one["gain"]) else ", settles later than is shown"
             lines.append(said)
