@@ -110,8 +110,15 @@ def _thousands(table: RawTable) -> dict[str, Any] | None:
     for mark in (".", ",", "'", " "):
         grouped = re.compile(rf"[+-]?[0-9]{{1,3}}(?:{re.escape(mark)}[0-9]{{3}})+(?:{re.escape(decimal)}[0-9]*)?")
         if strange and all(grouped.fullmatch(text) for text in strange):
-            return {"thousands": mark, "decimal": decimal}
+            # Nothing has shown that a point is one of decimals where all other numbers are whole.
+            swapped = mark == decimal == "." and all(_whole(one.values) for one in table.columns if not one.strange)
+            return {"thousands": mark, "decimal": "," if swapped else decimal}
     return None
+
+
+def _whole(values: NDArray[np.float64]) -> bool:
+    known = values[np.isfinite(values)]
+    return bool((known == np.round(known)).all())
 
 
 def _missing(table: RawTable) -> dict[str, Any] | None:

@@ -69,7 +69,8 @@ def _set(stamps: NDArray[np.float64], step: float) -> NDArray[np.int64]:
     back, on = steps < -_BACK * step, steps > step * len(stamps)
     ordered = np.diff(np.sort(stamps))
     even = np.mean(np.abs(ordered - step) <= _EVEN * step) if len(ordered) else 1.0
-    if not on.any() and even >= _IN_ORDER:
+    # What is left open between them is no place for what was written later: a counter that wraps begins anew.
+    if not on.any() and even >= _IN_ORDER and ordered.max(initial=0.0) <= _BACK * step:
         return np.zeros(1, dtype=np.int64)
     return np.concatenate([[0], np.flatnonzero(back | on) + 1, [len(stamps)]])
 

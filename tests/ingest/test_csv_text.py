@@ -206,6 +206,20 @@ def test_the_header_is_the_line_of_names(write: Write, case: str) -> None:
     assert len(table) == 15 + head.count("\n0.")
 
 
+def test_points_between_thousands_of_whole_numbers_are_no_decimal_points(write: Write) -> None:
+    """1.234.567 beside whole numbers had been read as 1234.567."""
+    counts = ["1.234.567", "1.235.001", "998.100"] * 5
+    found = inspect_file(write("run.csv", "t;u;n\n" + "".join(f"{k};{k % 3};{n}\n" for k, n in enumerate(counts))))
+    assert found.table.find("n").values[:3].tolist() == [1234567.0, 1235001.0, 998100.0]
+
+
+def test_a_header_that_comes_again_in_another_order_is_refused(write: Write) -> None:
+    """It had been told as a mark of a missing value, and what it asked to write would have exchanged the columns."""
+    rows = "".join(f"{k / 10},{k % 3},{k * k}\n" for k in range(15))
+    with pytest.raises(ReaderError, match=r"(?s)another order.*line 17"):
+        read_table(write("run.csv", f"t,u,y\n{rows}t,y,u\n{rows}"))
+
+
 def test_names_of_rows_have_no_head_in_tables_of_r(write: Write) -> None:
     """``write.table`` quotes them; the head, a name short, had been left out, and they had been time."""
     rows = "".join(f'"{k + 1}" {k / 10} {k % 3} {k * k}\n' for k in range(15))

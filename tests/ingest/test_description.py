@@ -111,9 +111,9 @@ REFUSED = {
     "no channels": (
         GOOD[GOOD.index("channels:") : GOOD.index("source:")],
         "channels: []\n",
-        r"field channels.*at least 1 item",
+        r"field channels.*at least 1 entry",
     ),
-    "no cases": (GOOD[GOOD.index("cases:") : GOOD.index("inferred:")], "cases: {}\n", r"field cases.*at least 1 item"),
+    "no cases": (GOOD[GOOD.index("cases:") : GOOD.index("inferred:")], "cases: {}\n", r"field cases.*at least 1 entry"),
     "both kinds of source": (
         "  files:\n",
         "  generator: abdx\n  files:\n",

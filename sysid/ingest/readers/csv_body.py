@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ReaderError
+from sysid.errors import ReaderError, shortened
 from sysid.extras import has
 from sysid.ingest.calendar import Calendar
 from sysid.ingest.numbers import MISSING, NumberFormat
@@ -292,6 +292,16 @@ class Body:
         """The rows without the header, where it comes again, as after a restart of the logger."""
         names = [name.strip() for name in self.layout.names]
         again = [row for row in rows if names and [cell.strip() for cell in row.cells] == names]
+        begun = [row for row in rows if len(names) > 1 and row.cells and row.cells[0].strip() in names]
+        other = [row for row in begun if row not in again and sorted(c.strip() for c in row.cells) == sorted(names)]
+        if other:
+            raise ReaderError(
+                "the header comes again with its columns in another order",
+                where=f"{self.file.path}, line {other[0].line}",
+                expected=f"{', '.join(names)}, as in the first one",
+                got=shortened(", ".join(cell.strip() for cell in other[0].cells)),
+                remedy="part the file there, a file for each recording: what stands below is another column",
+            )
         if not again:
             return rows
         self.notes.append(f"the header comes again in line {again[0].line} and is left out there")
