@@ -128,13 +128,12 @@ def step_by_step(step: Runner) -> Runner:
     """
 
     def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
-        outputs, flags = [], []
-        for sample in inputs:
-            one = step(sample, state)
-            outputs.append(one.output)
-            flags.append(one.flags)
-            state = one.state
-        return Run(output=np.stack(outputs), state=state, flags=np.stack(flags))
+        one = step(inputs[0], state)
+        output, flags = (np.empty((len(inputs), *a.shape), dtype=a.dtype) for a in (one.output, one.flags))
+        for k in range(len(inputs)):
+            one = one if k == 0 else step(inputs[k], one.state)
+            output[k], flags[k] = one.output, one.flags
+        return Run(output=output, state=one.state, flags=flags)
 
     return run
 

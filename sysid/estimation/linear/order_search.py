@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.regression import root_weights, stack
+from sysid.estimation.linear.regression import blocks_of
+from sysid.estimation.nonparametric.evidence import triangle
 from sysid.kernels import linear_orders as kernel
 from sysid.models import ARX, Lags, Mapping, Start
 from sysid.traces import Trace
@@ -273,24 +273,26 @@ def search_orders(
     lags = Lags(inputs=(input_lags,) * m, output=tuple(range(1, grid.max_na + 1)))
     # The rows are the same for every candidate: those on which the largest looks at no masked sample.
     experiments = [experiment.one_step(lags) for experiment in given]
-    X, y = stack(experiments, lags, intercept=False)
-    if len(X) <= lags.n_regressors + grid.intercept:
+    rows = sum(
+        int(np.count_nonzero(one.weights)) if one.weights is not None else len(one.output) for one in experiments
+    )
+    # The column of the intercept stands first: it is in every candidate.
+    laid = (np.column_stack(block) for block in blocks_of(experiments, lags))
+    if 0 < rows <= lags.n_regressors + grid.intercept:
         raise TraceError(
             "fewer samples than the largest candidate has parameters",
             expected=f"more than {lags.n_regressors + grid.intercept}",
-            got=len(X),
+            got=rows,
             remedy="lower the orders, or use longer traces",
         )
-    # The column of the intercept stands first: it is in every candidate.
-    root = root_weights(experiments)
-    table = np.column_stack([root[root > 0.0], X, y])
-    norms = np.linalg.norm(table, axis=0)
-    triangle = np.ascontiguousarray(linalg.qr(table, mode="r")[0][: table.shape[1]].T)
-    tolerance = len(table) * np.finfo(np.float64).eps * norms
+    reduced = triangle(laid, free=0)
+    table = np.column_stack([reduced.R, reduced.z])
+    tolerance = rows * np.finfo(np.float64).eps * np.linalg.norm(table, axis=0)
+    factor = np.ascontiguousarray(table.T)
     rank = 0
     target, everything = table.shape[1] - 1, np.arange(table.shape[1])
     if grid.intercept:
-        rank = kernel.reflect(triangle, 0, everything[1:], target - 1, target, 0, tolerance[0])
+        rank = kernel.reflect(factor, 0, everything[1:], target - 1, target, 0, tolerance[0])
     outputs = everything[1 + m * reach : target]
     dead_times = grid.dead_times(m)
     per_block = grid.size(m) // len(dead_times)
@@ -302,7 +304,7 @@ def search_orders(
         first = [1 + i * reach + nk - grid.min_nk for i, nk in enumerate(dead)]
         columns = np.array([np.arange(at, at + grid.max_nb) for at in first], dtype=np.int64).reshape(inputs)
         losses = np.empty((n_leaves, grid.max_na + 1))
-        kernel.nested_losses(triangle, rank, columns, least, outputs, target, tolerance, losses)
+        kernel.nested_losses(factor, rank, columns, least, outputs, target, tolerance, losses)
         return losses[:, grid.min_na :]
 
     blocks = []

@@ -91,18 +91,6 @@ def deviation(experiment: Experiment, point: OperatingPoint) -> Experiment:
     )
 
 
-def root_weights(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
-    """Square roots of all samples' weights, one experiment after the other.
-
-    Args:
-        experiments: The records.
-
-    Returns:
-        Shape ``(n_samples_of_all,)``.
-    """
-    return np.concatenate([np.ones(len(e.output)) if e.weights is None else np.sqrt(e.weights) for e in experiments])
-
-
 def stack(
     experiments: Sequence[Experiment], lags: Lags, *, intercept: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -119,15 +107,41 @@ def stack(
     Raises:
         TraceError: If no row counts.
     """
-    X = np.concatenate([regressor_matrix(experiment, lags) for experiment in experiments])
-    y = np.concatenate([experiment.output for experiment in experiments])
-    if intercept:
-        X = np.column_stack([X, np.ones(len(X))])
-    root = root_weights(experiments)
-    kept = root > 0.0
-    if not kept.any():
+    found = [*blocks_of(experiments, lags, rows=None)]
+    X, y = (np.concatenate([block[side] for block in found]) for side in (1, 2))
+    return (np.column_stack([X, np.concatenate([block[0] for block in found])]) if intercept else X), y
+
+
+def blocks_of(
+    experiments: Sequence[Experiment], lags: Lags, *, rows: int | None = TALL
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
+    """The same some rows at a time, for what sums them up: a long record times its lags is larger than any memory.
+
+    Args:
+        experiments: The records, with the weights of their rows.
+        lags: The regressors.
+        rows: Samples of a block at most; ``None`` for whole records.
+
+    Yields:
+        Square roots of the weights, regressors and targets of the rows that count, both times these roots.
+
+    Raises:
+        TraceError: If no row counts.
+    """
+    if not any(e.weights is None or (e.weights > 0.0).any() for e in experiments):
         raise nothing_in_a_row(lags.depth + 1, experiments)
-    return X[kept] * root[kept, None], y[kept] * root[kept]
+    for e in experiments:
+        past_inputs, past_output = e.history.padded(lags.depth)
+        u, y = np.concatenate([past_inputs, e.inputs]), np.concatenate([past_output, e.output])
+        n = len(e.output)
+        for first in range(0, n, rows or n):
+            last = min(first + (rows or n), n)
+            here = slice(first, lags.depth + last)
+            X = lagged(u[here], y[here], lags, last - first)
+            root = np.ones(last - first) if e.weights is None else np.sqrt(e.weights[first:last])
+            kept = root > 0.0
+            if kept.any():
+                yield root[kept], X[kept] * root[kept, None], e.output[first:last][kept] * root[kept]
 
 
 def nothing_in_a_row(needed: int, experiments: Sequence[Experiment]) -> TraceError:
