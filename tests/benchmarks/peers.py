@@ -31,6 +31,7 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -226,11 +227,13 @@ def compare(problem: Problem, python: Path, cap: float, folder: Path, workers: i
     stored = problem.store(folder)
     jobs = [(tool, seed) for tool in TOOLS for seed in (SEEDS if tool not in CERTAIN else SEEDS[:1])]
     with ThreadPoolExecutor(workers) as pool:  # each peer is a process; what is compared is processor time
-        done = list(pool.map(lambda job: peer(python, job[0], stored, cap, job[1]), jobs))
-    for tool in TOOLS:
-        runs = [learned for (name, _), learned in zip(jobs, done, strict=True) if name == tool and learned]
-        if runs:
-            judge(problem, runs, curves, cap)
+        done = pool.map(lambda job: peer(python, job[0], stored, cap, job[1]), jobs)
+        for tool, own_jobs in groupby(jobs, key=lambda job: job[0]):
+            runs = [learned for _ in own_jobs if (learned := next(done))]
+            if runs:
+                judge(problem, runs, curves, cap)
+            else:
+                print(f"  {tool} gave nothing with any seed", flush=True)
 
 
 def judge(problem: Problem, runs: list[Learned], curves: list[tuple[np.ndarray, np.ndarray]], cap: float) -> None:

@@ -11,7 +11,7 @@ from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.linear import slow_poles
-from sysid.estimation.linear.regression import Solution, deviation, solve, stack
+from sysid.estimation.linear.regression import Solution, deviation, regress
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.uncertainty import Uncertainty
@@ -53,9 +53,7 @@ def fit_arx(
     experiments = arx_experiments(
         traces, mapping, orders, start=start or Start(), rest_output=rest, operating_point=operating_point
     )
-    X, y = stack(experiments, orders.lags, intercept=orders.intercept)
-    solution = solve(X, y, ridge=ridge, constant=orders.intercept)
-    residual = y - X @ solution.coefficients
+    solution, residual = regress(experiments, orders.lags, intercept=orders.intercept, ridge=ridge)
     model = arx_model(
         solution.coefficients, orders, mapping, traces[0], rest_output=rest, operating_point=operating_point
     )

@@ -24,7 +24,7 @@ from scipy import linalg
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.arx import arx_experiments, arx_model, arx_uncertainty, first_output, stability_note
-from sysid.estimation.linear.regression import Solution, regressor_matrix, solve, stack
+from sysid.estimation.linear.regression import Solution, regress, regressor_matrix, solve
 from sysid.estimation.operating_point import OperatingPoint
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.models import ARX, ARXModel, Mapping, Start
@@ -67,8 +67,7 @@ def fit_iv4(
         return arx_model(theta, orders, mapping, traces[0], rest_output=rest, operating_point=None)
 
     unfiltered = np.ones(1)
-    X, y = stack(experiments, orders.lags, intercept=orders.intercept)
-    theta = solve(X, y, constant=orders.intercept).coefficients
+    theta = regress(experiments, orders.lags, intercept=orders.intercept)[0].coefficients
     theta = _estimate(experiments, model_of(theta), unfiltered).coefficients
     whitening = _whitening(experiments, model_of(theta), orders.na + sum(orders.nb))
     solution = _estimate(experiments, model_of(theta), whitening)

@@ -91,36 +91,47 @@ def deviation(experiment: Experiment, point: OperatingPoint) -> Experiment:
     )
 
 
-def stack(
-    experiments: Sequence[Experiment], lags: Lags, *, intercept: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weighted regressors and targets of the rows that count; no row crosses from one experiment into the next.
+def regress(
+    experiments: Sequence[Experiment], lags: Lags, *, intercept: bool, ridge: float = 0.0
+) -> tuple[Solution, NDArray[np.float64]]:
+    """Least squares over the rows that count; none crosses from one experiment into the next.
 
     Args:
         experiments: The records, with the weights of their rows.
         lags: The regressors.
         intercept: Add a column of ones after them.
+        ridge: As for :func:`solve`.
 
     Returns:
-        Matrix of shape ``(n_rows, n_columns)`` and target of shape ``(n_rows,)``.
+        The solution, and the weighted residuals, shape ``(n_rows,)``.
 
     Raises:
-        TraceError: If no row counts.
+        TraceError: If no row counts, or there are fewer rows than columns and no penalty.
     """
-    found = [*blocks_of(experiments, lags, rows=None)]
-    X, y = (np.concatenate([block[side] for block in found]) for side in (1, 2))
-    return (np.column_stack([X, np.concatenate([block[0] for block in found])]) if intercept else X), y
+
+    def blocks() -> Iterator[NDArray[np.float64]]:
+        for root, X, y in blocks_of(experiments, lags):
+            yield np.column_stack([X, root, y] if intercept else [X, y])
+
+    samples = sum(len(block) for block in blocks())
+    if samples > TALL:
+        reduced = triangle(blocks(), free=0)
+        X, y = reduced.R, reduced.z
+    else:
+        whole = np.concatenate([*blocks()])
+        X, y = whole[:, :-1], whole[:, -1]
+    solution = solve(X, y, ridge=ridge, constant=intercept, samples=samples)
+    return solution, np.concatenate([block[:, -1] - block[:, :-1] @ solution.coefficients for block in blocks()])
 
 
 def blocks_of(
-    experiments: Sequence[Experiment], lags: Lags, *, rows: int | None = TALL
+    experiments: Sequence[Experiment], lags: Lags
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
-    """The same some rows at a time, for what sums them up: a long record times its lags is larger than any memory.
+    """Weighted regressors and targets some rows at a time: a long record times its lags is larger than any memory.
 
     Args:
         experiments: The records, with the weights of their rows.
         lags: The regressors.
-        rows: Samples of a block at most; ``None`` for whole records.
 
     Yields:
         Square roots of the weights, regressors and targets of the rows that count, both times these roots.
@@ -134,8 +145,8 @@ def blocks_of(
         past_inputs, past_output = e.history.padded(lags.depth)
         u, y = np.concatenate([past_inputs, e.inputs]), np.concatenate([past_output, e.output])
         n = len(e.output)
-        for first in range(0, n, rows or n):
-            last = min(first + (rows or n), n)
+        for first in range(0, n, TALL):
+            last = min(first + TALL, n)
             here = slice(first, lags.depth + last)
             X = lagged(u[here], y[here], lags, last - first)
             root = np.ones(last - first) if e.weights is None else np.sqrt(e.weights[first:last])
@@ -196,9 +207,6 @@ def solve(
             got=samples,
             remedy="lower the orders, or use longer traces",
         )
-    if len(X) > max(TALL, n):
-        reduced = triangle(_blocks(X, y), free=0)
-        X, y = reduced.R, reduced.z
     norms = np.linalg.norm(X, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
     if constant:
@@ -220,8 +228,3 @@ def solve(
     return Solution(
         coefficients=coefficients / scale, unscaled_covariance=covariance / np.outer(scale, scale), rank=rank
     )
-
-
-def _blocks(X: NDArray[np.float64], y: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    for first in range(0, len(X), TALL):
-        yield np.column_stack([X[first : first + TALL], y[first : first + TALL]])
