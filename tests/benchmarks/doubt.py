@@ -8,6 +8,7 @@
 * Each published whole of the service brake (``WHOLES``, or those of ``--wholes=``) alone on ``abdx-kinds-unseen``: per
   kind the share of the sequences within 1 psi rms, and how many diverge. ``--count=`` takes so many of each kind from
   number ``--first=`` on.
+  ``--fresh=10000`` draws the same kinds from other seeds, which begin there: nothing here has looked at those.
 * Each of them as the first member of a committee with the others: the threshold of its doubt is found on
   ``abdx-kinds-calibration`` (``--calibrate=`` sequences of each of its three kinds) so that 5 % of the right answers
   are doubted there; then per unseen kind the share of samples with an error over ``--error=`` psi, how many of these
@@ -19,7 +20,9 @@ Making the traces takes some 2 s of processor time each, once.
 
 from __future__ import annotations
 
+import re
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +31,7 @@ import numpy as np
 from sysid.composite import DoubtFigures, committee, doubt_figures, doubt_threshold, perturbed, run_monte_carlo
 from sysid.export import read_bundle
 from sysid.ingest import load_dataset
+from sysid.ingest.dataset import find_dataset
 from sysid.models import Cascade
 from sysid.traces import Trace
 
@@ -57,6 +61,15 @@ def sequences(data: str, kinds: tuple[str, ...], first: int, count: int) -> dict
     }
 
 
+def fresh(data: str, count: int, seed: int) -> dict[str, list[Trace]]:
+    """The same kinds of command from other seeds."""
+    text = find_dataset(data).read_text(encoding="utf-8")
+    text = re.sub(r"seed: (\d+)", lambda found: f"seed: {int(found[1]) + seed}", text)
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "dataset.yaml").write_text(text, encoding="utf-8")
+        return sequences(folder, UNSEEN, 0, count)
+
+
 def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: float, by: float) -> None:
     """Print both tables."""
     wholes: dict[str, Cascade] = {}
@@ -70,7 +83,7 @@ def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: f
         for kind, one in found.by_kind.items():
             print(f"  {kind:<10} {100 * one.within:5.1f} %  median {one.quantiles[0.5]:.2f} psi, {one.lost} diverge")
     calibration = [trace for traces in known.values() for trace in traces]
-    for name in named():
+    for name in named() if by or len(wholes) > 1 else ():
         others = [whole for other, whole in wholes.items() if other != name]
         if by:
             others = [perturbed(wholes[name], "BP", one, readers=["RL"]) for one in (by, -by)]
@@ -100,8 +113,11 @@ def together(parts: list[DoubtFigures]) -> DoubtFigures:
 
 
 if __name__ == "__main__":
+    number, begins = int(option("count", 8)), int(option("fresh", 0))
     main(
-        sequences("abdx-kinds-unseen", UNSEEN, int(option("first", 100)), int(option("count", 8))),
+        fresh("abdx-kinds-unseen", number, begins)
+        if begins
+        else sequences("abdx-kinds-unseen", UNSEEN, int(option("first", 100)), number),
         sequences("abdx-kinds-calibration", CALIBRATION, 0, int(option("calibrate", 10))),
         option("error", 1.0),
         option("perturb", 0.0),
