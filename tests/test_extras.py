@@ -80,6 +80,8 @@ def test_base_code_needs_no_extra(tmp_path):
         "sysid.export.onnx_blocks onnx",
         "sysid.export.onnx_core onnx",
         "sysid.export.onnx_equations onnx",
+        "sysid.export.onnx_flags onnx",
+        "sysid.export.onnx_limits onnx",
         "sysid.export.onnx_nodes onnx",
         "sysid.export.onnx_outputs onnx",
         "sysid.export.onnx_products onnx",
