@@ -1,4 +1,4 @@
-"""Are the channels sound: constants, coarse resolution, clipping, spikes, drift and jumps of level."""
+"""Are the channels sound: constants, coarse resolution, clipping, spikes, holds, drift and jumps of level."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, stacked
+from sysid.estimation.held_output import held_for
 
 COARSE = 0.1
 """Of a channel's standard deviation: a step of its converter that is larger is coarse."""
@@ -35,9 +36,23 @@ def check_channels(record: Record) -> Iterator[Finding]:
     for name in (*record.mapping.inputs, record.mapping.output):
         found += list(_channel(record, name))
     found += list(_trends(record))
+    found += list(_held(record))
     if not any(one.verdict is Verdict.LOOK for one in found):
         yield Finding(topic=Topic.CHANNELS, code="channels.sound", verdict=Verdict.FINE)
     yield from found
+
+
+def _held(record: Record) -> Iterator[Finding]:
+    """An output that is measured more slowly than it is recorded."""
+    samples = held_for(record.segments)
+    if samples > 1:
+        yield Finding(
+            topic=Topic.CHANNELS,
+            code="channel.held",
+            verdict=Verdict.LOOK,
+            subject=(record.mapping.output,),
+            figures={"samples": samples, "seconds": samples * record.sample_time},
+        )
 
 
 def _channel(record: Record, name: str) -> Iterator[Finding]:

@@ -20,7 +20,7 @@ from sysid.estimation.linear_posteriors import LinearPosterior
 from sysid.estimation.networks.joint import JointTraining
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import Training
-from sysid.estimation.record_notes import between_levels, contradicted, outnumbered, underexcited, undetermined
+from sysid.estimation.record_notes import between_levels, contradicted, held, outnumbered, underexcited, undetermined
 from sysid.estimation.result import FitResult
 from sysid.estimation.stability.check import (
     AbstractStabilityCheck,
@@ -202,7 +202,7 @@ class Estimator:
             told = () if found.posterior is not None else (f"No interval of the output: {self._unsure(options)}.",)
             off = equilibrium_notes(found.model, traces, named["start"])
             against = contradicted(found.model, traces, named["start"], options)
-            few = (*outnumbered(found.model, traces), *underexcited(found.model, traces))
+            few = (*outnumbered(found.model, traces), *underexcited(found.model, traces), *held(found.model, traces))
             switches, levels = between_levels(found.model, traces)
             warned = (*undetermined(traces, mapping), *few, *against, *off, *levels)
             told = (*told, *switches)

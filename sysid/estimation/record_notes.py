@@ -11,6 +11,7 @@ from sysid.estimation.closed_loop import feedback_told
 from sysid.estimation.error_causes import causes
 from sysid.estimation.error_lags import left_out
 from sysid.estimation.fitted_run import FreeRun
+from sysid.estimation.held_output import held_for
 from sysid.estimation.informative import informative, own_part, still
 from sysid.estimation.nonparametric.excitation_order import MOST, excitation_order
 from sysid.estimation.nonparametric.segments import segments_of
@@ -126,9 +127,10 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
         asked[j] = max(asked.get(j, 0), of_input)
     if not model.ratios and model.structure.learns_curves:
         asked = dict.fromkeys(range(len(model.mapping.inputs)), OF_CURVES)
-    segments, told = segments_of(traces, model.mapping.each[0]), []  # of each output the same inputs
+    told = []
     for j, needed in asked.items():
-        parts = [segment.inputs[:, j] for segment in segments]
+        # Masked samples too: what the inputs did there is known, and moves the samples that count.
+        parts = [trace[model.mapping.inputs[j]] for trace in traces]
         if not 0 < needed <= MOST or sum(map(len, parts)) < LEAST_SAMPLES or still(np.concatenate(parts)):
             continue
         order, _ = excitation_order(parts, needed, seen=NOTHING)
@@ -139,6 +141,27 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
                 "all others the model is free. Excite it with more (sysid.excite), or fit fewer coefficients."
             )
     return tuple(told)
+
+
+def held(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...]:
+    """Which outputs are measured more slowly than they are recorded.
+
+    Args:
+        model: The fitted model.
+        traces: The records that were fitted.
+
+    Returns:
+        One sentence for each such output.
+    """
+    found = {mapping.output: held_for(segments_of(traces, mapping)) for mapping in model.mapping.each}
+    return tuple(
+        f"{name} changes only after {samples} samples ({samples * traces[0].sample_time:.3g} s): it is measured more "
+        "slowly than it is recorded, and the model takes the hold for the plant's own lag, in intervals that are too "
+        f"narrow. Count new values alone, by repairs: {{repeats: {{{name}: mask}}}}, and fit a structure that needs no "
+        "measured past: a transfer function, a neural state space."
+        for name, samples in found.items()
+        if samples > 1
+    )
 
 
 def between_levels(model: AbstractModel, traces: Sequence[Trace]) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -272,6 +272,8 @@ class RepairOptions(Options):
         gaps: Fill by ``linear`` or ``hold``; ``mask`` fills and marks the samples as not usable.
         nan: ``interpolate`` missing values, ``hold`` the value before (a blank means: as before), or ``mask`` their
             samples as not usable; one for all, or by channel.
+        repeats: ``mask`` the samples of a channel that repeat the value before, by channel: it is measured more slowly
+            than it is recorded.
         jitter: ``resample`` uneven time stamps by ``grid.method``.
         constant: ``accept`` channels that never change.
     """
@@ -282,5 +284,6 @@ class RepairOptions(Options):
     duplicates: Literal["drop", "last", "average"] | None = None
     gaps: Literal["linear", "hold", "mask"] | None = None
     nan: NanRepair | dict[str, NanRepair] | None = None
+    repeats: dict[str, Literal["mask"]] | None = None
     jitter: Literal["resample"] | None = None
     constant: Literal["accept"] | None = None

@@ -220,16 +220,41 @@ def missing_values(record: Record, repairs: RepairOptions) -> Record:
     return replace(record, values=values, marked=marked)
 
 
+def repeated_values(record: Record, repairs: RepairOptions) -> Record:
+    """Values of a channel that is measured more slowly than it is recorded: they stand until the next one comes.
+
+    Args:
+        record: Samples with finite values.
+        repairs: ``repeats: {level: mask}`` marks the samples of that channel that repeat the value before.
+
+    Returns:
+        The samples.
+
+    Raises:
+        ConfigError: If a repair is asked for a channel that is not there.
+    """
+    _check_names(record, repairs)
+    marked = record.marked.copy()
+    for name in repairs.repeats or {}:
+        column = record.values[:, record.names.index(name)]
+        again = np.r_[False, column[1:] == column[:-1]]
+        marked |= again
+        record = record.noted(f"{name}: {int(again.sum())} values that repeat the one before masked")
+    return replace(record, marked=marked)
+
+
 def _check_names(record: Record, repairs: RepairOptions) -> None:
-    strangers = sorted(set(repairs.nan) - set(record.names)) if isinstance(repairs.nan, dict) else []
-    if strangers:
-        raise ConfigError(
-            f"repairs.nan names {strangers[0]}, which is not a channel",
-            where=f"the description of {record.table.source}",
-            expected=f"one of {', '.join(record.names)}",
-            got=strangers[0],
-            remedy="write the names of channels on the left",
-        )
+    for kind in ("nan", "repeats"):
+        asked = getattr(repairs, kind)
+        strangers = sorted(set(asked) - set(record.names)) if isinstance(asked, dict) else []
+        if strangers:
+            raise ConfigError(
+                f"repairs.{kind} names {strangers[0]}, which is not a channel",
+                where=f"the description of {record.table.source}",
+                expected=f"one of {', '.join(record.names)}",
+                got=strangers[0],
+                remedy="write the names of channels on the left",
+            )
 
 
 def _check_missing(record: Record, missing: NDArray[np.bool_], name: str, repair: str | None) -> None:

@@ -68,6 +68,10 @@ SAID: Final[dict[str, Words]] = {
         "{who} has {count:.0f} single samples that jump away and back, by up to {largest:.3g} {unit}.",
         "Mask them, or fit with a robust loss: repairs: {{nan: mask}} after they are emptied in the file.",
     ),
+    "channel.held": Words(
+        "{who} changes only after {samples:.0f} samples ({seconds:.3g} s): it is measured more slowly than recorded.",
+        "A model takes the hold for the plant's lag. Count new values alone: repairs: {{repeats: {{{who}: mask}}}}.",
+    ),
     "output.jump": Words(
         "{who}: at {seconds:.4g} s the level shifts by {size:.3g} {unit}, and no input did it.",
         "Cut the record there into two experiments, or add what changed as an input.",

@@ -161,6 +161,12 @@ REPAIRED: dict[str, Done] = {
         [0, 1, N - 1],
         "u: 3 missing values filled and masked, first at sample 0 (line 2), longest run 2",
     ),
+    "repeats: mask": (
+        {"values": [x - x % 3 for x in range(N)], "repairs": {"repeats": {"u": "mask"}}},
+        [x - x % 3 for x in range(N)],
+        [x for x in range(N) if x % 3],
+        f"u: {sum(x % 3 > 0 for x in range(N))} values that repeat the one before masked",
+    ),
     "constant: accept": (
         {"values": [3.5] * N, "repairs": {"constant": "accept"}},
         [3.5] * N,
