@@ -273,9 +273,7 @@ def search_orders(
     lags = Lags(inputs=(input_lags,) * m, output=tuple(range(1, grid.max_na + 1)))
     # The rows are the same for every candidate: those on which the largest looks at no masked sample.
     experiments = [experiment.one_step(lags) for experiment in given]
-    rows = sum(
-        int(np.count_nonzero(one.weights)) if one.weights is not None else len(one.output) for one in experiments
-    )
+    rows = sum(experiment.n_counted for experiment in experiments)
     # The column of the intercept stands first: it is in every candidate.
     laid = (np.column_stack(block) for block in blocks_of(experiments, lags))
     if 0 < rows <= lags.n_regressors + grid.intercept:
@@ -312,8 +310,7 @@ def search_orders(
         for losses in pool.map(block, dead_times):
             blocks.append(losses)
             on_progress(len(blocks) * per_block, grid.size(m))
-    n_samples = sum(experiment.n_counted for experiment in experiments)
-    return _collected(np.array(blocks) / n_samples, grid, dead_times, n_samples)
+    return _collected(np.array(blocks) / rows, grid, dead_times, rows)
 
 
 def _collected(

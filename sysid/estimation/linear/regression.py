@@ -113,14 +113,13 @@ def regress(
         for root, X, y in blocks_of(experiments, lags):
             yield np.column_stack([X, root, y] if intercept else [X, y])
 
-    samples = sum(len(block) for block in blocks())
-    if samples > TALL:
-        reduced = triangle(blocks(), free=0)
-        X, y = reduced.R, reduced.z
-    else:
+    samples = sum(experiment.n_counted for experiment in experiments)
+    if samples <= TALL:
         whole = np.concatenate([*blocks()])
-        X, y = whole[:, :-1], whole[:, -1]
-    solution = solve(X, y, ridge=ridge, constant=intercept, samples=samples)
+        solution = solve(whole[:, :-1], whole[:, -1], ridge=ridge, constant=intercept)
+        return solution, whole[:, -1] - whole[:, :-1] @ solution.coefficients
+    reduced = triangle(blocks(), free=0)
+    solution = solve(reduced.R, reduced.z, ridge=ridge, constant=intercept, samples=samples)
     return solution, np.concatenate([block[:, -1] - block[:, :-1] @ solution.coefficients for block in blocks()])
 
 
