@@ -150,7 +150,7 @@ def parse_yaml(text: str, *, where: object) -> dict[str, Any]:
             where=place,
             expected="YAML: 'key: value' lines, indented by spaces",
             got="a tab" if "'\\t'" in problem else problem,
-            remedy="indent by spaces" if "'\\t'" in problem else "correct the line that is named",
+            remedy=_remedy(problem),
         ) from error
     if not isinstance(data, dict):
         raise ConfigError(
@@ -213,6 +213,14 @@ def _extent(node: yaml.Node, *, level: int, known: dict[int, int | None]) -> int
         raise _refused(f"more than {MOST_VALUES:,} values, with the aliases written out", node)
     known[id(node)] = count
     return count
+
+
+def _remedy(problem: str) -> str:
+    if "'\\t'" in problem:
+        return "indent by spaces"
+    if "cannot start any token" in problem:
+        return "put the text in quotes, as in unit: '%'"
+    return "correct the line that is named"
 
 
 def yaml_text(data: Mapping[str, Any]) -> str:

@@ -25,7 +25,7 @@ _FUSED = {
 _UNITS_IN_NAMES = frozenset(
     {"bar", "mbar", "barg", "bara", "Pa", "hPa", "kPa", "MPa", "psi", "psig", "psia", "V", "mV", "A", "mA"}
     | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
-    | {"g", "rad", "deg"}
+    | {"g", "rad", "deg", "%"}
 )
 
 

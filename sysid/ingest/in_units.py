@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sysid.errors import TraceError, UnitError
 from sysid.ingest.options import ColumnOptions, FileOptions
 from sysid.ingest.table import RawColumn, RawTable, time_unit
+from sysid.ingest.words import quoted
 from sysid.traces import Channel
 from sysid.units import Reference, convert
 
@@ -113,7 +114,7 @@ def check_units_said(
         return
     one, (header, name, unit) = len(missing) == 1, missing[0]
     headers = ", ".join(f"'{header} [{unit}]'" for header, _, unit in missing)
-    units = ", ".join(f"{name}: {unit}" for _, name, unit in missing)
+    units = ", ".join(f"{name}: {quoted(unit) if unit[:1] in '%*@-' else unit}" for _, name, unit in missing)
     raise UnitError(
         "a column has no unit" if one else f"{len(missing)} columns have no unit",
         where=f"{source}, channel {name} (column {header})" if one else source,

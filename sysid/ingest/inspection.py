@@ -20,7 +20,7 @@ from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.restarts import finer_than_clock, records_by_clock
-from sysid.ingest.second_clocks import is_counter, without_second_clocks
+from sysid.ingest.second_clocks import counts_rows, is_counter, without_second_clocks
 from sysid.ingest.table import RawColumn, RawTable, is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.units import Reference, atmosphere_in, is_pressure
@@ -222,10 +222,12 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     name = asked.column or table.time or (_rising(table.columns) if table.step is None else None)
     if name is None and table.step is not None:
         return TimeOptions(step=table.step), ""
-    if name is None:
+    column = None if name is None else table.find(name)
+    counted = column is not None and name not in {asked.column, table.time} and counts_rows(column)
+    if column is None or name is None or counted:
         step = _step_in_a_column(table.columns)
-        return TimeOptions(step=step or 1.0), f"guessed: no time stamps, {step or 1.0:g} s between them"
-    column = table.find(name)
+        why = f"{name} counts the rows and says no time" if counted else "no time stamps"
+        return TimeOptions(step=step or 1.0), f"guessed: {why}, {step or 1.0:g} s between them"
     by_rising = "" if name in {asked.column, table.time} else f"{name} is taken for time, as it rises"
     clock = clock_of(column.values, column.name, origin=column.counted_from) if asked.unit is None else None
     said = None if clock is not None and "clock" in table.settings else column.unit
@@ -241,6 +243,7 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     guess = "s" if step < 5.0 else "ms" if step < 5e3 else "us"
     why = f"the file says {said}, which is no unit of time" if said else "the file does not say its unit"
     first = f"{by_rising}; " if by_rising else ""
+    why += "; it rises by 1, as a number of samples does" if len(steps) and bool((steps == 1.0).all()) else ""
     return TimeOptions(column=column.name, unit=guess), f"guessed: {first}{name} in {guess}; {why}"
 
 

@@ -7,11 +7,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError, ReaderError
+from sysid.errors import ChannelError, ConfigError, ReaderError, UnitError
 from sysid.ingest.clocks import clock_of
 from sysid.ingest.options import FileOptions, LongOptions
-from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.table import RawColumn, RawTable, time_unit
 from sysid.ingest.words import Words, states_for
+from sysid.units import convert
+
+_RATED = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+"""Units in which a time beside a rate may count."""
+_NEAR = 0.02
+"""Share of a sample time by which the steps of a clock may be off it."""
 
 
 def with_meaning(table: RawTable, files: FileOptions) -> RawTable:
@@ -53,18 +59,23 @@ def _as_states(column: RawColumn, files: FileOptions) -> RawColumn:
 
 
 def with_clock(table: RawTable) -> RawTable:
-    """A table whose time without a unit has that of the clock that it is by the size of its numbers.
+    """A table whose time without a unit has that of the clock that it is: by a rate beside it, else by its size.
 
     Args:
         table: From any reader, or from memory.
 
     Returns:
-        The table; what was told by size is among its notes. As it is where nothing is told, or a unit is known.
+        The table; what was told is among its notes, and that a rate and a time do not go together. As it is where
+        nothing is told, or a unit is known.
     """
     if table.time is None:
         return table
     column = next(column for column in table.columns if column.name == table.time)
-    if column.unit is not None or column.problem is not None:
+    if column.problem is not None:
+        return table
+    if table.step is not None and (beside := _beside_a_rate(table, column, table.step)) is not None:
+        return beside
+    if column.unit is not None:
         return table
     clock = clock_of(column.values, column.name, origin=column.counted_from)
     if clock is None:
@@ -72,6 +83,35 @@ def with_clock(table: RawTable) -> RawTable:
     columns = tuple(replace(c, unit=clock.unit) if c is column else c for c in table.columns)
     told = f"{column.name} counts {clock.told}, told by its size"
     return replace(table, columns=columns, settings={**table.settings, "clock": told}, notes=(*table.notes, told))
+
+
+def _beside_a_rate(table: RawTable, column: RawColumn, step: float) -> RawTable | None:
+    """A table whose file says a rate and has a time too: they are of one unit, or one counts the samples."""
+    steps = np.diff(column.values)
+    known = steps[np.isfinite(steps)]
+    if not len(known):
+        return None
+    usual = (float(np.median(known)), float(np.mean(known)))
+    units = _RATED if column.unit is None else {column.unit: _RATED.get(column.unit, _in_seconds(column.unit))}
+    for unit, seconds in units.items():
+        if any(abs(seconds * pace - step) <= _NEAR * step for pace in usual):
+            if column.unit is not None:
+                return table
+            columns = tuple(replace(c, unit=unit) if c is column else c for c in table.columns)
+            told = f"{column.name} is taken in {unit}: its steps are the sample time that the file says, {step:g} s"
+            return replace(table, columns=columns, notes=(*table.notes, told))
+    if column.unit is None and bool((steps == 1.0).all()):
+        told = f"{column.name} counts the rows: the file says {step:g} s between them"
+        return replace(table, time=None, notes=(*table.notes, told))
+    told = f"the file says {step:g} s between samples, and {column.name} rises by {usual[0]:g} {column.unit or ''}"
+    return replace(table, notes=(*table.notes, f"{told.rstrip()}: {column.name} is believed"))
+
+
+def _in_seconds(unit: str) -> float:
+    try:
+        return float(convert(np.ones(1), time_unit(unit), "s")[0])
+    except UnitError:
+        return float("nan")
 
 
 def _wide(table: RawTable, long: LongOptions) -> RawTable:

@@ -39,6 +39,9 @@ def usually_missing(text: str) -> bool:
 
 _BLANKS = dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f"), " ")
 
+HEXADECIMAL = re.compile(r"[+-]?0[xX][0-9a-fA-F]{1,13}")
+"""Counts as converters and buses write them; more digits are more than float64 holds."""
+
 MOST_WORDS = 64
 """Different texts that are no numbers, above which a column is one of remarks."""
 
@@ -85,7 +88,7 @@ class NumberFormat:
         if text in self.states:
             return self.states[text]
         if not _pattern(self.decimal, self.thousands).fullmatch(text):
-            return None
+            return float(int(text, 16)) if HEXADECIMAL.fullmatch(text) else None
         if self.thousands == self.decimal:
             head, _, tail = text.rpartition(self.decimal)
             text = f"{head.replace(self.decimal, '')}.{tail}" if head or tail != text else text

@@ -17,9 +17,13 @@ from sysid.ingest.table import RawColumn, RawTable, is_called_time, is_time_unit
 from sysid.units import convert
 
 _NUMBERED = re.compile(r"(?:t|time|zeit|temps|tiempo)(?:[ _]?\d+|[ _.][^\W_]{1,12})", re.IGNORECASE)
+_COUNTED = r"id|idx|index|row|line|zeile|sample|frame|scan|record|point|data[ _]?point|step|messung"
 _COUNTER = re.compile(
-    r"#|no\.?|nr\.?|n|id|idx|index|row|line|zeile|sample|frame|scan|count(?:er)?|record", re.IGNORECASE
+    rf"(?:(?:lfd\.?|{_COUNTED})s?[ _.]*)?(?:#|no\.?|nr\.?|num|number|index|id|count(?:er)?)|n|k|i|{_COUNTED}",
+    re.IGNORECASE,
 )
+_NAMELESS = {"column_1", "unnamed: 0", "level_0"}
+"""What a first column without a name is called, as that of an index that pandas wrote."""
 _EVEN = 0.25
 """Of its usual step, how far each step of a clock may be off it."""
 _TOGETHER = 0.1
@@ -42,6 +46,19 @@ def is_counter(name: str) -> bool:
     return _COUNTER.fullmatch(name.strip()) is not None
 
 
+def counts_rows(column: RawColumn) -> bool:
+    """Whether a column is called a number of rows, or nothing, and is one: it rises by one from each to the next.
+
+    Args:
+        column: A column.
+
+    Returns:
+        Whether it is.
+    """
+    called = is_counter(column.name) or column.name.casefold() in _NAMELESS
+    return called and column.unit in {None, "1"} and _by_one(column.values)
+
+
 def without_second_clocks(table: RawTable, clock: str | None) -> RawTable:
     """A table whose further clocks and counters are no channels, nor what stands behind one of another pace.
 
@@ -52,9 +69,7 @@ def without_second_clocks(table: RawTable, clock: str | None) -> RawTable:
     Returns:
         The table; each such column says why it is aside.
     """
-    if clock is None:
-        return table
-    first = table.find(clock)
+    first = None if clock is None else table.find(clock)
     columns, other = list[RawColumn](), ""
     for column in table.columns:
         said = "" if column is first or column.problem is not None or column.aside else _said(column, first)
@@ -66,15 +81,16 @@ def without_second_clocks(table: RawTable, clock: str | None) -> RawTable:
     return replace(table, columns=tuple(columns))
 
 
-def _said(column: RawColumn, first: RawColumn) -> str:
+def _said(column: RawColumn, first: RawColumn | None) -> str:
     """What a column is if it is a clock or a counter, else nothing."""
+    if counts_rows(column) or (first is None and is_called_time(column.name) and _by_one(column.values)):
+        return "counts the rows"
+    if first is None or is_counter(column.name):
+        return ""
     called = is_called_time(column.name) or _NUMBERED.fullmatch(column.name.strip()) is not None
     timed = column.unit is not None and is_time_unit(column.unit)
-    counts = is_counter(column.name)
-    if not (called or timed or counts) or not _is_even(column.values):
+    if not (called or timed) or not _is_even(column.values):
         return ""
-    if counts:
-        return "counts the rows" if bool((np.diff(column.values) == 1.0).all()) else ""
     mine, theirs = _in_seconds(column), _in_seconds(first)
     if not float(np.median(np.diff(theirs))) > 0.0:
         return ""
@@ -88,6 +104,10 @@ def _said(column: RawColumn, first: RawColumn) -> str:
     if abs(offset) <= 1e-3 * step or abs(offset) > _ORIGIN or factor != 1.0:
         return f"the time again, as in {first.name}"
     return f"a second clock, {offset:.6g} ahead of {first.name}"
+
+
+def _by_one(values: NDArray[np.float64]) -> bool:
+    return len(values) > 2 and bool((np.diff(values) == 1.0).all())
 
 
 def _is_even(values: NDArray[np.float64]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -217,3 +218,51 @@ def test_a_record_is_proposed_in_parts(tmp_path: Path, split: list[float], roles
     assert {trace.name: len(trace) for trace in loaded} == roles
     assert {name: role.value for name, role in loaded.roles.items()} == {name: name for name in roles}
     assert np.concatenate([trace["u"] for trace in loaded]).tolist() == [k % 7 for k in range(20)]
+
+
+@pytest.mark.parametrize(
+    ("head", "step", "said"),
+    [
+        ("n,u", 1.0, "guessed: n counts the rows and says no time, 1 s between them"),
+        ("t,u", 1.0, "guessed: t in s; the file does not say its unit; it rises by 1, as a number of samples does"),
+        ("# fs = 20 Hz\nn,u", 0.05, ""),
+        ("# fs = 20 Hz\nt,u", 0.05, ""),
+    ],
+)
+def test_a_number_of_rows_is_not_taken_for_seconds_in_silence(write: Write, head: str, step: float, said: str) -> None:
+    found = inspect_file(write("rig.csv", f"{head}\n" + rows(20, lambda i: f"{i},{i % 3}")))
+    assert (found.sample_time, found.time_told) == (step, said)
+    assert [column.name for column in found.channels] == ["u"]
+
+
+def test_a_time_beside_a_rate_is_of_the_unit_that_agrees_with_it(write: Write) -> None:
+    found = inspect_file(write("rig.csv", "# fs = 20 Hz\nt,u\n" + rows(20, lambda i: f"{50 * i},{i % 3}")))
+    assert (found.sample_time, found.time.unit) == (0.05, "ms")
+    found = inspect_file(write("bad.csv", "# fs = 20 Hz\nt [s],u\n" + rows(20, lambda i: f"{0.1 * i:.1f},{i % 3}")))
+    assert found.sample_time == 0.1
+    assert "the file says 0.05 s between samples, and t rises by 0.1 s: t is believed" in found.problems
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"meta": {"fs": 20}, "data": {"u": [1, 2, 4], "y": [0, 1, 2]}},
+        {"meta": {"sampling_rate_hz": 20}, "data": [{"u": 1, "y": 0}, {"u": 2, "y": 1}, {"u": 4, "y": 2}]},
+        {"info": {"rig": "A", "timing": {"dt_ms": 50}}, "data": {"u": [1, 2, 4], "y": [0, 1, 2]}},
+        {"meta": {"Fs [kHz]": 0.02, "channels": ["u", "y"]}, "data": [[1, 0], [2, 1], [4, 2]]},
+        {
+            "meta": {"fs": 20},
+            "signals": {"u": {"values": [1, 2, 4], "unit": "V"}, "y": {"values": [0, 1, 2], "unit": "V"}},
+        },
+    ],
+)
+def test_what_is_said_of_arrays_may_stand_beside_them(write: Write, content: object) -> None:
+    found = inspect_file(write("run.json", json.dumps(content)))
+    assert (found.sample_time, [column.name for column in found.channels]) == (0.05, ["u", "y"])
+
+
+def test_counts_may_be_hexadecimal(write: Write) -> None:
+    path = write("bus.csv", "t [s],u [1],share_%\n" + rows(20, lambda i: f"{i},0x{250 * i:04X},{i}"))
+    trace = proposed(path).traces[0]
+    assert trace["u"].tolist() == [250.0 * i for i in range(20)]
+    assert trace.channels[1].unit == "percent"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,3 +39,12 @@ def test_what_goes_like_a_clock_is_no_channel(case: str) -> None:
     first, second, behind = without_second_clocks(a_table(("t", T, None), column, ("y", Y, None)), "t").columns
     assert (first.aside, second.aside) == ("", said)
     assert bool(behind.aside) is (case == "of another pace")
+
+
+@pytest.mark.parametrize("name", ["n", "k", "Sample Number", "column_1", "Nr.", "index"])
+def test_a_number_of_rows_is_no_channel_where_nothing_is_time(name: str) -> None:
+    counts = RawColumn(name=name, values=np.arange(1.0, 21.0))
+    table = RawTable(source=Path("rig.csv"), reader="csv", columns=(counts, RawColumn(name="y", values=Y)), step=0.05)
+    assert [column.aside for column in without_second_clocks(table, None).columns] == ["counts the rows", ""]
+    gaps = replace(counts, values=np.delete(np.arange(21.0), 7))
+    assert not without_second_clocks(replace(table, columns=(gaps, table.columns[1])), None).columns[0].aside

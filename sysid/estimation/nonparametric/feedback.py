@@ -16,8 +16,9 @@ from sysid.traces import Trace
 
 PAST, AHEAD, CURVED = 20, 6, 4
 """Lags of inputs and output that are known, samples to come that are asked, and curved columns of each channel."""
-SURE, FAINT, PART = 1e-5, 0.02, 0.05
-"""Probability below which chance is no answer, and parts of an error from which feedback is told, and sure."""
+SURE, PART, FAINT_AT_ONCE, AT_ONCE = 1e-5, 0.02, 0.02, 0.03
+"""Probability below which chance is no answer; part of an error from which feedback is sure, as a controller that is
+moved by little else than its set point leaves no more; and parts within the sample from which it is told, and sure."""
 MOST_SAMPLES = 20_000
 """Samples that are looked at; of longer records the first ones."""
 NOISELESS = 1e-7
@@ -55,12 +56,12 @@ class Feedback:
     @property
     def at_once(self) -> bool:
         """Whether an input is set from the output of its own sample: the plant cannot answer within it then."""
-        return self.share_at_once > PART
+        return self.share_at_once > AT_ONCE
 
     @property
     def slight(self) -> bool:
         """Whether there is a sign of it."""
-        return self.p < SURE or self.share_at_once > FAINT
+        return self.p < SURE or self.share_at_once > FAINT_AT_ONCE
 
 
 def find_feedback(segments: Sequence[Segment]) -> Feedback | str:
@@ -159,7 +160,7 @@ def _at_once(segments: Sequence[Segment], past: int) -> float:
         free = rows - count - past - 1 - len(blocks)
         p, share = _tested(known, with_past, past, (rows - count, free))
         now, now_share = _tested(with_past, with_now, 1, (free + 1, free))
-        if max(p, now) < SURE and now_share > PART:
+        if max(p, now) < SURE and now_share > AT_ONCE:
             found = max(found, share)
     return found
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from sysid.errors import ReaderError
 from sysid.ingest.calendar import is_calendar
 from sysid.ingest.headers import is_unit
-from sysid.ingest.numbers import MISSING, usually_missing
+from sysid.ingest.numbers import HEXADECIMAL, MISSING, usually_missing
 from sysid.units import USUAL_UNITS
 
 BLANKS = " "
@@ -101,7 +101,7 @@ def _kind(cell: str) -> Kind:
         return Kind.NOTHING
     if is_calendar(text):
         return Kind.TIME
-    return Kind.NUMBER if suffix_of(text) else Kind.WORD
+    return Kind.NUMBER if suffix_of(text) or HEXADECIMAL.fullmatch(text) else Kind.WORD
 
 
 _usual_kind = lru_cache(maxsize=16384)(_kind)

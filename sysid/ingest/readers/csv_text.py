@@ -70,8 +70,8 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
         notes.append("decimal comma")
     clock = headers[time].name if time is not None else recognise_time(raw)
     above = [*layout.comments, *(layout.separator.join(row.cells) for row in layout.preamble)]
-    step = said_step(above) if clock is None else None
-    if step is not None:
+    step = said_step(above)
+    if step is not None and clock is None:
         notes.append(f"sample time {step:g} s, from the lines above the table")
     return RawTable(
         source=path,

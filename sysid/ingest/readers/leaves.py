@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,9 @@ _STEPS = {"ts", "dt", "sample_time", "sampletime", "sampling_time", "samplingtim
 _STEPS |= {"samplingperiod", "sampleperiod", "sampling_interval", "sample_interval", "wf_increment", "t_s", "delta_t"}
 _RATES = {"fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "samplingrate", "sampling_frequency"}
 _RATES |= {"sample_frequency", "samplingfrequency", "samplefrequency", "sfreq"}
+_IN_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+_IN_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}
+_IN_UNIT = re.compile(r"(?P<stem>\w+?)[_ ]*[_ (\[.](?P<unit>[a-z]+)[)\]]?")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,7 +119,7 @@ def step_in(name: str, number: float | None) -> float | None:
     """The sample time that a number of a certain name says.
 
     Args:
-        name: For example ``"Ts"`` or ``"fs"``.
+        name: For example ``"Ts"``, ``"fs"``, ``"dt_ms"``, ``"sampling_rate [Hz]"``.
         number: The number.
 
     Returns:
@@ -124,7 +128,11 @@ def step_in(name: str, number: float | None) -> float | None:
     if number is None or not (number > 0.0 and np.isfinite(number)):
         return None
     plain = name.casefold().strip()
-    return number if plain in _STEPS else 1.0 / number if plain in _RATES else None
+    match = None if plain in _STEPS | _RATES else _IN_UNIT.fullmatch(plain)
+    stem, unit = (match["stem"], match["unit"]) if match else (plain, "")
+    if stem in _STEPS and unit in _IN_SECONDS:
+        return number * _IN_SECONDS[unit]
+    return 1.0 / (number * _IN_HERTZ[unit]) if stem in _RATES and unit in _IN_HERTZ else None
 
 
 def texts_of(value: Any) -> tuple[str, ...]:

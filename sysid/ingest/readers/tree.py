@@ -23,6 +23,8 @@ from sysid.ingest.readers.records import Found, joined, records_of
 from sysid.ingest.table import RawTable, array_column, by_length, distinct, recognise_time
 
 _DEEPEST = 40
+_NAMES = {"names", "channels", "columns", "labels", "signals", "variables", "fields", "header"}
+_NAMES |= {f"{one}{mark}names" for one in ("channel", "column", "signal", "variable") for mark in ("", "_")}
 
 
 def table_of(
@@ -71,11 +73,11 @@ def table_of(
     others += tuple(item.column for item in named if item not in inside)
     steps = {item.step for item in inside if len(item.column.values) == (len(alike[0].values) if alike else 0)}
     time = recognise_time(alike)
-    step = steps.pop() if len(steps) == 1 and time is None else None
+    step = steps.pop() if len(steps) == 1 else None
     turned = [f"{name}: its rows are taken as channels, as it is {r} x {c}" for name, (r, c) in walk.turned.items()]
     # Where some are turned and some are not, no word is right for all: they are told apart anew each time.
     settings = {"transpose": True} if walk.turned and not walk.standing else {}
-    told = [f"sample time {step:g} s, from the file"] if step is not None else []
+    told = [f"sample time {step:g} s, from the file"] if step is not None and time is None else []
     table = RawTable(
         source=path,
         reader=reader,
@@ -163,7 +165,8 @@ class _Walk:
             step = step_in(str(key), _of_element(value, index))
             if step is not None:
                 return step
-        return outer
+        said = {self.step_beside(part, None, index) for part in _saying(node)} - {None}
+        return said.pop() if len(said) == 1 else outer
 
     def columns(
         self,
@@ -197,6 +200,8 @@ class _Walk:
         cells = {str(key): parts for key, value in node.items() if (parts := _cell(value)) is not None}
         elements = [leaf for cell in cells.values() for _, leaf in cell]
         lengths = {len(leaf.values) for leaf in (*leaves.values(), *elements) if leaf.vector}
+        names = _names_beside(node)
+        leaves = {key: replace(leaf, names=leaf.names or names) for key, leaf in leaves.items()}
         for key, value in node.items():
             name = str(key)
             if name in cells:
@@ -277,10 +282,35 @@ def _of_element(value: Any, index: int | None) -> float | None:
     return numbers[0] if len(set(numbers)) == 1 else None
 
 
+def _saying(node: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The mappings beside arrays that say something of them and hold none: ``{meta: {fs: 20}, data: ...}``."""
+    return [value for value in node.values() if isinstance(value, Mapping) and not _holds_numbers(value)]
+
+
+def _holds_numbers(node: Any) -> bool:
+    if isinstance(node, Mapping | list):
+        return any(map(_holds_numbers, node.values() if isinstance(node, Mapping) else node))
+    leaf = leaf_of(node)
+    return leaf is not None and leaf.values.dtype.kind not in "USO"
+
+
 def _units_beside(node: Mapping[str, Any]) -> dict[str, str]:
     """A mapping ``units`` beside the arrays gives their units by name."""
-    units = node.get("units", node.get("unit"))
-    return {str(k): v for k, v in units.items() if isinstance(v, str)} if isinstance(units, Mapping) else {}
+    found = dict[str, str]()
+    for part in (*_saying(node), node):
+        units = part.get("units", part.get("unit"))
+        found |= {str(k): v for k, v in units.items() if isinstance(v, str)} if isinstance(units, Mapping) else {}
+    return found
+
+
+def _names_beside(node: Mapping[str, Any]) -> tuple[str, ...]:
+    """A list of texts that is called names, or channels, gives the columns of a matrix theirs."""
+    for part in (node, *_saying(node)):
+        for key, value in part.items():
+            leaf = leaf_of(value) if str(key).casefold().strip() in _NAMES else None
+            if leaf is not None and leaf.vector and all(isinstance(text, str) for text in leaf.values):
+                return tuple(map(str, leaf.values))
+    return ()
 
 
 def _without_common_prefix(found: list[Found], separator: str) -> tuple[list[Found], str]:

@@ -83,3 +83,16 @@ def test_a_fit_to_a_closed_loop_says_what_that_does_to_it(structure: object, sai
     free = lfilter([0.0, GAIN], [1.0, -POLE], u) + 0.5 * np.random.default_rng([1, 3]).standard_normal(N)
     told = sysid.fit(sysid.data((u, free), sample_time=1.0), "u -> y", structure).warnings
     assert not [note for note in told if "closed loop" in note]
+
+
+def test_a_strong_controller_that_a_test_signal_moves_more_is_told_beside_a_biased_fit() -> None:
+    rng = np.random.default_rng(3)
+    noise, dither = lfilter([0.02], [1.0, -0.9], rng.standard_normal((2, N))), rng.standard_normal(N)
+    u, y, x, total = np.zeros(N), np.zeros(N), 0.0, 0.0
+    for k in range(N):
+        x = 0.9 * x + (0.1 * u[k - 1] if k else 0.0)
+        y[k] = x + noise[0, k]
+        total += 0.5 * y[k]
+        u[k] = dither[k] - 5.0 * y[k] - total
+    fit = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.OE(nb=1, nf=1, nk=1))
+    assert any("closed loop" in note for note in fit.warnings)
