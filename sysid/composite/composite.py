@@ -10,12 +10,14 @@ from collections.abc import Mapping as Dict
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from sysid.composite.fixed_member import FixedMember, Standing
+from sysid.composite.fixed_member import FixedMember, Standing, parameters_of
 from sysid.composite.limit_expressions import named_limits
+from sysid.composite.parameters import check_names, declared, values_in
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training, estimators
-from sysid.models import NARX, AbstractStructure, Limit, Mapping
+from sysid.models import NARX, AbstractStructure, Cascade, Limit, Mapping
 from sysid.models.cascade_run import Level
+from sysid.models.grey_box import Parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,6 +123,8 @@ class Composite:
         limits: Limits of outputs; in its other instances a member has those of its first, unless they have their own.
             A side may be any expression of channels, ``"min(BP, 1.2*AR[k-1])"``: it becomes a fixed submodel, called
             after the output (:mod:`sysid.composite.limit_expressions`).
+        parameters: What limits name that is estimated, by name as in :class:`~sysid.composite.FixedMember`; those of
+            the fixed submodels are known in limits as well.
 
     Raises:
         ConfigError: If two of them write one channel, or nothing is fitted.
@@ -130,15 +134,18 @@ class Composite:
     fixed: tuple[FixedMember, ...] = ()
     rest: Dict[str, Level] = field(default_factory=dict)
     limits: Dict[str, Limit] = field(default_factory=dict)
+    parameters: tuple[Parameter, ...] | Dict[str, Any] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "members", tuple(self.members))
         object.__setattr__(self, "fixed", tuple(self.fixed))
         if not self.members:
             raise ConfigError("no member is fitted", where="members", expected="at least one", got="none")
-        more, limits = named_limits(self.standing, self.limits)
+        object.__setattr__(self, "parameters", parameters_of(self.parameters))
+        more, limits = named_limits(self.standing, self.limits, declared(self.fixed, self._parameters))
         object.__setattr__(self, "fixed", (*self.fixed, *more))
         object.__setattr__(self, "limits", limits)
+        self._check_parameters()
         written = [name for one in self.standing for name in one.outputs]
         if len(set(written)) < len(written):
             raise ConfigError(
@@ -148,6 +155,39 @@ class Composite:
                 got=", ".join(sorted(name for name in set(written) if written.count(name) > 1)),
                 remedy="correct the mapping or the instances",
             )
+
+    @property
+    def _parameters(self) -> tuple[Parameter, ...]:
+        return self.parameters  # type: ignore[return-value]  # brought into this form when it was made
+
+    def _check_parameters(self) -> None:
+        read = declared(self.fixed)
+        if strangers := [one.name for one in self._parameters if one.name not in read]:
+            raise ConfigError(
+                f"nothing reads the parameter {strangers[0]}",
+                where=f"parameters, {strangers[0]}",
+                expected="a parameter that a limit names",
+                got=strangers[0],
+                remedy="correct the name, or leave it out",
+            )
+        check_names(read, self.standing)
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that are estimated."""
+        return tuple(dict.fromkeys(parameter.name for one in self.fixed for parameter in one.free))
+
+    def fixed_in(self, whole: Cascade) -> tuple[FixedMember, ...]:
+        """The fixed submodels with the parameters that a whole has.
+
+        Args:
+            whole: A trained one.
+
+        Returns:
+            The submodels.
+        """
+        values = values_in(whole) if self.free else {}
+        return tuple(one.at(values) for one in self.fixed)
 
     @property
     def standing(self) -> tuple[Standing, ...]:

@@ -9,13 +9,14 @@ found as one, and runs as one (:mod:`sysid.composite.fixed_members`); anything e
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 from sysid.composite.fixed_expressions import expression_of, reads_nothing, words_of
-from sysid.composite.fixed_member import FixedMember
+from sysid.composite.fixed_member import FixedMember, parameters_of
 from sysid.equations.functions import CONSTANTS
 from sysid.equations.parser import DEEPEST, parse
 from sysid.equations.syntax import (
@@ -34,6 +35,7 @@ from sysid.equations.syntax import (
 from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.models import Mapping
+from sysid.models.grey_box import Parameter
 
 _SWITCH = (0.0, 1.0)
 """Bounds of a switch: off, on and how far between."""
@@ -47,6 +49,7 @@ def fixed_by_equations(
     instances: tuple[str, ...] = ("",),
     shared: tuple[str, ...] = (),
     tables: Dict[str, Any] | None = None,
+    parameters: Dict[str, Any] | tuple[Parameter, ...] = (),
 ) -> tuple[FixedMember, ...]:
     """Fixed submodels, one for each equation; beside one that reads its own past, what that was.
 
@@ -60,6 +63,8 @@ def fixed_by_equations(
         instances: Suffixes of the channel names, one for each instance.
         shared: Inputs that have the same name in every instance.
         tables: By name the points ``[[x, y], ...]`` of functions that equations call.
+        parameters: By name the start of what is estimated, or ``{start:, low:, high:, prior:, fixed:, unit:}``, as of
+            :class:`sysid.models.GreyBox`. One is the same wherever it is named, in limits too.
 
     Returns:
         The submodels, in the order of the equations.
@@ -72,7 +77,7 @@ def fixed_by_equations(
         >>> str(relay.mapping), relay.memory, relay.constant, relay.low, relay.high
         ('p+q -> R', 21.0, -15.0, 0.0, 1.0)
     """
-    equations = parse(text)
+    equations, named = parse(text), parameters_of(parameters)
     names = [one.name for one in equations]
     for what, given in (("rest", rest), ("unit", unit)):
         _check_known(what, list(given) if isinstance(given, Dict) else [], names)
@@ -85,18 +90,20 @@ def fixed_by_equations(
             shared=tuple(name for name in shared if name in words["mapping"].inputs),
         )
         for one in equations
-        for words in _found(one, text, tables or {})
+        for words in _found(one, text, tables or {}, named)
     ]
+    _check_known("parameters", [one.name for one in named], [name for one in equations for name in _read(one)])
     _check_known("tables", list(tables or {}), [node.function for one in equations for node in _calls(one)])
     _check_known("shared", list(shared), [name for one in equations for name in _read(one)])
     return tuple(members)
 
 
-def bounds_in(text: str) -> tuple[float, float]:
+def bounds_in(text: str, parameters: Collection[str] = ()) -> tuple[float, float]:
     """Between which numbers the right side of an equation is held; infinite where it is not.
 
     Args:
         text: One equation.
+        parameters: Names in it that are estimated.
 
     Returns:
         Least and greatest value.
@@ -105,7 +112,7 @@ def bounds_in(text: str) -> tuple[float, float]:
         ConfigError: If it cannot be read.
     """
     (equation,) = parse(text)
-    return _Reader(text=text, shift=0).bounded(equation.right)[1:]
+    return _Reader(text=text, shift=0, parameters=frozenset(parameters)).bounded(equation.right)[1:]
 
 
 def equation_of(fixed: FixedMember) -> str:
@@ -202,7 +209,9 @@ class _NoSum(Exception):  # noqa: N818 - nobody is told: what is no sum is an ex
     """Something is no weighted sum."""
 
 
-def _found(equation: Equation, text: str, tables: Dict[str, Any]) -> list[dict[str, Any]]:
+def _found(
+    equation: Equation, text: str, tables: Dict[str, Any], parameters: tuple[Parameter, ...]
+) -> list[dict[str, Any]]:
     """An equation in the words of :class:`FixedMember`: those of what goes with it first."""
     if equation.kind == CONTINUOUS:
         raise equation_error(
@@ -212,19 +221,23 @@ def _found(equation: Equation, text: str, tables: Dict[str, Any]) -> list[dict[s
             expected="y = ... or y[k+1] = ..., sample by sample",
             remedy=f"write {equation.name}[k+1] = {equation.name}[k] + h*(...), h being the sample time",
         )
-    reader = _Reader(text=text, shift=int(equation.kind == DISCRETE))
+    names = frozenset(one.name for one in parameters)
+    reader = _Reader(text=text, shift=int(equation.kind == DISCRETE), parameters=names)
     inside, low, high = reader.bounded(equation.right)
     try:
         return [_held_sum(equation, reader.total(inside, equation.name), text) | {"low": low, "high": high}]
     except _NoSum:
-        found = expression_of(equation, inside, text)
+        found = expression_of(equation, inside, text, names)
     try:
         total = replace(reader, shift=0).total(found.equation.right, equation.name)
         words = _held_sum(found.equation, total, text)
     except _NoSum:
         called = {node.function for node in _calls(equation)}
         own = {name: points for name, points in tables.items() if name in called}
-        words = words_of(found.equation) | {"tables": own}
+        read = _read(found.equation)
+        words = words_of(found.equation, names) | {
+            "tables": own, "parameters": tuple(one for one in parameters if one.name in read)
+        }  # fmt: skip
     return [*found.past, words | {"low": low, "high": high}]
 
 
@@ -253,10 +266,12 @@ class _Reader:
     Args:
         text: All equations, to show where something is wrong.
         shift: Samples that all is earlier: 1 where the left side is the next sample.
+        parameters: Names of what is estimated: no sum has one.
     """
 
     text: str
     shift: int
+    parameters: frozenset[str] = frozenset()
 
     def bounded(self, node: Node) -> tuple[Node, float, float]:
         """What of a right side stands between two numbers, and the numbers."""
@@ -340,7 +355,7 @@ class _Reader:
                 return _Sum(constant=Fraction(repr(node.value)))
             case Name() if node.name in CONSTANTS:
                 return _Sum(constant=Fraction(repr(CONSTANTS[node.name])))
-            case Name():
+            case Name() if node.name not in self.parameters:
                 return _Sum(weights={(node.name, self.shift): Fraction(1)})
             case Delayed(seconds=False):
                 return _Sum(weights={(node.name, int(node.lag) + self.shift): Fraction(1)})

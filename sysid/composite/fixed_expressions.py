@@ -6,7 +6,9 @@ reads what it was a sample ago; and an equation's own past is a fixed submodel b
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from sysid.equations.functions import CONSTANTS, OWN
@@ -32,6 +34,8 @@ from sysid.models import Mapping
 _REMEMBER = {"relay": ("x", "on", "off"), "latch": ("set", "reset"), "hold": ("x", "when")}
 """What each function reads that may be the whole of an equation."""
 
+_COMPARED = frozenset({"<", "<=", ">", ">=", "and", "or", "not"})
+
 
 @dataclass(frozen=True, kw_only=True)
 class FixedExpression:
@@ -46,13 +50,14 @@ class FixedExpression:
     past: tuple[dict[str, Any], ...]
 
 
-def expression_of(equation: Equation, right: Node, text: str) -> FixedExpression:
+def expression_of(equation: Equation, right: Node, text: str, parameters: Collection[str] = ()) -> FixedExpression:
     """What an equation says that is no weighted sum.
 
     Args:
         equation: The equation.
         right: What of its right side is left once its bounds are taken away.
         text: All equations, to show where something is wrong.
+        parameters: Names that are no channels.
 
     Returns:
         The fixed submodel, and what goes with it.
@@ -62,7 +67,7 @@ def expression_of(equation: Equation, right: Node, text: str) -> FixedExpression
     """
     name = equation.name
     if equation.kind == DISCRETE:
-        right = rewritten(right, _a_sample_earlier)
+        right = rewritten(right, partial(_a_sample_earlier, parameters))
     if right is equation.right or equation.kind == DISCRETE:
         right = _without_memory(right, name, text)
     right = rewritten(right, _plain)
@@ -75,7 +80,7 @@ def expression_of(equation: Equation, right: Node, text: str) -> FixedExpression
         return Name(name=past[int(node.lag)], at=node.at) if mine else node  # type: ignore[attr-defined]  # a Delayed
 
     found = replace(equation, kind=DEFINITION, right=rewritten(right, own))
-    if not set(channels_of(found.right)) - set(past.values()):
+    if not set(channels_of(found.right, parameters)) - set(past.values()):
         raise reads_nothing(equation, text)
     return FixedExpression(
         equation=found,
@@ -86,17 +91,41 @@ def expression_of(equation: Equation, right: Node, text: str) -> FixedExpression
     )
 
 
-def words_of(equation: Equation) -> dict[str, Any]:
-    """An equation of other channels in the words of :class:`sysid.composite.FixedMember`."""
+def words_of(equation: Equation, parameters: Collection[str] = ()) -> dict[str, Any]:
+    """An equation of other channels, and of parameters, in the words of :class:`sysid.composite.FixedMember`."""
     text = written(equation.right)
     (again,) = parse(f"{written_name(equation.name)} = {text}")  # in whose order the channels are counted
-    return {"mapping": Mapping(inputs=channels_of(again.right), outputs=(equation.name,)), "equation": text}
+    inputs = channels_of(again.right, parameters)
+    return {"mapping": Mapping(inputs=inputs, outputs=(equation.name,)), "equation": text}
 
 
-def channels_of(node: Node) -> tuple[str, ...]:
+def channels_of(node: Node, parameters: Collection[str] = ()) -> tuple[str, ...]:
     """The channels that an expression reads, in order."""
     read = sorted((one for one in nodes_of(node) if isinstance(one, Name | Delayed)), key=lambda one: one.at)
-    return tuple(dict.fromkeys(one.name for one in read if one.name not in CONSTANTS))
+    return tuple(dict.fromkeys(one.name for one in read if one.name not in CONSTANTS and one.name not in parameters))
+
+
+def moving(node: Node) -> frozenset[str]:
+    """The names in an expression that it moves with: what is compared decides, and moves nothing.
+
+    Args:
+        node: The expression.
+
+    Returns:
+        The names.
+    """
+    match node:
+        case Name() | Delayed():
+            return frozenset([node.name])
+        case Operation() if node.operator in _COMPARED:
+            return frozenset()
+        case Operation():
+            return frozenset().union(*map(moving, node.operands))
+        case Call() if node.function == "sign":
+            return frozenset()
+        case Call():
+            return frozenset().union(*map(moving, node.parts))
+    return frozenset()
 
 
 def reads_nothing(equation: Equation, text: str) -> ConfigError:
@@ -110,9 +139,9 @@ def reads_nothing(equation: Equation, text: str) -> ConfigError:
     )
 
 
-def _a_sample_earlier(node: Node) -> Node:
+def _a_sample_earlier(parameters: Collection[str], node: Node) -> Node:
     match node:
-        case Name() if node.name not in CONSTANTS:
+        case Name() if node.name not in CONSTANTS and node.name not in parameters:
             return Delayed(name=node.name, lag=1.0, seconds=False, at=node.at)
         case Delayed():
             return replace(node, lag=node.lag + 1.0)
@@ -132,6 +161,8 @@ def _without_memory(node: Node, name: str, text: str) -> Node:
     if not isinstance(node, Call) or node.function not in _REMEMBER:
         return node
     names = _REMEMBER[node.function]
+    if node.function == "relay" and len(node.parts) > len(names):
+        names = (*names, "slope")
     given = dict(zip(names, node.arguments, strict=False)) | dict(node.options)
     if len(node.parts) != len(names) or set(given) != set(names):
         raise equation_error(
@@ -150,6 +181,12 @@ def _without_memory(node: Node, name: str, text: str) -> Node:
         return Call(function="where", arguments=(condition, yes, no), at=node.at)
 
     one = Number(value=1.0, at=node.at)
+    if "slope" in given:  # what fixed_members says of a Schmitt trigger, of on and off that are no numbers
+        half = Number(value=0.5, at=node.at)
+        middle = operation("*", half, operation("+", given["on"], given["off"]))
+        memory = operation("+", one, operation("*", given["slope"], operation("-", given["on"], given["off"])))
+        moved = operation("*", given["slope"], operation("-", given["x"], middle))
+        return operation("+", operation("+", half, moved), operation("*", memory, operation("-", before, half)))
     if node.function == "hold":
         return where(given["when"], given["x"], before)
     if node.function == "latch":

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from sysid.composite.fixed_expressions import moving
 from sysid.equations.functions import OWN
 from sysid.equations.syntax import Call, Delayed, nodes_of
 from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.models import GreyBox, Mapping
-from sysid.models.grey_box import Table, lowered
+from sysid.models.grey_box import Parameter, Table, lowered, parameters_from
 from sysid.traces import Trace
 
 
@@ -66,6 +67,31 @@ class Standing:
         return [self.channel(self.output, instance) for instance in self.instances]
 
 
+def parameters_of(given: Dict[str, Any] | tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+    """Parameters of what is fixed, from what people write.
+
+    Args:
+        given: By name a start, or ``{start:, low:, high:, prior:, fixed:, unit:}``.
+
+    Returns:
+        Them.
+
+    Raises:
+        ConfigError: If they cannot be; or if one is to have a value per case, which a whole knows nothing of.
+    """
+    found = parameters_from(given)
+    for one in found:
+        if one.per:
+            raise ConfigError(
+                f"{one.name} is to have a value per {one.per}",
+                where=f"parameters, {one.name}",
+                expected="one value: every trace of a whole is run with the same",
+                got=f"per: {one.per}",
+                remedy="leave per out, or make it a channel of the traces",
+            )
+    return found
+
+
 @dataclass(frozen=True, kw_only=True)
 class FixedMember(Standing):
     """A submodel that is declared and not fitted: an expression of its inputs, held between two bounds.
@@ -76,6 +102,8 @@ class FixedMember(Standing):
         equation: The expression, in the language of equations, which reads all inputs and remembers nothing else:
             ``"max(a, b[k-1])*c"``. Its output's own past is an input under another name.
         tables: By name the points of functions that it calls.
+        parameters: What of it is estimated in rounds of training end to end: by name a start, or ``{start:, low:,
+            high:, prior:, fixed:, unit:}``.
         gains: The weight of each input, in the output's unit per the input's, or its weights by lag (``{0: 2, 1: -1}``
             looks one sample ahead); under the output's own name the weight of its last value: 1 sums up, more is a
             relay with hysteresis.
@@ -94,6 +122,7 @@ class FixedMember(Standing):
     gains: Dict[str, float | Dict[int, float]] = field(default_factory=dict)
     equation: str = ""
     tables: tuple[Table, ...] | Dict[str, Any] = ()
+    parameters: tuple[Parameter, ...] | Dict[str, Any] = ()
     constant: float = 0.0
     low: float = -math.inf
     high: float = math.inf
@@ -103,6 +132,7 @@ class FixedMember(Standing):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "parameters", parameters_of(self.parameters))
         object.__setattr__(self, "tables", self.grey_box.tables if self.equation else tuple(self.tables))
         if self.equation:
             self._check_equation()
@@ -138,8 +168,28 @@ class FixedMember(Standing):
 
     @property
     def grey_box(self) -> GreyBox:
-        """The equation as a structure without parameters."""
-        return GreyBox(equations=f"{written_name(self.output)} = {self.equation}", tables=self.tables)
+        """The equation as a structure."""
+        equations = f"{written_name(self.output)} = {self.equation}"
+        return GreyBox(equations=equations, tables=self.tables, parameters=self.parameters)
+
+    @property
+    def free(self) -> tuple[Parameter, ...]:
+        """What is estimated."""
+        return self.grey_box.free if self.equation else ()
+
+    def at(self, values: Dict[str, float]) -> FixedMember:
+        """The same submodel at other values of its parameters.
+
+        Args:
+            values: By name, in their units; a parameter that is not among them keeps its own.
+
+        Returns:
+            The submodel.
+        """
+        if not self.free:
+            return self
+        named = self.grey_box.named
+        return replace(self, parameters=tuple(replace(one, start=values.get(one.name, one.start)) for one in named))
 
     def _check_equation(self) -> None:
         system = self.grey_box.system
@@ -147,6 +197,16 @@ class FixedMember(Standing):
         parts = [node for one in system.equations for node in nodes_of(one.right)]
         lost = any(isinstance(node, Delayed) and (node.seconds or node.name == self.output) for node in parts)
         remembers = any(isinstance(node, Call) and node.function in OWN for node in parts)
+        for one in self.free:
+            if not any(one.name in moving(equation.right) for equation in system.equations):
+                raise ConfigError(
+                    f"nothing moves with {one.name}, which only decides",
+                    where=f"parameters, {one.name}",
+                    expected="a parameter that the output moves with: an exact switch has no derivative",
+                    got=self.equation,
+                    remedy="let it act through a slope, as in relay(x, on=..., off=..., slope=20) or clamp(20*(x - "
+                    "...), 0, 1)",
+                )
         if lost or remembers or self.gains or self.constant or set(system.others) != set(self.mapping.inputs):
             raise ConfigError(
                 f"the equation of {self.mapping} is none of these inputs",
@@ -158,13 +218,13 @@ class FixedMember(Standing):
             )
 
     def _check_gains(self) -> None:
-        if set(self.gains) - {self.output} != set(self.mapping.inputs) or self.tables:
+        if set(self.gains) - {self.output} != set(self.mapping.inputs) or self.tables or self.parameters:
             raise ConfigError(
                 f"the gains of {self.mapping} are not those of its inputs",
                 where="gains",
                 expected=f"one for each of {', '.join(self.mapping.inputs)}, with or without {self.output}",
                 got=", ".join(self.gains) or "none",
-                remedy="correct the gains or the mapping, or write an equation, which alone calls tables",
+                remedy="correct the gains or the mapping, or write an equation, which alone has tables and parameters",
             )
         own = self.gains.get(self.output, 0.0)
         if isinstance(own, Dict):

@@ -19,7 +19,8 @@ switch jumps from one sample to the next: what follows has no edge, and training
 
 What is no weighted sum, such as a product, the greater of two channels, a root or a table, is an equation. It runs in
 the same pass, exactly as it is written; training goes through it by the derivatives of its operations, which know
-nothing of a switch: what a comparison decides has an edge.
+nothing of a switch: what a comparison decides has an edge. What is not known of it is a parameter, and is estimated
+with the networks when the whole is trained end to end; until then it stands where it starts.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ from sysid.traces import Channel, Trace
 def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = None) -> NARXModel | GreyBoxModel:
     """A fixed submodel in its first instance, as a model that runs and is exported like the others.
 
-    A sum is a network without neurons, and what is no sum a grey box without parameters.
+    A sum is a network without neurons, and what is no sum a grey box, its parameters where they start.
 
     Args:
         fixed: What is declared.
@@ -65,7 +66,13 @@ def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = 
     }
     if fixed.equation:
         return GreyBoxModel(
-            grey=fixed.grey_box, theta=np.empty(0), norms=(), levels=(), spans=(), substeps=1, **channels
+            grey=fixed.grey_box,
+            theta=np.array([one.start for one in fixed.free]),
+            norms=(),
+            levels=(),
+            spans=(),
+            substeps=1,
+            **channels,
         )
     lags = [sorted(one) for one in fixed.weights]
     weights = [one[lag] for one, own in zip(fixed.weights, lags, strict=True) for lag in own]

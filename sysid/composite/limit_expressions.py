@@ -7,22 +7,25 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from sysid.composite.fixed_equations import bounds_in, fixed_by_equations
+from sysid.composite.fixed_expressions import channels_of
 from sysid.composite.fixed_member import FixedMember, Standing
 from sysid.equations.parser import parse
-from sysid.equations.syntax import Name
+from sysid.equations.syntax import Delayed, Name, nodes_of
 from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.models import Limit
+from sysid.models.grey_box import Parameter
 
 
 def named_limits(
-    standing: Sequence[Standing], limits: Dict[str, Limit]
+    standing: Sequence[Standing], limits: Dict[str, Limit], parameters: Dict[str, Parameter] | None = None
 ) -> tuple[tuple[FixedMember, ...], dict[str, Limit]]:
     """Limits by channels alone.
 
     Args:
         standing: All members and fixed submodels.
-        limits: Limits of outputs, each side a number, a channel, or an expression of channels.
+        limits: Limits of outputs, each side a number, a channel, or an expression of channels and parameters.
+        parameters: What is estimated, by name; those that no limit names are ignored.
 
     Returns:
         A fixed submodel for each expression, called ``AR low`` or ``AR high``, in the instances of what it limits, with
@@ -46,10 +49,12 @@ def named_limits(
     for output, limit in limits.items():
         for side in ("low", "high"):
             bound = getattr(limit, side)
-            if not isinstance(bound, str) or bound in channels or not _is_expression(bound):
+            if not isinstance(bound, str) or bound in channels:
+                continue
+            if not _is_expression(bound) and bound not in (parameters or {}):
                 continue
             name, own = f"{output} {side}", first.get(output)
-            more += _submodels(name, bound, output, own)
+            more += _submodels(name, bound, output, own, parameters or {})
             changed = found[output]
             found[output] = replace(changed, low=name) if side == "low" else replace(changed, high=name)
     return tuple(more), found
@@ -64,12 +69,20 @@ def _is_expression(text: str) -> bool:
     return not isinstance(equation.right, Name)
 
 
-def _submodels(name: str, text: str, output: str, own: Standing | None) -> list[FixedMember]:
+def _submodels(
+    name: str, text: str, output: str, own: Standing | None, parameters: Dict[str, Parameter]
+) -> list[FixedMember]:
     """One expression as fixed submodels, in all instances of the output where it is that of the first."""
     equation = f"{written_name(name)} = {text}"
     try:
-        low, high = bounds_in(equation)
-        members = fixed_by_equations(equation, rest=min(max(0.0, low), high))  # nobody reads what it was before
+        (parsed,) = parse(equation)
+        read = {one.name for one in nodes_of(parsed.right) if isinstance(one, Name | Delayed)}
+        named = tuple(one for one in parameters.values() if one.name in read)
+        if named and not channels_of(parsed.right, parameters):  # a fixed submodel stands where what it reads stands
+            equation = f"{written_name(name)} = {text} + 0*{written_name(output)}[k-1]"
+        low, high = bounds_in(equation, parameters)
+        rest = min(max(0.0, low), high)  # nobody reads what it was before
+        members = fixed_by_equations(equation, rest=rest, parameters=named)
     except ConfigError as error:
         raise ConfigError(
             error.what, where=f"limits of {output}", expected=error.expected, got=text, remedy=error.remedy

@@ -7,6 +7,7 @@ import numpy as np
 from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_members import fixed_model
 from sysid.composite.members import Members, assembled
+from sysid.composite.parameters import trained_equations
 from sysid.composite.plan import RoundPlan, TrainingPlan
 from sysid.composite.shared_weights import SharedWeights
 from sysid.composite.stages import reading_more
@@ -40,15 +41,37 @@ def rehearse(composite: Composite, plan: TrainingPlan, like: Trace) -> None:
         whole = reading_more(whole, one.reads)
         if one.share_weights:
             SharedWeights.of(composite, one, whole)
+    _check_estimated(composite, plan)
 
 
 def _check_names(composite: Composite, asked: RoundPlan, outputs: tuple[str, ...]) -> None:
     """Refuse a round that names what nothing writes."""
+    free = [one.output for one in composite.fixed if one.free]
     for name in asked.members or ():
-        composite.member(name)
+        if name not in free:
+            composite.member(name)
     _check_known(outputs, "targets", tuple(asked.targets))
     _check_known(outputs, "measured", asked.measured)
     _check_known(outputs, "reads", tuple(name for output, more in asked.reads.items() for name in (output, *more)))
+
+
+def _check_estimated(composite: Composite, plan: TrainingPlan) -> None:
+    """Refuse parameters that would stay where they start."""
+    trained = {
+        parameter.name
+        for one in plan.rounds
+        if not one.share_weights
+        for equation in trained_equations(composite.fixed, one.members or None)
+        for parameter in equation.free
+    }
+    if left := [name for name in composite.free if name not in trained]:
+        raise ConfigError(
+            f"no round estimates the parameter {left[0]}",
+            where=f"parameters, {left[0]}",
+            expected="a round of training end to end that names no members, or among them the output of its equation",
+            got=f"{len(plan.rounds)} rounds",
+            remedy="add such a round, or write fixed: true",
+        )
 
 
 def _check_known(outputs: tuple[str, ...], where: str, names: tuple[str, ...]) -> None:

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from sysid.composite.composite import Composite
+from sysid.composite.fixed_member import Standing
 from sysid.composite.keeper import Report
 from sysid.composite.members import free_runs, mean_squares, seen_from
+from sysid.composite.parameters import trained_equations, values_in, with_values
 from sysid.composite.plan import RoundPlan
 from sysid.composite.shared_weights import SharedWeights
 from sysid.composite.stages import reading_more
@@ -37,6 +39,7 @@ class JointRound:
         estimation: Traces to fit, over the part's channels.
         selection: Traces that choose among the states on the way, likewise.
         shared: The instances, where the members keep one set of weights for all of theirs.
+        parameters: Names of the parameters of equations, each of which is one wherever it acts.
     """
 
     whole: Cascade
@@ -47,6 +50,7 @@ class JointRound:
     estimation: tuple[Trace, ...]
     selection: tuple[Trace, ...]
     shared: SharedWeights | None
+    parameters: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -83,7 +87,9 @@ class JointRound:
         else:
             # What no target depends on would be run, and its sensitivities with it, for nothing.
             part = whole.upstream_of(asked.targets, given=asked.measured)
-            asked_for = [one for one in composite.members if not asked.members or one.output in asked.members]
+            named = asked.members or None
+            asked_for: list[Standing] = [one for one in composite.members if named is None or one.output in named]
+            asked_for += [*trained_equations(composite.fixed, named)]
             trained = [name for member in asked_for for name in member.outputs if name in part.outputs]
         part = _in_own_order(part)
         return cls(
@@ -95,6 +101,7 @@ class JointRound:
             estimation=tuple(_of_part(part, trace) for trace in used),
             selection=tuple(_of_part(part, trace) for trace in selection),
             shared=stand,
+            parameters=composite.free,
         )
 
     @property
@@ -140,6 +147,7 @@ class JointRound:
             trained=self.trained,
             training=self.training,
             selection=self.selection,
+            shared=self.parameters,
             on_progress=report,
         )
 
@@ -158,7 +166,7 @@ class JointRound:
         whole = self.whole
         for model in self.part.models:
             whole = whole.with_member(fit.model.member(Ends.of(model).outputs[0]))
-        return replace(fit, model=whole)
+        return replace(fit, model=with_values(whole, values_in(fit.model)) if self.parameters else whole)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -201,7 +209,7 @@ class TrainedRound:
         """
         return cls(
             name=name,
-            trained=tuple(one.output for one in composite.members if not set(one.outputs).isdisjoint(ready.trained)),
+            trained=tuple(one.output for one in composite.standing if not set(one.outputs).isdisjoint(ready.trained)),
             shared=asked.share_weights,
             measured=asked.measured,
             traces=len(ready.estimation),
@@ -223,7 +231,10 @@ class TrainedRound:
     @property
     def sentences(self) -> list[str]:
         """All that its fit says: which states were looked at, which was chosen, and how it ended."""
-        return [f"Round {self.name}: {said}" for said in (*self.fit.notes, self.fit.status.value)]
+        return [
+            f"Round {self.name}: {said}"
+            for said in (*self.fit.notes, *self.fit.told_of_equations, self.fit.status.value)
+        ]
 
 
 def train_round(

@@ -56,6 +56,14 @@ class SharedWeights:
             ConfigError: If its members do not stand in the same several instances, a target does not stand there, or
                 the limits of an instance are others than those of the first.
         """
+        if free := [one.output for one in composite.fixed if one.free and one.output in (asked.members or ())]:
+            raise ConfigError(
+                "a round that shares weights estimates no parameters of equations",
+                where="share_weights",
+                expected="members that are networks",
+                got=", ".join(free),
+                remedy="estimate them in a round of their own: a parameter is the same in all instances there",
+            )
         members = tuple(one for one in composite.members if one.output in (asked.members or ()))
         instances = members[0].instances
         beside = [one for one in composite.standing if one.instances == instances]

@@ -19,6 +19,7 @@ from sysid.composite.fixed_members import with_fixed
 from sysid.composite.keeper import Keeper, MakeAll, Task
 from sysid.composite.limit_check import LimitCheck, check_limits
 from sysid.composite.members import Members, assembled, dealt, whole_score
+from sysid.composite.parameters import values_in
 from sysid.composite.plan import Retraining, RoundPlan, TrainingPlan
 from sysid.composite.rehearsal import rehearse
 from sysid.composite.round import JointRound, TrainedRound
@@ -174,6 +175,11 @@ class TrainedComposite:
         return self.stages[self.chosen]
 
     @property
+    def parameters(self) -> dict[str, float]:
+        """What was estimated in equations, by name, in its unit."""
+        return values_in(self.model)
+
+    @property
     def notes(self) -> list[str]:
         """Sentences on how it came about, but for the rounds that ended as they should."""
         alone = len(self.rounds) == 1
@@ -181,7 +187,8 @@ class TrainedComposite:
         said = [one.fit.status.value if alone else f"Round {one.name}: {one.fit.status.value}" for one in unstable]
         choice = [] if self.candidates is None or self.candidates.choice is None else [self.candidates.sentence]
         learned = [] if self.active_learning is None else [self.active_learning.sentence]
-        return [*choice, *(one.sentence for one in self.retrained), *said, *learned]
+        estimated = [f"Round {one.name}: {told}" for one in self.rounds for told in one.fit.told_of_equations]
+        return [*choice, *(one.sentence for one in self.retrained), *said, *estimated, *learned]
 
 
 def train(
@@ -238,8 +245,15 @@ def train(
         retrained=tuple(training.retrained),
         rounds=tuple(training.rounds),
         active_learning=training.active_learning[0] if training.active_learning else None,
-        limits=check_limits(composite, [*seen.estimation, *chain.from_iterable(one for one, _ in seen.also.values())]),
+        limits=check_limits(composite, _fitted(composite, data, seen, list(training.stages.values())[-1])),
     )
+
+
+def _fitted(composite: Composite, data: TrainingData, seen: TrainingData, whole: Cascade) -> list[Trace]:
+    """All that was fitted, with what the fixed submodels say in the end."""
+    given = data if composite.free else seen
+    traces = [*given.estimation, *chain.from_iterable(one for one, _ in given.also.values())]
+    return with_fixed(composite.fixed_in(whole), traces) if composite.free else traces
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

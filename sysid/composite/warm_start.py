@@ -24,13 +24,14 @@ def started_from(composite: Composite, given: Cascade, like: Trace) -> Cascade:
         like: A trace of the whole, for units.
 
     Returns:
-        The whole: those networks, and the fixed submodels as they are declared.
+        The whole: those networks, and the fixed submodels as they are declared, parameters of the same name as given.
 
     Raises:
         ConfigError: If a member is not there, is of another kind or reads what nothing here writes.
     """
     networks = [_network(given, member, there) for member in composite.members for there in member.instances]
-    fixed = [placed(one, fixed_model(one, like), there) for one in composite.fixed for there in one.instances]
+    known = composite.fixed_in(given)
+    fixed = [placed(one, fixed_model(one, like), there) for one in known for there in one.instances]
     whole = wired(composite, [*networks, *fixed])
     declared = {
         one.channel(name, there) for one in composite.standing for there in one.instances for name in one.mapping.inputs

@@ -52,6 +52,15 @@ class Uncertainty:
         half = scipy.stats.norm.ppf(0.5 + 0.5 * probability) * self.standard_deviations
         return np.column_stack([self.values - half, self.values + half])
 
+    @property
+    def sentence(self) -> str:
+        """Each parameter with half of its 95 % interval; those that have none alone."""
+        half = self.interval(0.95)[:, 1] - self.values
+        each = zip(self.names, self.values, half, strict=True)
+        return ", ".join(
+            f"{name} = {value:.5g}{'' if np.isnan(wide) else f' ± {wide:.2g}'}" for name, value, wide in each
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
         return {

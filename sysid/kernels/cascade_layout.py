@@ -34,6 +34,8 @@ class Equations(NamedTuple):
         code_first: Where each member's begin; one more entry than members.
         registers: All registers, with the numbers in place.
         low: The first register of each member.
+        free: Where what is estimated of its numbers begins.
+        n_free: How many these are.
         given: Where its regressors begin.
         first: The first register that its instructions write.
         result: The register that is its output.
@@ -47,6 +49,8 @@ class Equations(NamedTuple):
     code_first: NDArray[np.int64]
     registers: NDArray[np.float64]
     low: NDArray[np.int64]
+    free: NDArray[np.int64]
+    n_free: NDArray[np.int64]
     given: NDArray[np.int64]
     first: NDArray[np.int64]
     result: NDArray[np.int64]

@@ -13,7 +13,8 @@ scaled numbers, with lag :math:`l_i`,
 The sum runs over regressors that are an output of the cascade, the member's own or an upstream one: the
 sensitivity of the upstream output is an input of the downstream recursion, scaled from the one's numbers to the
 other's. Of a member that is an equation the factors :math:`c_{ji,t}` are the derivatives of its operations, taken back
-through them (``sysid/kernels/register_machine.py``). Inputs of the whole contribute nothing. An output held by a
+through them (``sysid/kernels/register_machine.py``), and so is :math:`\partial y_{j,t} / \partial\theta`, where some
+of its numbers are estimated. Inputs of the whole contribute nothing. An output held by a
 constant has a zero row; held by a channel, it has that channel's row.
 
 Rows end after the parameters of the member itself: no output depends on members that run later.
@@ -197,6 +198,7 @@ def sensitivities(p, past, first, n_rows, values, kept, held, own_first, extent,
     e = p.equations
     is_equation, steps_first, steps, v = e.is_one, e.code_first, e.code, e.registers.copy()
     given, first_of, low, result, widths, places, table = e.given, e.first, e.low, e.result, e.widths, e.places, e.table
+    free, n_free = e.free, e.n_free
     d, bar = np.empty((len(steps), 3)), np.empty(len(v))
     for t in range(first, first + n_rows):
         here, at_neuron = _u((past + t) * wide), 0
@@ -211,8 +213,9 @@ def sensitivities(p, past, first, n_rows, values, kept, held, own_first, extent,
                 x[i] = (flat[here - back[first_x + i]] - p.regressor_offset[first_x + i]) / regressor_scale[first_x + i]
             if not slopes_of_values(p.kinds[m], h, n, s):
                 slopes_of_sums(p.kinds[m], theta, at, n, x, n_x, sums, s)
-            size = p.theta_first[m + 1] - at
-            linear, gates = size > n * (n_x + 1 + n_y) + n_y, gates_at(p.theta_first, m, n, n_x, n_y)
+            size = p.theta_first[m + 1] - at if not is_equation[m] else n_free[m]
+            linear = size > n * (n_x + 1 + n_y) + n_y and not is_equation[m]
+            gates = gates_at(p.theta_first, m, n, n_x, n_y)
             gated, to_gates = gates >= 0, _u(max(gates - at, 0))
             k, r, y = _u(n), _u(n_x), _u(n_y)
             for j in range(n_y):
@@ -229,7 +232,7 @@ def sensitivities(p, past, first, n_rows, values, kept, held, own_first, extent,
                 _gains(g, theta, _u(at + n * (n_x + 1 + j)), gated, _u(at) + to_gates, k, r, x)
                 whole = own_first[m] >= 0 and n_y == 1  # its own part is written anew, number by number
                 _clear(J, row, row + _u(own_first[m] if whole else extent[o]))
-                if own_first[m] >= 0:
+                if own_first[m] >= 0 and not is_equation[m]:
                     own = row + _u(own_first[m])
                     _own(J, own, gated, own + to_gates, _u(j), k, r, y, linear, x, h, s, g)
                 if whole:
@@ -244,6 +247,8 @@ def sensitivities(p, past, first, n_rows, values, kept, held, own_first, extent,
                     moves_of(steps, begin, end, d, result[m], low[m], first_of[m], bar)
                     for i in range(n_x):
                         c[i] = bar[given[m] + i]
+                    for i in range(size if own_first[m] >= 0 else 0):
+                        J[row + _u(own_first[m] + i)] = bar[free[m] + i]
                 found = 0
                 for i in range(first_x, first_x + n_x):
                     of = source[i]

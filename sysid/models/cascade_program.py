@@ -128,6 +128,8 @@ def _equations(given: Sequence[ColumnEquation | None], regressors: Sequence[int]
         code_first=_firsts([len(one.code) for one in all_]),
         registers=registers,
         low=low,
+        free=low + np.array([one.free.start for one in all_], dtype=np.int64),
+        n_free=np.array([one.free.stop - one.free.start for one in all_], dtype=np.int64),
         given=low + numbers,
         first=low + numbers + np.array(regressors, dtype=np.int64),
         result=low + np.array([one.result for one in all_], dtype=np.int64),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -31,6 +31,7 @@ class ColumnEquation:
         result: The register that is the output.
         places: Of each table its first row and its rows, shape ``(n_tables, 2)``.
         table: Rows of all tables, shape ``(n_rows, 2)``.
+        free: Where those of the numbers stand that are estimated.
     """
 
     numbers: NDArray[np.float64]
@@ -38,6 +39,7 @@ class ColumnEquation:
     result: int
     places: NDArray[np.int64]
     table: NDArray[np.float64]
+    free: slice = field(default_factory=lambda: slice(0, 0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -135,6 +135,9 @@ class EquationForm(AbstractForm):
                 result=int(place[program.results[0]]),
                 places=low.places,
                 table=low.table,
+                free=slice(len(program.constants), len(program.constants) + low.n_estimated)
+                if low.n_estimated
+                else slice(0, 0),
             ),
         )
 

@@ -194,7 +194,7 @@ class GreyBox(AbstractStructure):
                 "the equations are no text", where="equations", expected="text, one equation a line",
                 got=shortened(text), remedy="write equations: | and the equations below it, indented",
             )  # fmt: skip
-        object.__setattr__(self, "parameters", _entries(self.parameters, Parameter, "parameters"))
+        object.__setattr__(self, "parameters", parameters_from(self.parameters))
         object.__setattr__(self, "initial", _entries(self.initial, InitialState, "initial"))
         object.__setattr__(self, "tables", _tables(self.tables))
         object.__setattr__(self, "cases", cases_of(self.cases))
@@ -373,6 +373,21 @@ def lowered(
         solver=solver,
     )
     return lower(structure.system, terms)
+
+
+def parameters_from(given: Any) -> tuple[Parameter, ...]:
+    """Parameters from what people write.
+
+    Args:
+        given: By name a start, or the fields of :class:`Parameter`.
+
+    Returns:
+        Them.
+
+    Raises:
+        ConfigError: If they cannot be.
+    """
+    return _entries(given, Parameter, "parameters")
 
 
 def _entries(given: Any, kind: Any, where: str) -> tuple[Any, ...]:

@@ -83,11 +83,12 @@ def wired_transfer_function(mapping: str) -> TransferFunctionModel:
     )
 
 
-def wired_equation(text: str, *inputs: str, **tables) -> GreyBoxModel:
-    """A member that is an equation without parameters."""
+def wired_equation(text: str, *inputs: str, free: dict[str, float] | None = None, **tables) -> GreyBoxModel:
+    """A member that is an equation; its parameters stand where they start."""
+    free = free or {}
     return GreyBoxModel(
-        grey=GreyBox(equations=text, tables=tables),
-        theta=np.empty(0),
+        grey=GreyBox(equations=text, tables=tables, parameters=free),
+        theta=np.array(list(free.values())),
         norms=(),
         levels=(),
         spans=(),
@@ -160,7 +161,8 @@ def build_equations() -> Cascade:
         models=(
             wired_narx("STP+Q -> BP", NARX(input_delays=[[0, 1], [1, 3]], output_delays=2, neurons=5), 1),
             wired_narx("BP+STP -> AR", structure, 2),
-            wired_equation("TOP = max(BP, 0.8*AR[k-1] + sqrt(abs(STP - BP[k-2])))", "STP", "AR", "BP"),
+            wired_equation("TOP = max(BP, part*AR[k-1] + sqrt(abs(STP - BP[k-2])))", "STP", "AR", "BP",
+                           free={"part": 0.8}),
             wired_equation("Q = where(STP > BP[k-1], share(AR)*BC[k-2], 40 - 0.1*STP[k-3])", "BC", "STP", "BP", "AR",
                            share=[[0, 1], [39, 0.5], [90, 1.5]]),
             wired_narx("Q -> BC", structure, 3),

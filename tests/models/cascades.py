@@ -92,12 +92,13 @@ def at_most(text: str, *, above: float) -> ARXModel:
     )
 
 
-def equation(text: str, *inputs: str, **tables) -> GreyBoxModel:
-    """A member that is an equation without parameters."""
+def equation(text: str, *inputs: str, free: dict[str, float] | None = None, **tables) -> GreyBoxModel:
+    """A member that is an equation; its parameters stand where they start."""
+    free = free or {}
     output = text.split(" = ", maxsplit=1)[0]
     return GreyBoxModel(
-        grey=GreyBox(equations=text, tables=tables),
-        theta=np.empty(0),
+        grey=GreyBox(equations=text, tables=tables, parameters=free),
+        theta=np.array(list(free.values())),
         norms=(),
         levels=(),
         spans=(),
@@ -203,7 +204,8 @@ CASCADES = {
     "equations in a circle": Cascade(
         models=(
             network("STP+x+BC -> BP", seed=1, inputs=(1, 3)), network("BP -> AR", seed=2),
-            equation("x = sqrt(abs(BP[k-1] - 0.9*AR[k-1]) + 0.1) * max(AR[k-2], ER[k-1])", "AR", "ER", "BP"),
+            equation("x = root*sqrt(abs(BP[k-1] - share*AR[k-1]) + 0.1) * max(AR[k-2], ER[k-1])", "AR", "ER", "BP",
+                     free={"share": 0.9, "root": 1.0}),
             equation("ER = where(STP > 75, BP, 0.5*y[k-1]) - filled(x)/30", "STP", "y", "BP", "x",
                      filled=[[0, 1], [80, 3], [400, -2]]),
             linear("ER -> y"), network("y+x -> BC", seed=3, spread=0.1),

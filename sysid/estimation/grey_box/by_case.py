@@ -10,7 +10,7 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.grey_box.named import named_of
+from sysid.estimation.named import named_of
 from sysid.estimation.result import FitResult
 from sysid.models import Start
 from sysid.models.case_values import case_of, cases_among

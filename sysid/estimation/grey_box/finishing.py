@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.clock import now
-from sysid.estimation.grey_box.findings import with_evidence
-from sysid.estimation.grey_box.named import Named, named_of
+from sysid.estimation.findings import with_evidence
 from sysid.estimation.grey_box.preparing import ROUNDS, SHARPER, seen_terms
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.stepping import ACCURACY, Stepping, substeps_for
@@ -17,6 +16,7 @@ from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, at_minimum
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.named import Named, named_of
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.training import Training
 from sysid.estimation.result import Status
@@ -88,7 +88,7 @@ def settled(candidate: starts.Candidate, provider: EquationProvider) -> starts.C
     Returns:
         The candidate.
     """
-    solution = with_evidence(candidate.solution, provider)
+    solution = with_evidence(candidate.solution, provider.n_samples)
     if solution.status in {Status.STALLED, Status.NOT_IMPROVED} and at_minimum(solution.state, provider):
         solution = replace(solution, status=Status.CONVERGED)
     return replace(candidate, solution=solution)

@@ -15,11 +15,10 @@ from sysid.equations import ROSENBROCK, RUNGE_KUTTA, Lowered
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
+from sysid.estimation.findings import Findings
 from sysid.estimation.grey_box.by_case import case_notes, with_cases
-from sysid.estimation.grey_box.findings import Findings
 from sysid.estimation.grey_box.finishing import Done, Ready, finished, settled
 from sysid.estimation.grey_box.layout import EquationLayout
-from sysid.estimation.grey_box.named import Named, named_of
 from sysid.estimation.grey_box.preparing import (
     WINDOW,
     first_terms,
@@ -41,6 +40,7 @@ from sysid.estimation.grey_box.stepping import (
 )
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
+from sysid.estimation.named import Named, named_of
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import Choice, choose
 from sysid.estimation.networks.multistart_result import multistart_result, multistart_status

@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.equations import Net
-from sysid.estimation.grey_box.named import Named
 from sysid.estimation.grey_box.preparing import WINDOW
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.named import FLAT_ALPHA, Named, precision_of
 from sysid.estimation.networks.initialise import AbstractLayout
 
 Array = NDArray[np.float64]
-
-FLAT_ALPHA = 1e-10
-"""Precision of what nothing is known of, in scaled numbers: a hundred thousand times its scale is ordinary."""
 
 READOUT_SPREAD = 1e-3
 """Standard deviation of the readouts where a fit starts: the equations are then as they were written."""
@@ -69,15 +66,13 @@ class EquationLayout(AbstractLayout):
             The prior: what is declared of a parameter is known, of the others and of initial states nothing is, and
             the networks' weights are the evidence's.
         """
-        scale, p, w = self.provider.scale, len(self.provider.scale), self.first_weight
+        p, w = len(self.provider.scale), self.first_weight
         vague = [one.place for one in self.named if one.parameter.prior is None]
         entries: list[tuple[str, NDArray[np.int64], bool, float]] = [
             ("parameters", np.array(vague, dtype=np.int64), True, FLAT_ALPHA)
         ]
-        for one in self.named:
-            if one.parameter.prior is not None:
-                at, known = one.place, one.parameter.prior
-                entries.append((one.name, np.array([at]), True, float(scale[at] / known) ** 2))
+        known = [one for one in self.named if one.parameter.prior is not None]
+        entries += [(one.name, np.array([one.place]), True, precision_of(one.parameter)) for one in known]
         for number, net in enumerate(self.nets, start=1):
             hidden = w + np.arange(net.hidden.start, net.hidden.stop).reshape(net.neurons, -1)
             parts = {f"hidden {j}": hidden[:, j] for j in range(net.arguments + 1)}

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.grey_box.named import named_of
 from sysid.estimation.grey_box.provider import EquationProvider, Record
 from sysid.estimation.grey_box.stepping import STEPPED
+from sysid.estimation.named import named_of
 from sysid.models.equation_form import EquationForm
 from sysid.models.grey_box_model import EquationModel
 

@@ -28,10 +28,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.estimation.grey_box.named import Named
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, State
 from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.named import Named
 from sysid.estimation.result import Status
 
 Array = NDArray[np.float64]

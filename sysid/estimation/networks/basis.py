@@ -133,15 +133,22 @@ class RebasedProvider(AbstractProvider):
 
     Args:
         inner: The provider over plain regressors.
-        to_plain: From parameters in the basis to plain ones, shape ``(n_parameters, n_parameters)``.
+        to_plain: From parameters in the basis to plain ones, shape ``(n_parameters, n_in_basis)``.
+        between: Least and greatest of each parameter in the basis; ``None`` for no bounds.
     """
 
     inner: AbstractProvider
     to_plain: NDArray[np.float64]
+    between: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     n_samples: int = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "n_samples", self.inner.n_samples)
+
+    @property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Of the parameters in the basis; see the base class."""
+        return self.between
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""

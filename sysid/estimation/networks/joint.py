@@ -14,16 +14,18 @@ from sysid.errors import ConfigError
 from sysid.estimation.attempts import Attempt
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.findings import Findings, with_evidence
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks.basis import RebasedProvider
+from sysid.estimation.networks.joint_layout import JointLayout
 from sysid.estimation.networks.joint_provider import CascadeProvider
-from sysid.estimation.networks.member_layout import JointLayout
 from sysid.estimation.networks.multistart import INITIAL_ALPHA
 from sysid.estimation.networks.training import FitProgress, check_choice
 from sysid.estimation.result import Evidence, Status
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import Cascade, cascade_from_dict
 from sysid.models.typed_fields import TypedFields
 from sysid.traces import Trace
@@ -137,6 +139,8 @@ class CascadeFit:
         notes: Sentences worth knowing: which state was chosen among which, and by what.
         attempts: Every start at every checkpoint, and the one that was chosen; its errors are squared, in the errors
             that count as one.
+        uncertainty: Of the parameters of equations, where there are such; those of networks have priors alone.
+        warnings: Of these parameters those at a bound, not determined, or hardly to be told apart; or that none moved.
         solution: Where the parameters stand in the basis of training; not stored.
     """
 
@@ -149,7 +153,16 @@ class CascadeFit:
     evidence: Evidence | None = None
     notes: tuple[str, ...] = field(default=())
     attempts: tuple[Attempt, ...] = ()
+    uncertainty: Uncertainty | None = None
+    warnings: tuple[str, ...] = ()
     solution: Solution | None = None
+
+    @property
+    def told_of_equations(self) -> tuple[str, ...]:
+        """What is known of the parameters of equations, in words."""
+        if self.uncertainty is None:
+            return self.warnings
+        return (f"Estimated in equations: {self.uncertainty.sentence}.", *self.warnings)
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON values."""
@@ -165,7 +178,11 @@ class CascadeFit:
             else {name: getattr(self.evidence, name) for name in Evidence.__dataclass_fields__},
             "notes": list(self.notes),
             "attempts": [attempt.to_dict() for attempt in self.attempts],
-        }
+        } | (
+            {}
+            if self.uncertainty is None
+            else {"uncertainty": self.uncertainty.to_dict(), "warnings": list(self.warnings)}
+        )
 
     @classmethod
     def from_dict(cls, fields: dict[str, Any]) -> CascadeFit:
@@ -187,6 +204,8 @@ class CascadeFit:
             evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
             notes=tuple(fields["notes"]),
             attempts=tuple(Attempt.from_dict(attempt) for attempt in fields.get("attempts", ())),
+            uncertainty=Uncertainty.from_dict(fields["uncertainty"]) if "uncertainty" in fields else None,
+            warnings=tuple(fields.get("warnings", ())),
         )
 
 
@@ -290,7 +309,9 @@ class Joint:
     def _advance(
         self, where: Solution | NDArray[np.float64], checkpoint: int, began: float, which: str, name: str
     ) -> Solution:
-        provider = RebasedProvider(inner=self.provider, to_plain=self.layout.to_plain)
+        provider = RebasedProvider(
+            inner=self.provider, to_plain=self.layout.to_plain, between=self.layout.bounds
+        )  # fmt: skip
         keep = checkpoints_of(self.on_progress)
         # The run's own time counts towards its limit by itself; what is left of the whole is without it.
         engine = self._engine(checkpoint, began + keep.spent_s(name), which)
@@ -358,6 +379,7 @@ class Joint:
     def _result(self, seen: Sequence[_Candidate], *, interrupted: bool, seconds: float) -> CascadeFit:
         chosen = min(seen, key=lambda one: _last(one.score if self.selection else one.loss))
         curve = chosen.solution.curve if chosen.solution else ()
+        uncertainty, warnings = self._known(chosen.solution)
         how = "by the selection traces" if self.selection else "by its loss on the estimation traces"
         return CascadeFit(
             model=chosen.model,
@@ -376,9 +398,21 @@ class Joint:
                 f"Chosen {how} among {len(seen)} states: {chosen.sentence}.",
                 *_others([one for one in seen if one is not chosen]),
             ),
+            warnings=warnings,
             attempts=tuple(one.attempt(chosen=one is chosen) for one in seen),
+            uncertainty=uncertainty,
             solution=chosen.solution,
         )
+
+    def _known(self, solution: Solution | None) -> tuple[Uncertainty | None, tuple[str, ...]]:
+        """What is known of the parameters of equations, and what they leave open."""
+        named, n = self.layout.named, self.provider.n_samples
+        if not named:
+            return None, ()
+        if solution is None:
+            return None, ("The start was kept: the parameters of equations stand where they stood.",)
+        findings = Findings.of(with_evidence(solution, n), self.layout, named)
+        return findings.uncertainty(2.0 * solution.at.loss / max(n - len(solution.theta), 1)), findings.warnings
 
     def _status(self, chosen: _Candidate, seen: Sequence[_Candidate], *, interrupted: bool) -> Status:
         if interrupted:

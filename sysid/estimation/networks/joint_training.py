@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from collections.abc import Mapping as Dict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
-from sysid.estimation.networks.member_layout import JointLayout
+from sysid.estimation.networks.joint_layout import JointLayout
 from sysid.estimation.networks.training import FitProgress
 from sysid.models import Cascade, Ends
 from sysid.traces import Channel, Trace, TraceSet
@@ -27,12 +27,14 @@ def fit_cascade(
     trained: Sequence[str] | None = None,
     training: JointTraining | None = None,
     selection: Sequence[Trace] = (),
+    shared: Collection[str] = (),
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> CascadeFit:
     """Train the members of a cascade together, from where they are, for the free run of the whole.
 
     Sensitivities go through the wiring: the loss on a downstream output moves the parameters upstream. Each member
-    keeps the prior that it would have alone.
+    keeps the prior that it would have alone. A grey box without states, whose lags are whole samples, is trained
+    likewise: by its parameters, within their bounds and by their priors.
 
     Args:
         cascade: The start; its members have been fitted before.
@@ -42,6 +44,7 @@ def fit_cascade(
         trained: Outputs of the members that are trained; all by default.
         training: How to train.
         selection: Traces that choose among the states on the way, the start among them.
+        shared: Names of parameters of equations that are one wherever they stand.
         on_progress: Called after every iteration.
 
     Returns:
@@ -54,7 +57,7 @@ def fit_cascade(
     training = training or JointTraining()
     provider = training.provider(cascade, traces, unit_errors(cascade, traces, targets), trained)
     records = [_channels(cascade, trace) for trace in traces]
-    layout = JointLayout.of(provider.members, records)
+    layout = JointLayout.of(provider.members, records, shared)
     joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)
     return joint.fit([(None, layout.in_basis(provider.theta))])
 

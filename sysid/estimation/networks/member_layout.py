@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.least_squares.evidence import Group
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.models import Ends, Lags, Member
@@ -181,87 +180,3 @@ def basis_of(model: Member, layout: MemberLayout, records: Sequence[dict[str, ND
         rows.append(np.column_stack([z[depth - lag : depth - lag + n, column] for column, lag in pairs]))
     regressors = np.concatenate(rows)
     return RegressorBasis.incremental(layout.lags, regressors[:: 1 + len(regressors) // MAX_ROWS])
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class JointLayout:
-    """The members that are trained together, one after the other.
-
-    Args:
-        members: Their layouts.
-        to_plain: From parameters in the basis of training to plain ones: sparse, a block for each member.
-    """
-
-    members: tuple[MemberLayout, ...]
-    to_plain: scipy.sparse.csr_array
-
-    @classmethod
-    def of(cls, models: Sequence[Member], records: Sequence[dict[str, NDArray[np.float64]]]) -> JointLayout:
-        """The layout of some members.
-
-        Args:
-            models: The members that are trained, in the order of the parameters.
-            records: What their bases are scaled to; see :func:`basis_of`.
-
-        Returns:
-            The layout.
-        """
-        layouts, blocks = [], []
-        for model in models:
-            columns = ColumnRecursion.of(model)
-            if columns is not None:
-                layout = MemberLayout.of(model, columns)
-                basis = basis_of(model, layout, records)
-                layouts.append(layout)
-                blocks.append(layout.to_plain(basis))
-        return cls(members=tuple(layouts), to_plain=scipy.sparse.csr_array(scipy.sparse.block_diag(blocks)))
-
-    def in_basis(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Plain parameters as parameters in the basis.
-
-        Args:
-            theta: Plain parameters of all members, shape ``(n_parameters,)``.
-
-        Returns:
-            Same shape.
-        """
-        first, found = 0, []
-        for layout in self.members:
-            own = slice(first, first + layout.count)
-            found.append(np.linalg.solve(self.to_plain[own, own].toarray(), theta[own]))
-            first = own.stop
-        return np.concatenate(found)
-
-    def prior(self, *, alpha: float, beta: float) -> Prior:
-        """The prior a fit begins with, in the basis: every member's own groups.
-
-        Args:
-            alpha: Precision of every group.
-            beta: Precision of the residuals.
-
-        Returns:
-            The prior.
-        """
-        groups, first = [], 0
-        for layout in self.members:
-            groups += layout.groups(first)
-            first += layout.count
-        centre = self.in_basis(np.concatenate([layout.centre() for layout in self.members]))
-        return Prior(centre=centre, groups=tuple(groups), alphas=np.full(len(groups), alpha), beta=beta)
-
-    def draw(self, seed: int) -> NDArray[np.float64]:
-        """A random start, in the basis.
-
-        Args:
-            seed: Of the random numbers.
-
-        Returns:
-            Shape ``(n_parameters,)``.
-        """
-        rng = np.random.default_rng(seed)
-        centre = self.in_basis(np.concatenate([layout.centre() for layout in self.members]))
-        found, first = [], 0
-        for layout in self.members:
-            found.append(layout.draw(rng, centre[first : first + layout.count]))
-            first += layout.count
-        return np.concatenate(found)

@@ -27,8 +27,8 @@ class TrainedMembers:
         program: The members that are run, with all their parameters.
         plan: How they are laid out.
         depth: Rows of regressors that the program holds before the first sample.
-        places: For each trained member where its parameters stand among those of the program, and among those that are
-            trained.
+        places: For each trained member where its parameters stand in the program, among the weights of all and behind
+            these the registers of equations, and where among those that are trained.
         own_first: For each member that is run the first of its trained parameters; -1 where it has none.
         extent: For each output the parameters up to which its sensitivities are not zero.
         source: For each regressor the output that it holds; -1 for an input.
@@ -70,10 +70,10 @@ class TrainedMembers:
             )
         members = [_columns(model) for model in run]
         for model, columns, yes in zip(run, members, flags, strict=True):
-            if yes and columns.equation is not None:  # it reads and passes on, but its parameters are in its text
+            if yes and columns.equation is not None and columns.equation.free == slice(0, 0):
                 raise _cannot(model)
         program = program_of(members, [Ends.of(model) for model in run], cascade.wiring.channels, cascade.limits)
-        places = _places(members, flags)
+        places = _places(members, flags, program)
         output_of = {int(channel): i for i, channel in enumerate(program.output_channel)}
         source = np.array([output_of.get(int(channel), -1) for channel in program.regressor_channel], dtype=np.int64)
         own_first = np.full(len(run), -1, dtype=np.int64)
@@ -93,14 +93,19 @@ class TrainedMembers:
     @property
     def theta(self) -> NDArray[np.float64]:
         """The parameters that the trained members have, shape ``(n_parameters,)``."""
-        return np.concatenate([self.program.theta[whole] for whole, _ in self.places])
+        numbers = self._numbers
+        return np.concatenate([numbers[whole] for whole, _ in self.places])
 
     def program_at(self, theta: NDArray[np.float64]) -> Program:
         """The program with these parameters of the trained members."""
-        whole = self.program.theta.copy()
+        whole, n = self._numbers, len(self.program.theta)
         for place, own in self.places:
             whole[place] = theta[own]
-        return self.program._replace(theta=whole)
+        return self.program._replace(theta=whole[:n], equations=self.program.equations._replace(registers=whole[n:]))
+
+    @property
+    def _numbers(self) -> NDArray[np.float64]:
+        return np.concatenate([self.program.theta, self.program.equations.registers])
 
     def put(self, cascade: Cascade, theta: NDArray[np.float64]) -> Cascade:
         """The cascade with these parameters of the trained members."""
@@ -113,7 +118,7 @@ def with_theta(member: Member, theta: NDArray[np.float64]) -> Member:
     """A member with other parameters.
 
     Args:
-        member: An ARX model or a network of one or several outputs.
+        member: An ARX model, a network of one or several outputs, or an equation.
         theta: Its flat parameters, as its recursion has them.
 
     Returns:
@@ -160,20 +165,22 @@ def _cannot(model: Member) -> ConfigError:
     return ConfigError(
         "a member cannot be trained with the others, or lies between trained members and a target",
         where=str(model.mapping),
-        expected="ARX or NARX models from the first trained member on",
+        expected="ARX or NARX models, or equations with free parameters, from the first trained member on",
         got=model.structure.label,
         remedy="train only members downstream of it, or fit it as ARX or NARX",
     )
 
 
-def _places(members: Sequence[ColumnRecursion], trained: Sequence[bool]) -> tuple[tuple[slice, slice], ...]:
-    places, first, own = [], 0, 0
-    for columns, yes in zip(members, trained, strict=True):
-        n = len(columns.theta)
-        if yes:
-            places.append((slice(first, first + n), slice(own, own + n)))
-            own += n
-        first += n
+def _places(
+    members: Sequence[ColumnRecursion], trained: Sequence[bool], program: Program
+) -> tuple[tuple[slice, slice], ...]:
+    places, own, equations = [], 0, program.equations
+    for m in (m for m, yes in enumerate(trained) if yes):
+        is_equation = members[m].equation is not None
+        first = len(program.theta) + equations.free[m] if is_equation else program.theta_first[m]
+        n = int(equations.n_free[m] if is_equation else program.theta_first[m + 1] - first)
+        places.append((slice(int(first), int(first) + n), slice(own, own + n)))
+        own += n
     return tuple(places)
 
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
-from sysid.estimation.networks.member_layout import JointLayout, MemberLayout
+from sysid.estimation.networks.joint_layout import JointLayout
+from sysid.estimation.networks.member_layout import MemberLayout
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress
 from sysid.estimation.output_ends import ends_of_several, told

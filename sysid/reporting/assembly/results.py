@@ -249,6 +249,7 @@ class EquationRecord(Record):
     unit: str = Field(description="Of the output.")
     equation: str = Field(description="As fixed takes it, such as RL = relay(BP - AR, on=1.45, off=-0.985, slope=20).")
     instances: list[str] = Field(default=[""], description="What follows its channels' names at each of its places.")
+    parameters: dict[str, float] = Field(default={}, description="What was estimated in it, each in its unit.")
 
 
 class LimitExcess(Record):

@@ -211,9 +211,17 @@ def equation_table(found: Sequence[EquationRecord]) -> Table:
     rows: list[list[Value]] = [[one.equation, "" if one.unit == "1" else one.unit] for one in found]
     for row, one in zip(rows, found, strict=True) if several else ():
         row.append(", ".join(name or "nothing" for name in one.instances))
+    estimated = any(one.parameters for one in found)
+    for row, one in zip(rows, found, strict=True) if estimated else ():
+        row.append(", ".join(f"{name} = {value:.5g}" for name, value in one.parameters.items()))
     return plain_table(
         "What is known and fixed",
-        [("Equation", ""), ("Unit", "of what it gives"), *([("Instances", "its names end in")] if several else [])],
+        [
+            ("Equation", ""),
+            ("Unit", "of what it gives"),
+            *([("Instances", "its names end in")] if several else []),
+            *([("Estimated", "in its own unit")] if estimated else []),
+        ],
         rows,
         note="[k-1] is the value a sample before. As the pipeline has them: sysid equations PIPELINE.",
     )

@@ -7,10 +7,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sysid.composite import Composite, TrainingPlan
+from sysid.errors import ConfigError
 from sysid.field_checks import FieldError
 from sysid.models import Limit
+from sysid.models.grey_box import Parameter, parameters_from
 from sysid.workbench.assembly.extending import extending_schema
-from sysid.workbench.assembly.member_config import FixedConfig, MemberConfig, StandingConfig
+from sysid.workbench.assembly.member_config import FixedConfig, MemberConfig, ParametersField, StandingConfig
 from sysid.workbench.assembly.proof_config import InterpolationConfig, MonteCarloConfig, PublishedConfig
 from sysid.workbench.assembly.stage_config import (
     AblationConfig,
@@ -21,18 +23,27 @@ from sysid.workbench.assembly.stage_config import (
     check_rounds,
     names_in,
 )
+from sysid.workbench.fields import as_field_error
 from sysid.workbench.fits.config import ExportConfig
 from sysid.workbench.old_words import ASSEMBLY, STRICT, Words
 from sysid.workbench.stability import ExcursionConfig
 
 
 class LimitConfig(BaseModel):
-    """Values between which an output is held: a number in its unit, a channel, or an expression of channels."""
+    """Values between which an output is held: a number in its unit, a channel, or an expression of channels.
+
+    Args:
+        low: Least value; none where it is left out.
+        high: Greatest value; none where it is left out.
+        parameters: What of it is estimated: by name a start, or ``{start:, low:, high:, prior:, fixed:, unit:}``. Those
+            of ``fixed`` are known here as well.
+    """
 
     model_config = STRICT
 
     low: float | str | None = None
     high: float | str | None = None
+    parameters: ParametersField = Field(default_factory=dict)
 
 
 class AssemblyConfig(Words):
@@ -115,7 +126,14 @@ class AssemblyConfig(Words):
             fixed=tuple(one.fixed() for one in self.fixed),
             rest=self.rest,
             limits={name: Limit(low=one.low, high=one.high) for name, one in self.limits.items()},
+            parameters=self._limited_by,
         )
+
+    @property
+    def _limited_by(self) -> tuple[Parameter, ...]:
+        """The parameters of limits, each once if it is declared alike."""
+        known = (one for limit in self.limits.values() for one in parameters_from(limit.parameters))
+        return tuple(dict.fromkeys(known))
 
     @property
     def plan(self) -> TrainingPlan:
@@ -246,11 +264,16 @@ class AssemblyConfig(Words):
             if self.interpolation
             else (),
         }
-        named = {"retrain, members": self.retrain.members if self.retrain else ()}
+        try:
+            free = [one.output for one in self.composite.fixed if one.free]
+        except ConfigError as error:
+            raise as_field_error(error) from error
+        retrained = {"retrain, members": self.retrain.members if self.retrain else ()}
+        named: dict[str, tuple[str, ...]] = {}
         for stage, rounds in (("together", self.joint), ("active_learning, train", self.learning_rounds)):
             for field, names in names_in(rounds).items():
                 (named if field == "members" else asked)[f"{stage}, {field}"] = names
-        for known, places in ((written, asked), (bases, named)):
+        for known, places in ((written, asked), (bases, retrained), ([*bases, *free], named)):
             for where, names in places.items():
                 strangers = [name for name in names if name not in known]
                 if strangers:

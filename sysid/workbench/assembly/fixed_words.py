@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field
 from sysid.composite import FixedMember, equation_of, fixed_by_equations
 from sysid.errors import ConfigError
 from sysid.field_checks import Loc, Origins, check
-from sysid.workbench.assembly.member_config import TablesField
+from sysid.workbench.assembly.member_config import ParametersField, TablesField
 from sysid.workbench.old_words import STRICT
 from sysid.yaml_files import yaml_text
 
@@ -31,6 +31,8 @@ class FixedEquations(BaseModel):
         rest: Values at rest: one for all, or by output; 0 where none is given.
         unit: Units: one for all but switches and relays, or by output; a pure number where none is given.
         tables: By name the points ``[[x, y], ...]`` of functions that equations call.
+        parameters: What is estimated: by name a start, or ``{start:, low:, high:, prior:, fixed:, unit:}``. One that
+            several entries, or limits, name is declared alike in each entry, and is one.
     """
 
     model_config = STRICT
@@ -41,6 +43,7 @@ class FixedEquations(BaseModel):
     rest: float | dict[str, float] = 0.0
     unit: str | dict[str, str] = "1"
     tables: TablesField = Field(default_factory=dict)
+    parameters: ParametersField = Field(default_factory=dict)
 
 
 def one_by_one(entries: Sequence[Any], origins: Origins) -> list[tuple[Any, Loc]]:
@@ -72,7 +75,7 @@ def _members(entry: Mapping[str, Any], loc: Loc, origins: Origins) -> list[dict[
     try:
         members = fixed_by_equations(
             asked.equations, rest=asked.rest, unit=asked.unit, instances=asked.instances, shared=asked.shared,
-            tables=asked.tables,
+            tables=asked.tables, parameters=asked.parameters,
         )  # fmt: skip
     except ConfigError as error:
         place = origins.place((*loc, "equations"))
@@ -100,6 +103,7 @@ def plain_words(fixed: FixedMember) -> dict[str, Any]:
         "gains": {name: dict(one) if isinstance(one, Mapping) else one for name, one in fixed.gains.items()},
         "equation": fixed.equation,
         "tables": _points(fixed),
+        "parameters": _parameters(fixed),
         "constant": fixed.constant,
         "low": fixed.low,
         "high": fixed.high,
@@ -109,13 +113,18 @@ def plain_words(fixed: FixedMember) -> dict[str, Any]:
         "shared": list(fixed.shared),
     }
     usual = {
-        "gains": {}, "equation": "", "tables": {}, "constant": 0.0, "unit": "1", "instances": [""], "shared": [],
+        "gains": {}, "equation": "", "tables": {}, "parameters": {}, "constant": 0.0, "unit": "1", "instances": [""],
+        "shared": [],
     }  # fmt: skip
     return {name: value for name, value in words.items() if name not in usual or value != usual[name]}
 
 
 def _points(fixed: FixedMember) -> dict[str, list[list[float]]]:
     return {name: [list(point) for point in points] for name, points in fixed.points.items()}
+
+
+def _parameters(fixed: FixedMember) -> dict[str, Any]:
+    return {one.name: one.to_dict() for one in fixed.grey_box.named} if fixed.equation else {}
 
 
 def equations_text(members: Sequence[FixedMember]) -> str:
@@ -135,12 +144,20 @@ def equations_text(members: Sequence[FixedMember]) -> str:
             "instances": list(group[0].instances),
             "shared": list(group[0].shared),
             "tables": {name: points for one in group for name, points in _points(one).items()},
+            "parameters": {name: known for one in group for name, known in _parameters(one).items()},
             "unit": units if len(set(units.values())) > 1 else next(iter(units.values()), "1"),
             "rest": {
                 one.output: int(one.rest) if float(one.rest).is_integer() else one.rest for one in group if one.rest
             },
         }
-        usual: dict[str, Any] = {"instances": [""], "shared": [], "tables": {}, "unit": "1", "rest": {}}
+        usual: dict[str, Any] = {
+            "instances": [""],
+            "shared": [],
+            "tables": {},
+            "parameters": {},
+            "unit": "1",
+            "rest": {},
+        }
         given = {name: value for name, value in words.items() if value != usual[name]}
         head = yaml_text({**given, "equations": []}).splitlines()[:-1]  # what holds a list is never put on one line
         entry = [*head, "equations: |", *(f"  {equation_of(one)}" for one in group)]

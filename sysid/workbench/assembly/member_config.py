@@ -26,6 +26,9 @@ from sysid.workbench.old_words import STRICT, Words
 TablesField = dict[str, list[tuple[float, float]]]
 """Functions by their points."""
 
+ParametersField = dict[str, float | dict[str, Any]]
+"""What is estimated: by name a start, or ``{start:, low:, high:, prior:, fixed:, unit:}``."""
+
 
 class StandingConfig(Words):
     """One member, or the same in several instances.
@@ -138,6 +141,7 @@ class FixedConfig(StandingConfig):
             relay with hysteresis.
         equation: In the place of gains any expression of the inputs: ``max(BP, AR[k-1])*RL``.
         tables: By name the points ``[[x, y], ...]`` of functions that it calls.
+        parameters: What of it is estimated: by name a start, or ``{start:, low:, high:, prior:, fixed:, unit:}``.
         constant: What is added, in the output's unit.
         low: Least value; none where it is left out.
         high: Greatest value; none where it is left out.
@@ -150,6 +154,7 @@ class FixedConfig(StandingConfig):
     )
     equation: str = ""
     tables: TablesField = Field(default_factory=dict)
+    parameters: ParametersField = Field(default_factory=dict)
     constant: float = 0.0
     low: float = -math.inf
     high: float = math.inf
@@ -175,6 +180,7 @@ class FixedConfig(StandingConfig):
         """
         return FixedMember(
             **self.standing(),
-            gains=self.gains, equation=self.equation, tables=self.tables, constant=self.constant,
-            low=self.low, high=self.high, rest=self.rest, unit=self.unit,
+            gains=self.gains, equation=self.equation, tables=self.tables,
+            parameters=self.parameters, constant=self.constant, low=self.low, high=self.high, rest=self.rest,
+            unit=self.unit,
         )  # fmt: skip

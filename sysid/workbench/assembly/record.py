@@ -16,6 +16,7 @@ from sysid.composite.active_learning import ActiveLearned, Assessment
 from sysid.composite.fixed_equations import equation_of
 from sysid.composite.limits_held import Holding
 from sysid.composite.monte_carlo import MonteCarlo
+from sysid.composite.parameters import values_in
 from sysid.composite.round import TrainedRound
 from sysid.composite.training import TrainedComposite
 from sysid.models import Activity, Cascade
@@ -130,8 +131,9 @@ def assembly_results(
 
 
 def _equation(one: FixedMember, whole: Cascade) -> dict[str, Any]:
-    unit = whole.units.get(one.outputs[0], one.unit)
-    return {"output": one.output, "unit": unit, "equation": equation_of(one), "instances": list(one.instances)}
+    unit, values = whole.units.get(one.outputs[0], one.unit), values_in(whole)
+    found = {"output": one.output, "unit": unit, "equation": equation_of(one), "instances": list(one.instances)}
+    return found | {"parameters": {each.name: values[each.name] for each in one.free if each.name in values}}
 
 
 def write_signals(folder: Path, found: Outcome, outputs: Sequence[str], cases: TraceSet) -> None:
@@ -211,7 +213,7 @@ def _round(one: TrainedRound) -> dict[str, Any]:
         "selection_after": one.after,
         "status": fit.status.name,
         "attempts": [attempt.to_dict() for attempt in fit.attempts],
-        "notes": fit.notes,
+        "notes": [*fit.notes, *fit.told_of_equations],
     }
 
 

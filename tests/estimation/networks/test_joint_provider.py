@@ -14,7 +14,7 @@ from sysid.estimation.networks.joint_provider import BLOCK, CascadeProvider
 from sysid.models import Cascade, Limit
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace
-from tests.models.cascades import CASCADES, command, linear, network, service
+from tests.models.cascades import CASCADES, command, equation, linear, network, service
 from tests.models.test_cascade import lag
 
 
@@ -53,19 +53,40 @@ def test_some_members_alone_are_trained(trained):
     check(one)
 
 
-def test_what_an_equation_has_for_parameters_is_not_trained_with_the_others():
+def test_equations_are_trained_by_their_parameters_with_the_others():
     whole = CASCADES["equations in a circle"]
-    known = whole.member("x")
-    assert {member.mapping.output for member in provider(whole).members} == {"BP", "AR", "y", "BC"}
-    scaled = replace(known.grey, equations=f"{known.grey.equations} * k", parameters={"k": 1.0})
-    free = replace(known, grey=scaled, theta=[1.0])
-    for one, trained in ((whole, ("x",)), (whole.with_member(free), None)):
-        with pytest.raises(ConfigError, match="cannot be trained with the others"):
-            provider(one, trained=trained)
+    assert {member.mapping.output for member in provider(whole).members} == {"BP", "AR", "x", "y", "BC"}
+    alone = provider(whole, trained=("x",))
+    assert_array_equal(alone.theta, [0.9, 1.0])
+    assert alone.at([0.8, 1.1]).member("x").parameters == {"share": 0.8, "root": 1.1}
+    check(alone)
+    with pytest.raises(ConfigError, match="cannot be trained with the others"):
+        provider(whole, trained=("ER",))
+
+
+def test_the_sensitivities_of_parameters_equal_a_complex_step():
+    """A tank that an equation fills and a linear member empties, written once more in complex numbers."""
+    flow = equation("x = k*max(STP - p*BP[k-1], 0)^1.5/(1 + p)", "STP", "BP", free={"k": 0.4, "p": 0.7})
+    tank, n = linear("x -> BP"), 200
+    whole = Cascade(models=(flow, tank), limits={"x": Limit(high=80.0)})
+    one = provider(whole, n=n, trained=("x",), errors={"BP": 1.0, "x": 1.0})
+    (b0, b1, a1, a2), u = tank.coefficients, one.traces[0]["STP"]
+
+    def run(k: complex, p: complex) -> np.ndarray:
+        x, y = [0.0 + 0j], [90.0 + 0j] * 2
+        for t in range(n):
+            head = u[t] - p * y[-1]
+            filled = k * head**1.5 / (1 + p) if head.real > 0.0 else 0j
+            x.append(filled if filled.real < 80.0 else 80.0 + 0j)
+            y.append(b0 * x[-1] + b1 * x[-2] + a1 * y[-1] + a2 * y[-2])
+        return np.concatenate([y[2:], x[1:]])
+
+    expected = np.column_stack([run(0.4 + 1e-30j, 0.7), run(0.4, 0.7 + 1e-30j)]).imag / 1e-30
+    assert_allclose(one.jacobian(one.theta)[: 2 * n], expected, rtol=1e-9, atol=1e-9)
 
 
 def test_a_whole_of_equations_alone_has_nothing_to_train():
-    whole = CASCADES["equations in a circle"].upstream_of(["x"], given=("AR", "ER", "BP"))
+    whole = CASCADES["equations in a circle"].upstream_of(["ER"], given=("STP", "y", "BP", "x"))
     with pytest.raises(ConfigError, match="nothing is left to train"):
         provider(whole)
 

@@ -77,6 +77,11 @@ def test_what_is_known_stands_as_the_pipeline_has_it() -> None:
         ["RL = switch(BP - AR)", "", "nothing"],
     ]
     assert values(equation_table(known[1:])) == [["RL = switch(BP - AR)", ""]]
+    estimated = known[1].model_copy(update={"equation": "RL = switch(k*BP)", "parameters": {"k": 0.25}})
+    assert values(equation_table([known[1], estimated])) == [
+        ["RL = switch(BP - AR)", "", ""],
+        ["RL = switch(k*BP)", "", "k = 0.25"],
+    ]
 
 
 def test_each_side_of_a_limit_has_a_row(results: AssemblyResults) -> None:

@@ -93,6 +93,31 @@ def test_the_command_prints_what_is_read_as_the_same(tmp_path, capsys):
     assert refused.value.got == "kind: fits"
 
 
+def test_parameters_are_those_of_equations_and_limits_and_printed_as_the_same(tmp_path, capsys):
+    known = """\
+fixed:
+  - unit: cm
+    parameters: {k: {start: 0.1, low: 0.0}, on: 1.45}
+    equations: |
+      flow = k * sqrt(upper)
+      open = relay(upper - lower, on=on, off=-0.985, slope=20)
+"""
+    limits = "limits:\n  lower: {low: 0, high: edge + k*upper, parameters: {edge: {start: 9, unit: cm}}}\n"
+    text = PIPELINE.replace("limits:\n  lower: {low: 0}\n", limits)
+    given = config(tmp_path, text + known)
+    assert given.composite.free == ("k", "on", "edge")
+    assert [one.output for one in given.composite.fixed if one.free] == ["flow", "open", "lower high"]
+    validate(read_yaml(tmp_path / "tanks.yaml"), AssemblyConfig.model_json_schema())
+    equations_command(str(tmp_path / "tanks.yaml"))
+    assert config(tmp_path, text + capsys.readouterr().out) == given
+    named = text.replace("together:", "together:\n  members: [lower, flow, lower high]")
+    assert config(tmp_path, named + known).plan.rounds[0].members == ("lower", "flow", "lower high")
+    with pytest.raises(ConfigError, match="members names open"):
+        config(tmp_path, PIPELINE.replace("together:", "together:\n  members: [lower, open]") + EQUATIONS)
+    with pytest.raises(ConfigError, match="k is declared in two ways"):
+        config(tmp_path, text.replace("{edge:", "{k: 3, edge:") + known)
+
+
 BUILT_IN = [
     one
     for one in sorted(content_folders("pipelines")[0].glob("*.yaml"))

@@ -1,21 +1,23 @@
-"""What a fit of a grey box says of its parameters: their intervals, and what the records leave open."""
+"""What a fit says of the parameters of equations: their intervals, and what the records leave open."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from sysid.estimation.grey_box.named import Named
-from sysid.estimation.grey_box.profile import Profile
-from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import Solution
+from sysid.estimation.named import Named
 from sysid.estimation.uncertainty import Uncertainty
+
+if TYPE_CHECKING:
+    from sysid.estimation.grey_box.profile import Profile
 
 Array = NDArray[np.float64]
 
@@ -44,12 +46,24 @@ EVIDENCE_STEPS = 3
 """Steps of the evidence of a fit that ended before its first."""
 
 
-def with_evidence(solution: Solution, provider: EquationProvider) -> Solution:
+class Scaled(Protocol):
+    """What is trained: in which scales, and between which bounds."""
+
+    @property
+    def scale(self) -> Array:
+        """Of each parameter, in its unit."""
+
+    @property
+    def bounds(self) -> tuple[Array, Array] | None:
+        """Of each, over its scale."""
+
+
+def with_evidence(solution: Solution, n_samples: int) -> Solution:
     """A solution with its evidence, where it converged before there was any.
 
     Args:
         solution: Where the fit ended.
-        provider: The records.
+        n_samples: How many residuals there are.
 
     Returns:
         The solution.
@@ -59,7 +73,7 @@ def with_evidence(solution: Solution, provider: EquationProvider) -> Solution:
     state = solution.state
     prior, evidence = state.prior, state.evidence
     for _ in range(EVIDENCE_STEPS):
-        prior, evidence = update(prior, state.theta, state.at, provider.n_samples)
+        prior, evidence = update(prior, state.theta, state.at, n_samples)
     return replace(solution, state=replace(state, prior=prior, evidence=evidence))
 
 
@@ -83,14 +97,12 @@ class Findings:
     profiles: Sequence[Profile] = ()
 
     @classmethod
-    def of(
-        cls, solution: Solution, provider: EquationProvider, named: tuple[Named, ...], *, built: bool = False
-    ) -> Findings:
+    def of(cls, solution: Solution, trained: Scaled, named: tuple[Named, ...], *, built: bool = False) -> Findings:
         """What a solution says.
 
         Args:
             solution: Where the fit ended, with its evidence.
-            provider: The records.
+            trained: What is trained.
             named: Those that were estimated.
             built: Whether nobody wrote the equations: what has a prior there is a scale between blocks that no record
                 can tell, by construction. The others are told for that scale.
@@ -99,8 +111,10 @@ class Findings:
             The findings. A parameter at a bound is taken to be there for the others' sake, and has no interval.
         """
         prior, places = solution.state.prior, np.array([one.place for one in named], dtype=np.int64)
-        low, high = (side[places] for side in provider.bounds)
-        theta, scale = solution.theta[places], provider.scale[places]
+        whole = solution.theta
+        bounds = trained.bounds or (np.full(len(whole), -np.inf), np.full(len(whole), np.inf))
+        low, high = (side[places] for side in bounds)
+        theta, scale = whole[places], trained.scale[places]
         at = ["low" if t <= a else "high" if t >= b else "" for t, a, b in zip(theta, low, high, strict=True)]
         at = ["scale" if built and one.parameter.prior is not None else s for one, s in zip(named, at, strict=True)]
         held = np.zeros(len(solution.theta), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""Parameters with a name as they are trained: once where all cases share one, once for each case where they differ."""
+"""Parameters with a name as they are trained: once where all share one, once for each case where they differ."""
 
 from __future__ import annotations
 
@@ -6,6 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sysid.models.grey_box import GreyBox, Parameter
+
+FLAT_ALPHA = 1e-10
+"""Precision of what nothing is known of, in scaled numbers: a hundred thousand times its scale is ordinary."""
+
+
+def precision_of(parameter: Parameter) -> float:
+    """What is known of a parameter before the data, in scaled numbers."""
+    return FLAT_ALPHA if parameter.prior is None else (parameter.scale / parameter.prior) ** 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,7 +23,7 @@ class Named:
     Args:
         parameter: What is known of it.
         place: Where it stands in what is trained.
-        case: The case whose value it is; empty where all share one.
+        case: The case whose value it is, or the output whose equation has one of its own; empty where all share one.
     """
 
     parameter: Parameter
