@@ -332,7 +332,7 @@ class _MemberTwin(EquationTwin):
     """An equation of a cascade at one sample, of what every channel was before."""
 
     def __init__(self, model: GreyBoxModel, seen: dict[str, list[float]]) -> None:
-        super().__init__(model, np.empty(0, dtype=np.complex128))
+        super().__init__(model, model.theta.astype(np.complex128))
         self.seen = seen
         self.memory = {}
 
