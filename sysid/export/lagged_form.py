@@ -123,11 +123,12 @@ class LaggedForm:
         return all(1 in own for own in self.lags[self.n_inputs :])
 
 
-def lowered_form(model: Member) -> LaggedForm | StateSpaceForm | ProgramForm:
+def lowered_form(model: Member, *, spare: bool = False) -> LaggedForm | StateSpaceForm | ProgramForm:
     """A model, lowered to whichever kind it is.
 
     Args:
         model: The model.
+        spare: Whether equations without states have a number all the same.
 
     Returns:
         The lowered form.
@@ -144,14 +145,15 @@ def lowered_form(model: Member) -> LaggedForm | StateSpaceForm | ProgramForm:
             got="a model of several cases",
             remedy='export its fit, or model.with_case_inputs(), or model.for_case("run1")',
         )
+    if isinstance(form, EquationForm):
+        return ProgramForm(ends=model.ends, lowered=form, spare=spare and not form.lowered.states)
     lowered = HIDDEN.get(type(form))
     return LaggedForm.of(model) if lowered is None else lowered(form, model.ends)
 
 
-HIDDEN: dict[type, Callable[..., StateSpaceForm | ProgramForm]] = {
+HIDDEN: dict[type, Callable[..., StateSpaceForm]] = {
     StateSpace: StateSpaceForm.linear,
     NeuralForm: StateSpaceForm.neural,
     NeuralEnsemble: StateSpaceForm.ensemble,
-    EquationForm: lambda form, ends: ProgramForm(ends=ends, lowered=form),
 }
-"""Forms with hidden states, and what they become; every other form is lagged."""
+"""Forms that are state spaces, and what they become; those that are no equations either are lagged."""

@@ -149,11 +149,12 @@ class EquationState:
         }
 
 
-def layout_of(model: Member) -> StateLayout | HiddenState | EquationState:
+def layout_of(model: Member, *, spare: bool = False) -> StateLayout | HiddenState | EquationState:
     """The layout of a model's state, whatever it lowers to.
 
     Args:
         model: The model.
+        spare: Whether equations without states have a number all the same.
 
     Returns:
         Delay lines, the state of a state space, or that of equations.
@@ -161,7 +162,7 @@ def layout_of(model: Member) -> StateLayout | HiddenState | EquationState:
     Raises:
         ConfigError: If it lowers to none of them.
     """
-    form = lowered_form(model)
+    form = lowered_form(model, spare=spare)
     if isinstance(form, ProgramForm):
         return EquationState(form=form)
     return HiddenState(form=form) if isinstance(form, StateSpaceForm) else StateLayout.of_form(form)

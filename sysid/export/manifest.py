@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
-from sysid.export.layout import EquationState, HiddenState
+from sysid.export.layout import HiddenState
 from sysid.export.parity import Parity, ParityCase
 from sysid.export.stage import Port, Range, Stage
 from sysid.export.surrogate import Surrogate
@@ -336,7 +336,7 @@ def _initialisation(surrogate: Surrogate, example: Trace) -> dict[str, Any]:
     first = surrogate.inputs_of(example)[0]
     lines = "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale"
     spaces = [stage for stage in surrogate.stages if isinstance(stage.state, HiddenState)]
-    equations = any(isinstance(stage.state, EquationState) for stage in surrogate.stages)
+    equations = any(stage.searched for stage in surrogate.stages)
     levels = surrogate.levels(first).tolist()
     return {
         "rule": lines

@@ -117,10 +117,12 @@ class ProgramForm:
     Args:
         ends: Names, units and values at rest of what goes in and comes out.
         lowered: What the model runs.
+        spare: Whether it has a state that is always 0: files want one number beside past samples of inputs.
     """
 
     ends: Ends
     lowered: EquationForm
+    spare: bool = False
 
     low = -math.inf
     """Lower bound of the output: none."""
@@ -148,7 +150,7 @@ class ProgramForm:
     def updates(self) -> Listing:
         """``g``."""
         if not self.lowered.lowered.states:
-            return Listing(instructions=(), results=(0.0,))
+            return Listing(instructions=(), results=(0.0,) * self.spare)
         return Listing.of(self.lowered.lowered.updates, self.lowered)
 
     @cached_property
@@ -168,8 +170,8 @@ class ProgramForm:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states; files want one number at least, which is 0 where there are none."""
-        return self.lowered.lowered.states or ("none",)
+        """Names of the states."""
+        return self.lowered.lowered.states or ("none",) * self.spare
 
     @property
     def n_state(self) -> int:
@@ -236,13 +238,13 @@ class ProgramForm:
         """Of each state where a record begins that begins at rest; ``None`` for one that is where nothing changes."""
         terms = self.lowered.terms
         if not self.lowered.lowered.states:
-            return (0.0,)
+            return (0.0,) * self.spare
         levels = terms.held(terms.level)
         return tuple(float(level) if known else None for level, known in zip(levels, terms.declared, strict=True))
 
     def state_after(self, history: History) -> NDArray[np.float64]:
         """The states after some samples, as the model finds them, shape ``(n_states,)``."""
-        return self.lowered.state(history) if self.lowered.lowered.states else np.zeros(1)
+        return self.lowered.state(history) if self.lowered.lowered.states else np.zeros(self.n_state)
 
     @property
     def searches(self) -> bool:

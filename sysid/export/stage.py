@@ -102,6 +102,7 @@ class Stage:
         doubts: For each of its outputs whether being at a limit says that the answer is in doubt; that is always told.
         first: Where its state begins in the state of the whole.
         first_remainder: Where its remainders begin among those of the whole, in float32.
+        spare: Whether it has the one number that a whole has whose stages have no state.
     """
 
     model: Member
@@ -112,16 +113,17 @@ class Stage:
     doubts: tuple[bool, ...]
     first: int
     first_remainder: int
+    spare: bool = False
 
     @cached_property
     def form(self) -> LaggedForm | StateSpaceForm | ProgramForm:
         """What is written."""
-        return lowered_form(self.model)
+        return lowered_form(self.model, spare=self.spare)
 
     @cached_property
     def state(self) -> StateLayout | HiddenState | EquationState:
         """The layout of its own state, counted from ``first``."""
-        return layout_of(self.model)
+        return layout_of(self.model, spare=self.spare)
 
     @property
     def lagged(self) -> tuple[LaggedForm, StateLayout]:
@@ -166,6 +168,12 @@ class Stage:
         )
 
     @property
+    def searched(self) -> EquationState | None:
+        """The layout of equations that have states; ``None`` for any other model."""
+        state = self.state
+        return state if isinstance(state, EquationState) and state.form.n_state else None
+
+    @property
     def remainders(self) -> int:
         """Numbers more in its state in float32: what rounding took from its newest numbers, for the next step."""
         if isinstance(self.form, StateSpaceForm | ProgramForm):
@@ -200,6 +208,7 @@ def stages_of(
     columns = {name: i for i, name in enumerate(wiring.channels)}
     stages: list[Stage] = []
     first = remainder = 0
+    forgets = all(isinstance(form := lowered_form(one), ProgramForm) and not form.n_state for one in models)
     for model in models:
         ends = lowered_form(model).ends
         stage = Stage(
@@ -211,6 +220,7 @@ def stages_of(
             doubts=tuple(limits.get(name, Limit()).doubt for name in ends.outputs),
             first=first,
             first_remainder=remainder,
+            spare=forgets and not stages,
         )
         stages.append(stage)
         first, remainder = first + stage.state.size, remainder + stage.remainders

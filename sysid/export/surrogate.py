@@ -19,7 +19,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from sysid.errors import ConfigError
 from sysid.export.lagged_form import lowered_form
-from sysid.export.layout import DelayLine, EquationState, HiddenState
+from sysid.export.layout import DelayLine, HiddenState
 from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
 from sysid.models import AbstractModel, Cascade
 from sysid.models.form import unheeded
@@ -311,7 +311,7 @@ class Surrogate:
             "lines": [line.to_dict() for line in self.lines],
             "remainders_float32": self.remainders,
         }
-        equations = [(stage.first, stage.state) for stage in self.stages if isinstance(stage.state, EquationState)]
+        equations = [(stage.first, stage.searched) for stage in self.stages if stage.searched]
         if spaces:
             text["state_spaces"] = [{"first": at, **state.to_dict()} for at, state in spaces]
         if equations:

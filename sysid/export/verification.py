@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from sysid.export.exporter import ExportedFile, Kind
 from sysid.export.flags import expected_flags
-from sysid.export.layout import EquationState
 from sysid.export.parity import Allowed, ParityCase
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import render
@@ -60,7 +59,7 @@ def write_verification(
         "allowed": ", ".join(map(repr, allowed["float64"].each.tolist())),
         "allowed_float32": ", ".join(map(repr, allowed["float32"].each.tolist())),
     }
-    if any(isinstance(stage.state, EquationState) for stage in surrogate.stages):
+    if any(stage.searched for stage in surrogate.stages):
         begins = {name: surrogate.at_rest(inputs[0]).tolist() for name, (inputs, _) in records.items()}
         texts["states.json"] = (json.dumps(begins, indent=1) + "\n", "the state before each record, at rest")
     networks = [file for file in files if file.name.endswith(".onnx") and file.kind is Kind.SEQUENCE]

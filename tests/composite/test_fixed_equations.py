@@ -127,8 +127,7 @@ def test_a_relay_switches_where_it_says():
 
 def test_with_parameters_or_channels_for_numbers_it_is_the_same():
     """A sum with numbers, an expression with names; what is bounded, delayed and summed likewise."""
-    values = np.random.default_rng(3).normal(scale=2.0, size=(300, 2)) + [0.0, 2.0]
-    values[:, 1] = 2.0
+    values = np.column_stack([np.random.default_rng(3).normal(scale=2.0, size=300), np.full(300, 2.0)])
     trace = Trace(name="t", sample_time=0.1, channels=tuple(Channel(name=n, unit="1") for n in "ab"), values=values)
     text = "r = relay(a, on=2, off=-1, slope=3); y = clamp(0.5*a - 0.25, -1, 2); z[k+1] = 0.5*z[k] + 2*a[k]"
     named = "r = relay(a, on=b, off=p, slope=3); y = clamp(q*a - 0.25, p, b); z[k+1] = q*z[k] + 2*a[k]"

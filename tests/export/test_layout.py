@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sysid.export import StateLayout
+from sysid.export import StateLayout, Surrogate
 from sysid.models import NARX, History
+from tests.export.cascades import build_equations, wired_equation
 
 
 def test_lines_are_as_long_as_each_channels_longest_lag(narx):
@@ -59,3 +60,11 @@ def test_columns_are_where_samples_stand(model):
     for channel, own in enumerate((*model.recursion.lags.inputs, model.recursion.lags.output)):
         for lag in own:
             assert names[layout.column(channel, lag)] == f"{layout.lines[channel].channel}-{lag}"
+
+
+def test_equations_add_past_samples_alone_to_the_state_of_a_whole():
+    surrogate = Surrogate.of(build_equations(), {})
+    assert surrogate.state_size == sum(line.length for line in surrogate.lines)
+    assert "equations" not in surrogate.state_text()
+    alone = Surrogate.of(wired_equation("TOP = max(BP, STP[k-2])", "BP", "STP"), {})
+    assert (alone.state_size, alone.state_text()["equations"][0]["names"]) == (3, ["none"])
