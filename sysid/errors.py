@@ -173,10 +173,19 @@ class ParityError(SysidError):
         tolerance: What was allowed, in the same unit.
         unit: The output's unit.
         coarse: Whether the file computes in float32, whose rounding a model may make too much of.
+        grown: How many times larger the model makes a difference; 0 where that is not the reason.
     """
 
     def __init__(
-        self, file: str, case: str, difference: float, tolerance: float, unit: str, *, coarse: bool = False
+        self,
+        file: str,
+        case: str,
+        difference: float,
+        tolerance: float,
+        unit: str,
+        *,
+        coarse: bool = False,
+        grown: float = 0.0,
     ) -> None:
         self.difference = difference
         self.tolerance = tolerance
@@ -185,7 +194,11 @@ class ParityError(SysidError):
             where=f"case {case}",
             expected=f"a largest difference of at most {tolerance:g} {unit}",
             got=f"{difference:g} {unit}",
-            remedy="nothing was published: a model may make more of rounding to float32 than is allowed. Leave this "
+            remedy=f"nothing was published: this model makes {grown:.2g} times as much of a difference in the last "
+            "digit, which no two programs round alike. Its states are told by next to nothing: fit fewer, fit the free "
+            "run (noise: false), or leave out an output that is made of others"
+            if grown
+            else "nothing was published: a model may make more of rounding to float32 than is allowed. Leave this "
             "format out (those in float64 are exact), allow more (tolerance), or fit a model that forgets faster"
             if coarse
             else "the file was not published; please report this with the bundle's model.json",

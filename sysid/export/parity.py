@@ -31,6 +31,9 @@ DISTURBANCE = 1e-6
 """Change of the output before the first sample, as a share of its scale, by which amplification is measured: far
 above rounding, far below what would reach a network's bends."""
 
+LOST = 1e6
+"""Amplification from which a difference in the last digit may be as large as what is allowed."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParityCase:
@@ -312,7 +315,11 @@ def check_parity(
             row, column = divmod(int(ratios.argmax()), ratios.shape[1])
             each, port = float(allowed.each[column]), outputs[column]
             found_there = float(found[row, column])
-            raise ParityError(file.name, runs[row].name, found_there, each, port.unit, coarse=file.dtype == "float32")
+            coarse, grown = file.dtype == "float32", runs[row].amplification
+            raise ParityError(
+                file.name, runs[row].name, found_there, each, port.unit, coarse=coarse,
+                grown=grown if not coarse and grown > LOST else 0.0,
+            )  # fmt: skip
     every = np.concatenate([differences, drawn])
     near = int((every / allowed.each).max(axis=0).argmax())
     return Parity(

@@ -15,6 +15,12 @@ from sysid.kernels import innovations as kernel
 
 Array = NDArray[np.float64]
 
+_CLEARLY, _EDGE = 10.0, 1e-3
+"""How many times smaller numbers have to get for other coordinates; and how far from the unit circle poles are taken to
+stand when those are looked for."""
+_TINY, _TOGETHER = 1e-100, 1e12
+"""What no number is divided by; and how nearly alike modes may be to be told apart."""
+
 _NAMES = ("A", "B", "C", "D", "K", "constant")
 
 
@@ -182,20 +188,62 @@ class Innovations:
         Returns:
             The system; as it is where a state is neither reached nor seen, or the Gramians cannot be computed.
         """
-        A, n = self.predictor, self.n_state
-        if n == 0 or spectral_radius(A) >= 1.0:
+        if self.n_state == 0 or spectral_radius(self.predictor) >= 1.0:
             return self
         drive = np.concatenate([self.B - self.K @ self.D, self.K], axis=1)
+        return self.in_coordinates(*self._balance(self.predictor, drive))
+
+    def steady(self) -> tuple[Array, Array] | None:
+        """Coordinates in which a free run loses no digits.
+
+        Of a record with hardly any noise the predictor forgets at once what the system keeps for long: balanced for the
+        one, the matrices of the other have entries of thousands that cancel in each step.
+
+        Returns:
+            ``T`` and its inverse, for :meth:`in_coordinates`; ``None`` where they are hardly better, or cannot be
+            computed.
+        """
+        if not self.n_state or not np.isfinite(self.entries).all():
+            return None
+        poles, vectors = scipy.linalg.eig(self.A)
+        kept = [k for k, pole in enumerate(poles) if pole.imag >= 0.0]
+        parts = [part for k in kept for part in (vectors[:, k].real, vectors[:, k].imag)[: 1 + bool(poles[k].imag)]]
+        try:
+            back = np.column_stack(parts)
+            if not np.linalg.cond(back) < _TOGETHER:
+                return None
+            T = np.linalg.inv(back)
+            # Each mode is driven as much as it is seen: enough where one is so little of either that it stays so.
+            reached, seen = np.linalg.norm(T @ self.B, axis=1), np.linalg.norm(self.C @ back, axis=0)
+            size = np.sqrt(np.maximum(seen, _TINY) / np.maximum(reached, _TINY))
+            T, back = size[:, np.newaxis] * T, back / size
+            modal = self.in_coordinates(T, back)
+            U, V = modal._balance(modal.A * ((1.0 - _EDGE) / max(1.0, self.radius)), modal.B)
+            T, back = U @ T, back @ V
+        except np.linalg.LinAlgError:
+            return None
+        better = _CLEARLY * self.in_coordinates(T, back)._cancelling < self._cancelling
+        return (T, back) if better else None
+
+    @property
+    def _cancelling(self) -> float:
+        """How large the numbers are whose sums a free run is."""
+        across = float(np.linalg.norm(self.B) * np.linalg.norm(self.C))
+        return max(float(np.linalg.norm(self.A)), across)
+
+    def _balance(self, A: Array, drive: Array) -> tuple[Array, Array]:
+        """Coordinates in which a stable matrix with these drives and the outputs is balanced, and back; or none."""
+        none = np.eye(self.n_state)
         try:
             P = _root(_gramian(A, drive @ drive.T))
             Q = _root(_gramian(A.T, self.C.T @ self.C))
             U, sizes, Vt = scipy.linalg.svd(Q.T @ P)
             if not sizes[-1] > 1e-12 * sizes[0]:
-                return self
+                return none, none
             # Both directions come from the factors: nothing is inverted but the singular values.
-            return self.in_coordinates((U / np.sqrt(sizes)).T @ Q.T, P @ Vt.T / np.sqrt(sizes))
+            return (U / np.sqrt(sizes)).T @ Q.T, P @ Vt.T / np.sqrt(sizes)
         except (np.linalg.LinAlgError, ValueError):
-            return self
+            return none, none
 
 
 def spectral_radius(A: Array) -> float:

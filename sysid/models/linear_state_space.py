@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
@@ -22,7 +23,7 @@ from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
 from sysid.models.scaling import Scaling, VectorScaling
-from sysid.models.state_space import StateSpace
+from sysid.models.state_space import Filter, StateSpace
 from sysid.models.structure import AbstractStructure
 from sysid.models.to_control import Matrices, state_space
 
@@ -170,12 +171,26 @@ class _StateSpaceModel(InnovationModel):
     @cached_property
     def recursion(self) -> StateSpace:
         """The form that is run."""
-        return StateSpace.of(self.lowered, self.scaling, noise=self.orders.noise)
+        form = StateSpace.of(self.lowered, self.scaling, noise=self.orders.noise)
+        if self._steady is None:
+            return form
+        late = self.orders.shifts(len(self.mapping.inputs))
+        T, back = (scipy.linalg.block_diag(part, np.eye(sum(late))) for part in self._steady)
+        return replace(form, filter=Filter(system=self.system.behind(late), towards=T, back=back))
 
     @cached_property
     def lowered(self) -> Innovations:
-        """The system with the dead times among its states."""
-        return self.system.behind(self.orders.shifts(len(self.mapping.inputs)))
+        """The system with the dead times among its states, as it is run freely."""
+        return self._run_freely.behind(self.orders.shifts(len(self.mapping.inputs)))
+
+    @cached_property
+    def _steady(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Coordinates for free runs, where those of the fit lose digits there, and back."""
+        return self.system.steady() if self.orders.noise else None
+
+    @property
+    def _run_freely(self) -> Innovations:
+        return self.system if self._steady is None else self.system.in_coordinates(*self._steady)
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -374,7 +389,7 @@ def continuous_form(model: _StateSpaceModel) -> ContinuousStateSpace:
     Raises:
         ConfigError: If a pole is zero or lies on the negative real axis.
     """
-    system, late = model.system, model.orders.shifts(len(model.mapping.inputs))
+    system, late = model._run_freely, model.orders.shifts(len(model.mapping.inputs))
     remedy = (
         "fit fewer states, or a continuous transfer function (domain: continuous): such a pole mostly describes noise"
     )

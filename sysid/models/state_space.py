@@ -29,6 +29,21 @@ AT_ONE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Filter:
+    """A system in the coordinates in which its predictor loses no digits, where those of a free run are others.
+
+    Args:
+        system: In these coordinates.
+        towards: From its state to the one of a free run.
+        back: The inverse.
+    """
+
+    system: Innovations
+    towards: NDArray[np.float64]
+    back: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class StateSpace(AbstractForm):
     r"""``x(t+1) = A x(t) + B u(t)``, ``y(t) = C x(t) + D u(t) + c`` in scaled numbers.
 
@@ -64,6 +79,7 @@ class StateSpace(AbstractForm):
     low: float = -np.inf
     high: float = np.inf
     K: NDArray[np.float64] | None = None
+    filter: Filter | None = None
     predicts: bool = field(default=False, init=False)
 
     @classmethod
@@ -189,6 +205,8 @@ class StateSpace(AbstractForm):
         Returns:
             Shape ``(n_state,)``.
         """
+        if self.filter is not None:
+            return self.filter.towards @ self.filter.system.standing(inputs, output)
         drive = self.B @ inputs + self.gain @ (output - self.D @ inputs - self.constant)
         return np.asarray(scipy.linalg.lstsq(np.eye(self.n_state) - self.A + self.gain @ self.C, drive, cond=AT_ONE)[0])
 
@@ -211,7 +229,9 @@ class StateSpace(AbstractForm):
         measured = self._scaled(np.asarray(output, dtype=np.float64))
         x = self._filtered(history)
         start = x.copy()
-        X, _ = self._tracked(scaled, measured, x)
+        X, y = self._tracked(scaled, measured, x)
+        if min(steps, n) <= 1:
+            return self._in_units(y)
         moved = scaled @ self.B.T
         for _ in range(min(steps, n) - 1):
             X[1:] = X[:-1] @ self.A.T + moved[:-1]
@@ -231,6 +251,11 @@ class StateSpace(AbstractForm):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The filter's states and predictions over some scaled samples; ``x`` becomes the state after them."""
         states, predicted = np.empty((len(scaled), self.n_state)), np.empty((len(scaled), self.n_outputs))
+        if self.filter is not None:
+            z = self.filter.back @ x
+            predicted, states = self.filter.system.predicted(scaled, output, z)
+            x[:] = self.filter.towards @ z
+            return states @ self.filter.towards.T, predicted
         matrices = (self.A, self.B, self.C, self.D, self.gain, self.constant)
         innovations.predict(*matrices, scaled, np.ascontiguousarray(output), x, states, predicted)
         return states, predicted

@@ -40,7 +40,8 @@ class TransferFunction(AbstractStructure):
         poles: Number of poles.
         zeros: Number of zeros, at most that of the poles.
         delays: Dead time in samples; ``None``, or ``"auto"``, to search for it. A discrete transfer function without
-            dead time reacts to its input at once, and one that is sampled from a plant has a dead time of at least 1.
+            dead time reacts to its input at once, and one that is sampled from a plant has a dead time of at least 1:
+            none is found only where that leaves clearly less, and is told.
         domain: ``discrete``: ``B(1/q) / F(1/q)``, where ``zeros`` is the degree of ``B``; or ``continuous``:
             ``B(s) / F(s)``, its input held between samples.
         intercept: Fit a constant output beside them.

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy import signal
 
+import sysid
+from sysid.models import History
 from sysid.models.innovations import Innovations
 from sysid.models.linear_state_space import polynomials
 
@@ -50,3 +53,27 @@ def test_it_is_the_same_after_json() -> None:
     again = Innovations.from_dict(one.to_dict())
     for name in ("A", "B", "C", "D", "K", "constant"):
         np.testing.assert_array_equal(getattr(again, name), getattr(one, name))
+
+
+def test_a_free_run_keeps_its_digits_where_hardly_any_noise_was_seen() -> None:
+    # A pendulum without noise: a predictor that forgets at once, of a system that keeps what it has.
+    N, x = 300, np.zeros(2)
+    u = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, (2, N // 5))[1], 5)
+    y = np.zeros((N, 2))
+    for k in range(N):
+        y[k] = x
+        x = x + 0.05 * np.array([x[1], -4.0 * np.sin(x[0]) - 0.4 * x[1] + 2.0 * u[k]])
+    fit = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y1+y2", sysid.VectorStateSpace(states=3))
+    form = fit.model.recursion
+    assert np.linalg.norm(fit.model.system.A) > 100.0
+    assert np.linalg.norm(form.A) < 3.0
+    assert np.linalg.norm(form.B) * np.linalg.norm(form.C) < 3.0
+    inputs = u[:, np.newaxis]
+    history = History(inputs=inputs[:30], output=y[:30])
+    free = fit.model.simulate(inputs[30:], history) - y[30:]
+    assert (np.sqrt(np.mean(free**2, axis=0)) < 0.15 * y.std(axis=0)).all()
+    one = fit.model.predict(inputs[30:], y[30:], history) - y[30:]
+    assert (np.sqrt(np.mean(one**2, axis=0)) < 1e-2 * y.std(axis=0)).all()
+    gain = (form.C @ np.linalg.solve(np.eye(3) - form.A, form.B)).ravel()
+    system = fit.model.system
+    assert gain == pytest.approx((system.C @ np.linalg.solve(np.eye(3) - system.A, system.B)).ravel(), abs=2e-3)

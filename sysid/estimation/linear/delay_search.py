@@ -5,12 +5,21 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from sysid.estimation.nonparametric.dead_time import AROUND, descend
 
 FEW = 4
 """Dead times up to which every combination is tried, whatever a correlation says."""
 MOST_COMBINATIONS = 30
 """Combinations of dead times up to which all are tried; above, one input at a time."""
+LITTLE, LESS, CHANCE = 1e-4, 0.2, 20.0
+"""Part of a constant's loss from which an error is worth an explanation; part of a loss that a response within the
+sample must take away to be taken for one; and how much less, in twice the log likelihood, chance does not do."""
+READ_BACKWARDS = (
+    "The output answers within the sample: a dead time of 0 leaves clearly less than 1. Where a controller sets the "
+    "input from the output of its own sample, this is the controller read backwards: give delays: 1 then."
+)
 
 
 def searched_delays(
@@ -57,3 +66,34 @@ def searched_delays(
         f"The dead time of {max(best)} samples is the longest that was tried: the true one may be longer. Longer "
         "records, or max_delay, allow more.",
     )
+
+
+def without_dead_time(
+    delays: tuple[int, ...],
+    least: int,
+    loss_at: Callable[[tuple[int, ...], int], float],
+    constant: tuple[float, int],
+) -> tuple[int, ...]:
+    """Dead times where those inputs have none that clearly act within the sample.
+
+    One that is sampled from a plant does not, and a dead time of 0 costs a coefficient at the other end: it has to pay.
+
+    Args:
+        delays: The dead times with the least loss.
+        least: The shortest of the search.
+        loss_at: As for :func:`searched_delays`.
+        constant: The loss of a constant, and how many samples it is of.
+
+    Returns:
+        The dead times.
+    """
+    scale, count = constant
+    best, loss = delays, loss_at(delays, max(delays))
+    for j, delay in enumerate(delays):
+        if delay != least or loss <= LITTLE * scale:
+            continue
+        trial = (*best[:j], 0, *best[j + 1 :])
+        less = loss_at(trial, max(delays))
+        if less < (1.0 - LESS) * loss and count * np.log(loss / max(less, LITTLE**2 * scale)) > CHANCE:
+            best, loss = trial, less
+    return best

@@ -11,10 +11,12 @@ import numpy as np
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of
+from sysid.estimation.informative import informative
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.delay_search import without_dead_time
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.records import TimeRecord
@@ -24,6 +26,8 @@ from sysid.estimation.linear.transfer_function_search import AbstractProblem
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
+from sysid.estimation.nonparametric.feedback import find_feedback
+from sysid.estimation.nonparametric.segments import Segment
 from sysid.estimation.result import FitResult
 from sysid.models import AbstractModel, Domain, Mapping, Scaling, Start, TransferFunction, TransferFunctionModel
 from sysid.traces import Trace
@@ -179,6 +183,24 @@ class _Problem(AbstractProblem):
             most = min(most, max(map(_third, self.experiments)))
         return 0 if self.orders.domain is Domain.CONTINUOUS else min(1, most), most
 
+    def direct(self, delays: tuple[int, ...]) -> tuple[int, ...]:
+        """None where an input clearly acts within the sample and no controller sets one there; see the base class."""
+        if 1 not in delays:
+            return delays
+        targets = [e.output[rows] for e in self.experiments for rows in _counted(e)]
+        whole = self.scaling.scale_output(np.concatenate(targets))
+        constant = 0.5 * float(np.sum((whole - whole.mean()) ** 2)), len(whole)
+        found = without_dead_time(delays, 1, self.loss_at, constant)
+        return delays if found == delays or self._fed_back() else found
+
+    def _fed_back(self) -> bool:
+        stretches = [
+            Segment(inputs=e.inputs[rows], output=e.output[rows]) for e in self.experiments for rows in _counted(e)
+        ]
+        kept = informative(np.concatenate([s.inputs for s in stretches]))
+        found = find_feedback([replace(s, inputs=s.inputs[:, list(kept)]) for s in stretches])
+        return not isinstance(found, str) and found.at_once
+
     def likely_delays(self, least: int, most: int) -> list[list[int]]:
         """By correlation; see the base class."""
         return likely(self.experiments, self.orders.poles, most, least)
@@ -240,6 +262,13 @@ class _Problem(AbstractProblem):
             sample_time=self.terms.sample_time,
             free_start=experiment.free,
         )
+
+
+def _counted(experiment: Experiment) -> list[slice]:
+    """Stretches of samples that count."""
+    if experiment.weights is None:
+        return [slice(0, len(experiment.output))]
+    return list(np.ma.clump_unmasked(np.ma.masked_equal(experiment.weights, 0.0)))
 
 
 def _check(orders: TransferFunction, mapping: Mapping, experiments: Sequence[Experiment]) -> None:

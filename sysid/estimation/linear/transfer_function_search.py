@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sysid.errors import FitDivergedError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
-from sysid.estimation.linear.delay_search import FEW, searched_delays
+from sysid.estimation.linear.delay_search import FEW, READ_BACKWARDS, searched_delays
 from sysid.estimation.linear.pole_moves import at_one, filled_up, next_smaller, slowness
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_runs import EXACT, Candidate, End, Watch, long_run, short_run, tried
@@ -206,7 +206,7 @@ class AbstractProblem(ABC):
                 of_stability(model),
                 *fast,
             ),
-            warnings=fast,
+            warnings=(*fast, *(one for one in told if one == READ_BACKWARDS)),
         )
 
     def _reached(
@@ -344,9 +344,23 @@ class AbstractProblem(ABC):
     def _searched_delays(self) -> tuple[tuple[int, ...], tuple[str, ...]]:
         """Dead times with the least loss, and what is to be said of the search."""
         least, most = self.delay_range()
-        return searched_delays(self.likely_delays(least, most), least, most, self._loss_at)
+        found, told = searched_delays(self.likely_delays(least, most), least, most, self.loss_at)
+        direct = self.direct(found) if least > 0 else found
+        return direct, told if direct == found else (*told, READ_BACKWARDS)
 
-    def _loss_at(self, delays: tuple[int, ...], unknown: int) -> float:
+    def direct(self, delays: tuple[int, ...]) -> tuple[int, ...]:
+        """Dead times, none where an input clearly acts within the sample; of spectra they stay.
+
+        Args:
+            delays: Those that were found, from 1 on.
+
+        Returns:
+            The dead times.
+        """
+        return delays
+
+    def loss_at(self, delays: tuple[int, ...], unknown: int) -> float:
+        """The loss of some dead times after a short search, where so many first samples of a record do not count."""
         provider = self.provider(delays, unknown=unknown)
         begun = [tried(start, delays, provider) for start in self.starts(provider, few=True)]
         worth = sorted(begun, key=lambda one: one.loss)[:COMPARED]

@@ -174,3 +174,13 @@ def test_too_few_samples_are_refused() -> None:
     short = Trace(name="short", sample_time=T, channels=trace.channels, values=trace.values[:6])
     with pytest.raises(TraceError, match="fewer samples"):
         fit_transfer_function([short], TWO, orders(Domain.DISCRETE, delays=(1, 1)))
+
+
+@pytest.mark.parametrize("first,found", [(0.5, 0), (0.0, 1)])
+def test_an_input_that_acts_within_the_sample_is_found_to(first: float, found: int) -> None:
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.standard_normal(100), 3)
+    y = signal.lfilter([first, 0.3, 0.1], [1.0, -0.8, 0.1], u) + 0.05 * rng.standard_normal(300)
+    fit = fit_transfer_function([trace_of(u, y)], Mapping.parse("u1 -> y"), TransferFunction(poles=(2,), zeros=(1,)))
+    assert fit.model.structure.delays == (found,)
+    assert any("answers within the sample" in told for told in fit.warnings) is (found == 0)
