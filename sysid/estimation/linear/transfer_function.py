@@ -268,7 +268,9 @@ def _counted(experiment: Experiment) -> list[slice]:
     """Stretches of samples that count."""
     if experiment.weights is None:
         return [slice(0, len(experiment.output))]
-    return list(np.ma.clump_unmasked(np.ma.masked_equal(experiment.weights, 0.0)))
+    counts = np.concatenate([[False], experiment.weights > 0.0, [False]])
+    edges = np.flatnonzero(counts[1:] != counts[:-1]).reshape(-1, 2)
+    return [slice(int(first), int(last)) for first, last in edges]
 
 
 def _check(orders: TransferFunction, mapping: Mapping, experiments: Sequence[Experiment]) -> None:
