@@ -47,7 +47,7 @@ class _Record:
     """One trace: every channel in a first run, after as many rows as the lags reach back; the targets where they count.
 
     Inputs, and outputs of members that come before any trained one, keep the values of the first run. ``rows`` are
-    those of the samples that count, among the samples.
+    those of the samples that count, among the samples. Targets stand column by column.
     """
 
     values: NDArray[np.float64]
@@ -232,7 +232,7 @@ class CascadeProvider(AbstractProvider):
         return _Record(
             values=np.concatenate([np.tile(cascade.levels(inputs[0], rest), (self._trained.depth, 1)), run.values]),
             rows=rows,
-            target=target[rows],
+            target=np.asfortranarray(target[rows]),
             root_weights=None if usable.all() else usable.astype(np.float64),
         )
 
@@ -248,7 +248,7 @@ class CascadeProvider(AbstractProvider):
         return _Record(
             values=values,
             rows=rows,
-            target=experiment.output[rows],
+            target=np.asfortranarray(experiment.output[rows]),
             root_weights=None if usable.all() else usable.astype(np.float64),
         )
 
@@ -278,7 +278,10 @@ class CascadeProvider(AbstractProvider):
 
     def _counted_values(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The targets where they count, shape ``(n_counted, n_targets)``."""
-        return values[self._trained.depth + record.rows][:, self._columns]
+        ran, found = values[self._trained.depth :], np.empty_like(record.target)
+        for j, column in enumerate(self._columns):  # column by column, as they stand in memory: five times as fast
+            found[:, j] = ran[:, column] if len(record.rows) == len(ran) else ran[record.rows, column]
+        return found
 
     def _residual(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weighted residuals over their errors, shape ``(n_counted, n_targets)``."""
@@ -378,17 +381,18 @@ class CascadeProvider(AbstractProvider):
         kept = 1 + trained.carry
         size = min(MOST, max(BLOCK, 1 << (ALIVE // max(1, n * len(self.errors))).bit_length() - 1))
         kept[[output for output in self._outputs if output >= 0]] += size - 1
-        room = rows_for(kept, n)
-        at = 0
+        room, outputs, at = rows_for(kept, n), self._outputs, 0
+        every = len(record.rows) == samples
         for first in range(0, samples, size):
             rows = min(size, samples - first)
             sensitivities(
                 program, trained.depth, first, rows, passed.values, passed.kept, passed.held,
                 trained.own_first, trained.extent, trained.source, room,
             )  # fmt: skip
-            picked = record.rows[slice(*np.searchsorted(record.rows, (first, first + rows)))]
+            own_rows = (first, first + rows) if every else np.searchsorted(record.rows, (first, first + rows))
+            picked = record.rows[slice(*own_rows)]
             blocks: list[_Moving] = []
-            for output in self._outputs:
+            for output in outputs:
                 if output < 0:
                     blocks.append((np.zeros(len(picked), dtype=np.bool_), np.zeros((0, 0))))
                     continue
