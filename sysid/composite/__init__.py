@@ -24,7 +24,8 @@ from sysid.composite.plan import ActiveLearning, OneStep, Retraining, RoundPlan,
 from sysid.composite.rehearsal import rehearse
 from sysid.composite.round import JointRound, TrainedRound, train_round
 from sysid.composite.stages import Choice, choose_together, fit_member, model_of, one_step_of, reading_more, retrain
-from sysid.composite.training import Retrained, TrainedComposite, TrainingData, train
+from sysid.composite.training import Retrained, TrainedComposite, train
+from sysid.composite.training_data import TrainingData
 from sysid.composite.warm_start import started_from
 
 __all__ = [

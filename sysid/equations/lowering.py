@@ -23,14 +23,13 @@ from sysid.equations.graph import (
 )
 from sysid.equations.implicit import MOST_STATES_IMPLICIT, implicit_slopes
 from sysid.equations.lowered import ROSENBROCK, Lowered, Net, Switch, Terms
+from sysid.equations.nets import asked, check_weights, layer
 from sysid.equations.slopes import slopes_of
 from sysid.equations.syntax import Call, Delayed, Name, Node, Number, Operation, equation_error
 from sysid.equations.system import System
 from sysid.errors import ConfigError
 from sysid.kernels import register_machine as machine
 
-MOST_NEURONS = 200
-MOST_WEIGHTS = 5_000
 MOST_DELAYED = 100
 """Samples that are kept of what is computed; what goes in may be delayed by any number of samples."""
 LONGEST_DELAY = 1_000_000
@@ -349,69 +348,22 @@ class _Lowering:
     # Networks
 
     def _net(self, node: Call) -> int:
-        options = dict(node.options)
-        if not node.arguments or set(options) - {"neurons", "scale"} or "neurons" not in options:
-            raise equation_error(
-                "a network takes what it sees, and neurons",
-                self.system.text,
-                node.at,
-                expected=f"{OWN['net']}, and a scale where one is known",
-                remedy="write for example net(x, u, neurons=5)",
-            )
-        k = self._number(options["neurons"], "neurons")
-        if k != round(k) or not 1 <= k <= MOST_NEURONS:
-            raise equation_error(
-                "not a number of neurons",
-                self.system.text,
-                node.at,
-                expected=f"a whole number from 1 to {MOST_NEURONS}",
-                remedy="write for example neurons=5",
-            )
-        scale = self._number(options["scale"], "a scale") if "scale" in options else 1.0
+        neurons, scale = asked(node, self.system.text, self._number)
         arguments = [self.value(one) for one in node.arguments]
         net = Net(
             arguments=len(arguments),
-            neurons=int(k),
+            neurons=neurons,
             first=self.nets[-1].stop if self.nets else 0,
             norm=len(self.norms),
             probe=len(self.probed),
-            scaled="scale" in options,
+            scaled=scale is not None,
         )
-        if net.stop > MOST_WEIGHTS:
-            raise ConfigError(
-                "the networks have too many weights",
-                where="equations",
-                expected=f"at most {MOST_WEIGHTS:,}",
-                got=net.stop,
-                remedy="use fewer neurons",
-            )
+        check_weights(net)
         for value in arguments:
             self.probe(value)
         self.nets.append(net)
-        self.norms += [0.0, 1.0] * len(arguments) + [scale]
-        return self._layer(net, arguments)
-
-    def _layer(self, net: Net, arguments: list[int]) -> int:
-        def weight(place: int) -> int:
-            return self.graph.leaf(WEIGHT, place)
-
-        def norm(place: int) -> int:
-            return self.graph.leaf(NORM, net.norm + place)
-
-        scaled = [
-            self.apply(machine.MUL, self.apply(machine.SUB, value, norm(2 * i)), norm(2 * i + 1))
-            for i, value in enumerate(arguments)
-        ]
-        total = weight(net.linear.stop - 1)
-        for i, value in enumerate(scaled):
-            total = self.apply(machine.FMA, weight(net.linear.start + i), value, total)
-        for j in range(net.neurons):
-            row = net.first + j * (net.arguments + 1)
-            inside = weight(row + net.arguments)
-            for i, value in enumerate(scaled):
-                inside = self.apply(machine.FMA, weight(row + i), value, inside)
-            total = self.apply(machine.FMA, weight(net.readout.start + j), self.apply(machine.TANH, inside), total)
-        return self.apply(machine.MUL, norm(2 * net.arguments), total)
+        self.norms += [0.0, 1.0] * len(arguments) + [1.0 if scale is None else scale]
+        return layer(self.graph, net, arguments)
 
     # Programs
 

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from sysid.estimation.linear.state_space.search import StateSpaceTraining
     from sysid.estimation.linear.transfer_function import fit_transfer_function
     from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
-    from sysid.estimation.networks.joint import CascadeFit, JointTraining
+    from sysid.estimation.networks.cascade_fit import CascadeFit
+    from sysid.estimation.networks.joint_options import JointTraining
     from sysid.estimation.networks.joint_training import fit_cascade, with_upstream_outputs
     from sysid.estimation.networks.narx import fit_narx
     from sysid.estimation.networks.neural_state_space import fit_neural_state_space, fit_vector_neural_state_space
@@ -77,7 +78,8 @@ _WHERE = {
     "sysid.estimation.linear.state_space.search": ("StateSpaceTraining",),
     "sysid.estimation.linear.transfer_function": ("fit_transfer_function",),
     "sysid.estimation.linear.transfer_function_training": ("TransferFunctionTraining",),
-    "sysid.estimation.networks.joint": ("CascadeFit", "JointTraining"),
+    "sysid.estimation.networks.cascade_fit": ("CascadeFit",),
+    "sysid.estimation.networks.joint_options": ("JointTraining",),
     "sysid.estimation.networks.joint_training": ("fit_cascade", "with_upstream_outputs"),
     "sysid.estimation.networks.narx": ("fit_narx",),
     "sysid.estimation.networks.neural_state_space": ("fit_neural_state_space", "fit_vector_neural_state_space"),

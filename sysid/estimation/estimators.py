@@ -36,7 +36,7 @@ from sysid.estimation.linear_posteriors import (
     state_space_posterior,
     transfer_function_posterior,
 )
-from sysid.estimation.networks.joint import JointTraining
+from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.narx import fit_narx
 from sysid.estimation.networks.neural_state_space import (
     STARTS,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sysid.equations import Lowered
 from sysid.errors import TraceError
+from sysid.kernels import equation_run
 from sysid.kernels import register_machine as machine
 from sysid.models.activations import PLAIN
 from sysid.models.case_search import shown
@@ -318,7 +319,7 @@ class EquationForm(AbstractForm):
         """
         y = np.empty((len(u), self.n_outputs))
         path = np.empty((0, len(x))) if path is None else path
-        machine.free_run(self.programs, self.filled, x, u, *self._own, y, path)
+        equation_run.free_run(self.programs, self.filled, x, u, *self._own, y, path)
         return y
 
     def moved(self, u: Array, x: Array, S: Array, p: int) -> tuple[Array, Array]:
@@ -334,7 +335,7 @@ class EquationForm(AbstractForm):
             Output of shape ``(n_samples, n_outputs)``, in units, and ``(n_samples, n_outputs, n_columns)``.
         """
         y, J = np.empty((len(u), self.n_outputs)), np.empty((len(u), self.n_outputs, S.shape[1]))
-        machine.sensitivities(self.programs, self.filled, p, x, S, u, *self._own, y, J)
+        equation_run.sensitivities(self.programs, self.filled, p, x, S, u, *self._own, y, J)
         return y, J
 
     def probed(self, u: Array, path: Array) -> Array:

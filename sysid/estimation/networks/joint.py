@@ -4,209 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
 from sysid.estimation.attempts import Attempt
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.findings import Findings, with_evidence
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks.basis import RebasedProvider
+from sysid.estimation.networks.cascade_fit import CascadeFit
 from sysid.estimation.networks.joint_layout import JointLayout
+from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.joint_provider import CascadeProvider
 from sysid.estimation.networks.multistart import INITIAL_ALPHA
-from sysid.estimation.networks.training import FitProgress, check_choice
-from sysid.estimation.result import Evidence, Status
+from sysid.estimation.networks.training import FitProgress
+from sysid.estimation.result import Status
 from sysid.estimation.uncertainty import Uncertainty
-from sysid.models import Cascade, cascade_from_dict
-from sysid.models.typed_fields import TypedFields
+from sysid.models import Cascade
 from sysid.traces import Trace
 
 NEGLIGIBLE = 1e-6
 """Squared residual below which a target counts as met: that of a thousandth of the error that counts as one. Without it
 a target that is exactly right on a trace, such as a channel held at its bound, would outweigh all others."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointTraining(TypedFields):
-    """How the members of a cascade are trained together, in free run of the whole.
-
-    Args:
-        max_iterations: Levenberg-Marquardt iterations of a start that is never dropped.
-        max_time_s: Wall time of the whole fit in seconds. A fit that it ends cannot be repeated exactly.
-        tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
-        patience: Iterations over which improvement is judged.
-        checkpoints: How often the selection traces are looked at on the way; the best state seen is kept.
-        starts: Random starts, for networks that are fitted from nothing; half of them are dropped at each checkpoint.
-        seed: Seed of the first start; the others count up from it.
-        stride: Every so-manieth sample counts in the loss.
-        moves: A sample counts as well where a target has moved by more than so many of its errors since the last that
-            counted, and so does the one before it: what comes with a jump is not missed (``counted_rows.py``).
-        leverage: How many times as long as their median, at the start, a row of the Jacobian may be before it counts
-            less: where sensitivities explode, the few rows that do would forbid every step (``leverage.py``).
-        robust_scale: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
-            its logarithm (Cauchy loss): a few traces on which the free run is lost do not rule it (``robust_loss.py``).
-        damping: How far a step may go, as in :class:`~sysid.estimation.Training`.
-        workers: Records that are worked on at the same time.
-    """
-
-    max_iterations: int = 100
-    max_time_s: float = float("inf")
-    tolerance: float = 1e-3
-    patience: int = 20
-    checkpoints: int = 10
-    starts: int = 1
-    seed: int = 0
-    stride: int = 1
-    moves: float = float("inf")
-    leverage: float = float("inf")
-    robust_scale: float = float("inf")
-    damping: str = "marquardt"
-    workers: int = 2
-
-    def __post_init__(self) -> None:
-        check_choice("damping", self.damping, tuple(DAMPINGS))
-        for name in ("max_iterations", "patience", "checkpoints", "starts", "stride", "workers"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        for name in ("moves", "leverage", "robust_scale"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
-
-    def provider(
-        self,
-        cascade: Cascade,
-        traces: Sequence[Trace],
-        errors: Dict[str, float],
-        trained: Sequence[str] | None = None,
-        *,
-        begins: Callable[[Trace], Dict[str, float]] = lambda _: {},
-        measured: Callable[[Trace], Experiment] | None = None,
-    ) -> CascadeProvider:
-        """Residuals and Jacobians of a whole as these options have them count; every option that the provider has.
-
-        Args:
-            cascade: The whole.
-            traces: Estimation traces.
-            errors: For each target the error in its unit that counts as one.
-            trained: Outputs of the members that are trained; all by default.
-            begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
-            measured: From a trace its record, where it begins with measured samples.
-
-        Returns:
-            The provider.
-
-        Raises:
-            ChannelError: If a trace lacks an input or a target, or a name is no output of the cascade.
-            ConfigError: If a member that would have to pass on sensitivities cannot.
-        """
-        return CascadeProvider(
-            cascade=cascade,
-            traces=tuple(traces),
-            errors=errors,
-            trained=None if trained is None else tuple(trained),
-            stride=self.stride,
-            moves=self.moves,
-            leverage=self.leverage,
-            robust_scale=self.robust_scale,
-            workers=self.workers,
-            begins=begins,
-            measured=measured,
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CascadeFit:
-    """A trained cascade and how it came about; what a ``FitResult`` is for one model.
-
-    Args:
-        model: The cascade with the best parameters.
-        status: How the fit ended.
-        errors: For each target output the error in its unit that counted as one.
-        history: Learning curve: columns of equal length, among them ``iteration`` and ``loss`` (mean squared residual
-            over targets, in those errors).
-        train_time_s: Wall time in seconds.
-        seed: Seed of its random start; ``None`` where the fit began with the members as they were.
-        evidence: From Bayesian regularisation.
-        notes: Sentences worth knowing: which state was chosen among which, and by what.
-        attempts: Every start at every checkpoint, and the one that was chosen; its errors are squared, in the errors
-            that count as one.
-        uncertainty: Of the parameters of equations, where there are such; those of networks have priors alone.
-        warnings: Of these parameters those at a bound, not determined, or hardly to be told apart; or that none moved.
-        solution: Where the parameters stand in the basis of training; not stored.
-    """
-
-    model: Cascade
-    status: Status
-    errors: dict[str, float]
-    history: dict[str, NDArray[np.float64]]
-    train_time_s: float
-    seed: int | None = None
-    evidence: Evidence | None = None
-    notes: tuple[str, ...] = field(default=())
-    attempts: tuple[Attempt, ...] = ()
-    uncertainty: Uncertainty | None = None
-    warnings: tuple[str, ...] = ()
-    solution: Solution | None = None
-
-    @property
-    def told_of_equations(self) -> tuple[str, ...]:
-        """What is known of the parameters of equations, in words."""
-        if self.uncertainty is None:
-            return self.warnings
-        return (f"Estimated in equations: {self.uncertainty.sentence}.", *self.warnings)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The result as JSON values."""
-        return {
-            "model": self.model.to_dict(),
-            "status": self.status.name,
-            "errors": dict(self.errors),
-            "history": {name: column.tolist() for name, column in self.history.items()},
-            "train_time_s": self.train_time_s,
-            "seed": self.seed,
-            "evidence": None
-            if self.evidence is None
-            else {name: getattr(self.evidence, name) for name in Evidence.__dataclass_fields__},
-            "notes": list(self.notes),
-            "attempts": [attempt.to_dict() for attempt in self.attempts],
-        } | (
-            {}
-            if self.uncertainty is None
-            else {"uncertainty": self.uncertainty.to_dict(), "warnings": list(self.warnings)}
-        )
-
-    @classmethod
-    def from_dict(cls, fields: dict[str, Any]) -> CascadeFit:
-        """The result that :meth:`to_dict` wrote.
-
-        Args:
-            fields: What it wrote.
-
-        Returns:
-            The result.
-        """
-        return cls(
-            model=cascade_from_dict(fields["model"]),
-            status=Status[fields["status"]],
-            errors=dict(fields["errors"]),
-            history={name: np.asarray(column, dtype=np.float64) for name, column in fields["history"].items()},
-            train_time_s=fields["train_time_s"],
-            seed=fields["seed"],
-            evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
-            notes=tuple(fields["notes"]),
-            attempts=tuple(Attempt.from_dict(attempt) for attempt in fields.get("attempts", ())),
-            uncertainty=Uncertainty.from_dict(fields["uncertainty"]) if "uncertainty" in fields else None,
-            warnings=tuple(fields.get("warnings", ())),
-        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

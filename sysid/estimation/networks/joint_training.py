@@ -8,8 +8,10 @@ from collections.abc import Mapping as Dict
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
+from sysid.estimation.networks.cascade_fit import CascadeFit
+from sysid.estimation.networks.joint import Joint
 from sysid.estimation.networks.joint_layout import JointLayout
+from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.training import FitProgress
 from sysid.models import Cascade, Ends
 from sysid.traces import Channel, Trace, TraceSet

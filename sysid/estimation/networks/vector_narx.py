@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.networks.joint import CascadeFit, Joint, JointTraining
+from sysid.estimation.networks.cascade_fit import CascadeFit
+from sysid.estimation.networks.joint import Joint
 from sysid.estimation.networks.joint_layout import JointLayout
+from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.member_layout import MemberLayout
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress
