@@ -219,3 +219,5 @@ VARIANTS: Mapping[str, Variant] = {"listing": LISTING, "physical": PHYSICAL, "ac
 
 USUAL_VARIANT = "acoustic"
 """The preset of what does not name one."""
+
+USUAL = VARIANTS[USUAL_VARIANT]

@@ -2,7 +2,8 @@
 
 Hours of training lie in a frozen whole. Where a switch was declared wrongly, or traces are added, its networks are a
 far better beginning than fits from nothing, whatever they read: they are taken as they stand, at each instance with its
-own weights, and what is declared beside them is the composite's, not theirs.
+own weights (with those of the first where the whole has none there, as a line has one cylinder for all its positions),
+and what is declared beside them is the composite's, not theirs.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ def started_from(composite: Composite, given: Cascade, like: Trace) -> Cascade:
 
     Args:
         composite: What is declared.
-        given: A whole that has a network for each member in each of its instances.
+        given: A whole that has a network for each member in each of its instances, or in the first of them.
         like: A trace of the whole, for units.
 
     Returns:
@@ -52,12 +53,15 @@ def started_from(composite: Composite, given: Cascade, like: Trace) -> Cascade:
 def _network(given: Cascade, member: Member, instance: str) -> NARXModel:
     """The given network of a member in one of its instances."""
     output, asked = member.channel(member.output, instance), member.structure
-    found = network_of(given.member(output)) if output in given.outputs else None
+    first = member.instances[0]
+    at = instance if output in given.outputs else first
+    there = member.channel(member.output, at)
+    found = network_of(given.member(there)) if there in given.outputs else None
     if found is not None:
         own = found.network
-        inputs = {member.channel(name, instance) for name in member.mapping.inputs}
+        inputs = {member.channel(name, at) for name in member.mapping.inputs}
         if _said(own) == _said(asked) and inputs <= set(found.mapping.inputs):
-            return found
+            return found if at == instance else placed(member, found, instance)
     raise ConfigError(
         f"the whole to begin from has no such {output}",
         where="begin",

@@ -78,6 +78,11 @@ class Bundle:
         """The same of each output; before version 3 there was one."""
         return tuple(self.metadata.get("outputs") or [self.metadata["output"]])
 
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Least and greatest value of each input in the traces that it was fitted on, where that is known."""
+        return {str(one["name"]): (one["range"][0], one["range"][1]) for one in self.inputs if one.get("range")}
+
     def simulate(self, u: Any, *, initial: Initial = None, start: StartLike | None = None, warn: bool = True) -> Any:
         """Free run of the model over inputs that are in memory.
 
@@ -112,7 +117,7 @@ class Bundle:
         else:
             units = {str(entry["name"]): str(entry["unit"]) for entry in self.inputs}
             inputs = inputs_of(u, tuple(units), sample_time=self.model.sample_time, units=units)
-            told = self._outside(inputs) if warn else ""
+            told = said_outside(inputs, units, self.ranges) if warn else ""
             if told:
                 warnings.warn(told, OutsideRangeWarning, stacklevel=2)
         begin = None if start is None else Start.of(start)
@@ -151,18 +156,29 @@ class Bundle:
         columns = {name: record[name] for name in measured}
         return run_measured(surrogate, inputs, columns, start, record.usable_samples).computed
 
-    def _outside(self, inputs: NDArray[np.float64]) -> str:
-        """A sentence on the inputs that are beyond their declared ranges; empty where none is."""
-        told = []
-        for column, entry in zip(inputs.T, self.inputs, strict=True):
-            low, high = entry.get("range") or (-np.inf, np.inf)
-            share = float(np.mean((column < low) | (column > high)))
-            if share:
-                unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-                told.append(
-                    f"{entry['name']} is beyond {low:g} to {high:g}{unit} in {100.0 * share:.3g} % of the samples"
-                )
-        return f"{'; '.join(told)}: nothing there was fitted, and the accuracy is unknown" if told else ""
+
+def said_outside(inputs: NDArray[np.float64], units: Dict[str, str], ranges: Dict[str, tuple[float, float]]) -> str:
+    """A sentence on the inputs that are beyond what was fitted.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``.
+        units: Of each input, in their order.
+        ranges: Least and greatest value of each that was fitted, where that is known.
+
+    Returns:
+        The sentence; empty where none is.
+
+    Example:
+        >>> said_outside(np.array([[90.0], [0.0]]), {"STP": "psi"}, {"STP": (64.2, 90.0)})[:49]
+        'STP is beyond 64.2 to 90 psi in 50 % of the sampl'
+    """
+    told = []
+    for column, (name, unit) in zip(inputs.T, units.items(), strict=True):
+        low, high = ranges.get(name, (-np.inf, np.inf))
+        if share := float(np.mean((column < low) | (column > high))):
+            of = f"{low:g} to {high:g}" + ("" if unit == "1" else f" {unit}")
+            told.append(f"{name} is beyond {of} in {100.0 * share:.3g} % of the samples")
+    return f"{'; '.join(told)}: nothing there was fitted, and the accuracy is unknown" if told else ""
 
 
 class OutsideRangeWarning(UserWarning):

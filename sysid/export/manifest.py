@@ -261,8 +261,20 @@ def declared_ranges(inputs: Sequence[str], traces: TraceSet) -> dict[str, Range]
     Returns:
         By channel; empty without estimation traces.
     """
-    estimation = traces.with_role(Role.ESTIMATION)
-    return {name: found for name in inputs if (found := _range(name, estimation))}
+    return ranges_in(inputs, traces.with_role(Role.ESTIMATION))
+
+
+def ranges_in(inputs: Sequence[str], traces: Sequence[Trace]) -> dict[str, Range]:
+    """The range that each input has in some traces.
+
+    Args:
+        inputs: Names of the inputs.
+        traces: The traces.
+
+    Returns:
+        By channel, of those that they have.
+    """
+    return {name: found for name in inputs if (found := _range(name, traces))}
 
 
 def first_inputs(inputs: Sequence[str], traces: TraceSet) -> dict[str, float]:
@@ -313,7 +325,7 @@ def amplification(cases: Sequence[ParityCase], sequences: Sequence[ParityCase], 
     }
 
 
-def _range(name: str, estimation: tuple[Trace, ...]) -> Range | None:
+def _range(name: str, estimation: Sequence[Trace]) -> Range | None:
     there = [trace[name] for trace in estimation if name in trace.channel_names]
     return (min(float(v.min()) for v in there), max(float(v.max()) for v in there)) if there else None
 

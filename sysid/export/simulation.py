@@ -163,10 +163,9 @@ def declared_start(bundle: Bundle) -> Start:
 def _run(
     bundle: Bundle, given: Trace, channels: tuple[Channel, ...], initial: Initial, start: Start | None
 ) -> Simulation:
-    ranges = {entry["name"]: tuple(entry["range"]) for entry in bundle.inputs if entry["range"] is not None}
     outputs = tuple(channel_of(entry) for entry in bundle.outputs)
     names, targets = tuple(channel.name for channel in channels), [channel.name for channel in outputs]
-    surrogate = Surrogate.of(bundle.model, ranges, outputs=targets)
+    surrogate = Surrogate.of(bundle.model, bundle.ranges, outputs=targets)
     measured = [name for name in targets if name in given.channel_names]
     start, note = _start(bundle, given, measured, initial, start)
     values, firsts = given.columns(names), dict[str, int]()

@@ -31,7 +31,7 @@ def run_folder(tmp_path: Path) -> Path:
     """What a finished run leaves, and a command beside it."""
     folder = tmp_path / "runs" / "train"
     folder.mkdir(parents=True)
-    stored = StoredInterpolation(line=line(), inputs=(HANDLE,), outputs=(CYLINDER,))
+    stored = StoredInterpolation(line=line(), inputs=(HANDLE,), outputs=(CYLINDER,), ranges={"STP": (64.2, 90.0)})
     (folder / "line.json").write_text(json.dumps(stored.to_dict()), encoding="utf-8")
     command = {"command": ROWS, "time_unit": "ds", "unit": "psi"}
     (tmp_path / "command.json").write_text(json.dumps(command), encoding="utf-8")
@@ -55,6 +55,26 @@ def test_every_position_is_written_and_some_are_drawn(run_folder: Path, tmp_path
     assert_allclose(written["STP"], handle)
     expected = line().simulate(handle[:, None], [float(position) for position in positions])["BC"]
     assert_allclose(written.columns([f"BC{position}" for position in positions]).T, expected, atol=1e-6)
+
+
+def test_a_command_beyond_what_was_fitted_is_told_of(run_folder: Path, tmp_path: Path) -> None:
+    words = ["simulate", str(run_folder), "--command", str(tmp_path / "command.json"), "--positions", "1"]
+    told = "STP is beyond 64.2 to 90 psi in 40 % of the samples: nothing there was fitted"
+    within = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "a.csv")], catch_exceptions=False)
+    assert told not in within.output.replace("\n", " ")
+    rows = {"command": [[0, 90], [20, 0], [60, 90], [100, 90]], "time_unit": "ds", "unit": "psi"}
+    (tmp_path / "command.json").write_text(json.dumps(rows), encoding="utf-8")
+    beyond = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "b.csv")], catch_exceptions=False)
+    assert told in beyond.output.replace("\n", " ")
+
+
+def test_what_fitted_a_line_is_stored_with_it_and_old_lines_know_nothing_of_it(run_folder: Path) -> None:
+    file = run_folder / "line.json"
+    assert read_interpolation(run_folder).ranges == {"STP": (64.2, 90.0)}
+    fields = json.loads(file.read_text(encoding="utf-8"))
+    del fields["channels"]["inputs"][0]["range"]
+    file.write_text(json.dumps(fields), encoding="utf-8")
+    assert read_interpolation(run_folder).ranges == {}
 
 
 def test_a_command_in_kilopascal_is_converted(run_folder: Path, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import BrakedTrain, Probe
-from sysid.airbrake.variant import PHYSICAL, Variant
+from sysid.airbrake.variant import USUAL, Variant
 from sysid.errors import ConfigError
 from sysid.units import STANDARD_ATMOSPHERE_PA
 
@@ -82,7 +82,7 @@ class ReferenceBrake(AbstractBrake):
         self,
         *,
         consist: Consist,
-        variant: Variant = PHYSICAL,
+        variant: Variant = USUAL,
         sample_time: float = 0.1,
         time_step: float = 1e-3,
     ) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.airbrake.variant import PHYSICAL
+from sysid.airbrake.variant import USUAL
 from sysid.units import PSI_IN_PA
 
-EQUALISING_RATE = (PHYSICAL.equalising_rate or np.inf) / PSI_IN_PA
+EQUALISING_RATE = (USUAL.equalising_rate or np.inf) / PSI_IN_PA
 """Rate in psi/s at which the equalising reservoir follows a reduction: that of the reference physics."""
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import BrakedTrain, Probe
-from sysid.airbrake.variant import PHYSICAL, Variant
+from sysid.airbrake.variant import USUAL, Variant
 from sysid.errors import ConfigError
 from sysid.kernels.arrays import read_only
 from sysid.kernels.neurons import code_of
@@ -253,7 +253,7 @@ class ValveSurrogateBrake(AbstractBrake):
     """
 
     def __init__(
-        self, *, stages: Sequence[Stage], consist: Consist, variant: Variant = PHYSICAL, time_step: float = 1e-3
+        self, *, stages: Sequence[Stage], consist: Consist, variant: Variant = USUAL, time_step: float = 1e-3
     ) -> None:
         _check_valve(stages)
         sample_time = stages[0].models[0].sample_time

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from sysid.airbrake.consist import Consist
-from sysid.airbrake.variant import VARIANTS
+from sysid.airbrake.variant import USUAL_VARIANT, VARIANTS
 from sysid.code_digest import code_digest
 from sysid.content import content_folders
 from sysid.errors import ConfigError, SysidError
@@ -53,7 +53,7 @@ class ConsequenceOptions(BaseModel):
     train: str = "heavy-haul-101"
     speed: float = Field(default=80.0, gt=0.0, le=200.0)
     scenarios: tuple[str, ...] = ()
-    variant: str = "physical"
+    variant: str = USUAL_VARIANT
     limit: float = Field(default=1.0, gt=0.0)
     errors: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
     errors_in: tuple[str, ...] = ("full service", "emergency")
@@ -79,15 +79,20 @@ class PartOptions(BaseModel):
     Args:
         node: Of the valve that it was fitted at; left out for a model that stands at every car.
         everywhere: Whether a whole from the handle on, which was made for one place, stands at every car all the same.
+        beyond: Whether it is judged all the same where the handle or the pipe goes beyond the traces that fitted it.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
     node: int | None = Field(default=None, ge=3)
     everywhere: bool = False
+    beyond: bool = False
 
 
-Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade | Interpolation, Mapping[str, Any]]]]
-"""Models to judge, by the name of what they are together, each with what was said of it."""
+Given = tuple[AbstractModel | Cascade | Interpolation, Mapping[str, Any], Mapping[str, tuple[float, float]]]
+"""A model, what was said of it, and the range of each of its inputs in the traces that it was fitted on."""
+
+Subjects = Mapping[str, Sequence[Given]]
+"""Models to judge, by the name of what they are together."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,9 +137,12 @@ class TrainJudge:
         scene = _Scene.of(options)
         steps = []
         for subject, models in subjects.items():
-            parts = [Part(model=model, **PartOptions(**said).model_dump()) for model, said in models]
-            make = brake_of(parts, scene.consist)
-            what = [{"model": part.model.to_dict(), "node": part.node} for part in parts]
+            parts = [Part(model=one, ranges=known, **PartOptions(**said).model_dump()) for one, said, known in models]
+            make = brake_of(parts, scene.consist, scene.variant)
+            what = [
+                {"model": one.model.to_dict(), "node": one.node, "ranges": {} if one.beyond else dict(one.ranges)}
+                for one in parts
+            ]
             for name in scene.chosen:
                 terms = {"scenario": name, "subject": what, **scene.terms}
                 steps.append(Step(name=f"{subject}: {name}", terms=terms, run=_Judged(scene, name, make)))
@@ -176,7 +184,7 @@ class _Scene:
     def __init__(self, options: ConsequenceOptions, path: Path) -> None:
         self.train = read_train(path)
         self.consist = _consist(self.train, path)
-        self._variant = VARIANTS[options.variant]
+        self.variant = VARIANTS[options.variant]
         self._scenarios = all_scenarios(self.train, speed=options.speed * KMH)
         self.chosen = options.scenarios or tuple(self._scenarios)
         self.terms = {
@@ -204,7 +212,7 @@ class _Scene:
         return self._scenarios[name]
 
     def brake(self) -> ReferenceBrake:
-        return ReferenceBrake(consist=self.consist, variant=self._variant)
+        return ReferenceBrake(consist=self.consist, variant=self.variant)
 
     def reference(self, name: str) -> Run:
         if name not in self._references:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.variant import USUAL, Variant
 from sysid.errors import ConfigError
 from sysid.models import AbstractModel, Cascade, Interpolation, Mapping
 from sysid.rail.dynamics.brake import AbstractBrake
 from sysid.rail.dynamics.cascade_brake import CascadeBrake, LineBrake
+from sysid.rail.dynamics.known_brake import KnownBrake
 from sysid.rail.dynamics.surrogate import (
     COMMAND,
     CYLINDER,
@@ -32,11 +35,16 @@ class Part:
         node: Of the valve that it was fitted at; ``None`` for one that stands at every car.
         everywhere: Whether a whole from the handle on stands at every car though it was made for one: its pressures are
             those of one place, and a train of many has others everywhere else.
+        ranges: Least and greatest value that each of its inputs has in the traces that it was fitted on, where that is
+            known: a brake that is driven beyond those of the handle or the pipe is refused.
+        beyond: Whether it is run there all the same.
     """
 
     model: AbstractModel | Cascade | Interpolation
     node: int | None = None
     everywhere: bool = False
+    ranges: Dict[str, tuple[float, float]] = field(default_factory=dict)
+    beyond: bool = False
 
 
 def placed(parts: Sequence[Part], consist: Consist) -> Stage:
@@ -124,7 +132,7 @@ def ordered(parts: Sequence[Part]) -> list[list[Part]]:
     return done
 
 
-def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
+def brake_of(parts: Sequence[Part], consist: Consist, variant: Variant = USUAL) -> MakeBrake:
     """How to make a brake of fitted models.
 
     Models that begin at the handle (``STP``) are a brake of their own at every car. A cascade that does was made for
@@ -136,6 +144,7 @@ def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
     Args:
         parts: The models.
         consist: The train.
+        variant: The reading of the reference that models from the pipe on stand on.
 
     Returns:
         Makes fresh brakes.
@@ -143,6 +152,21 @@ def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
     Raises:
         ConfigError: If the models do not add up to a brake.
     """
+    make, ranges = _brake_of(parts, consist, variant), _fitted(parts)
+    return (lambda: KnownBrake(make(), ranges)) if ranges else make
+
+
+def _fitted(parts: Sequence[Part]) -> dict[str, tuple[float, float]]:
+    """Where all parts were fitted that read a channel."""
+    known: dict[str, list[tuple[float, float]]] = {}
+    for part in parts:
+        for name, found in part.ranges.items() if not part.beyond else ():
+            known.setdefault(name, []).append(found)
+    return {name: (max(low for low, _ in all_), min(high for _, high in all_)) for name, all_ in known.items()}
+
+
+def _brake_of(parts: Sequence[Part], consist: Consist, variant: Variant) -> MakeBrake:
+    """A brake that answers to anything."""
     lines = [part.model for part in parts if isinstance(part.model, Interpolation)]
     if lines:
         return _of_line(lines, len(parts), consist)
@@ -161,7 +185,7 @@ def brake_of(parts: Sequence[Part], consist: Consist) -> MakeBrake:
     def make() -> AbstractBrake:
         if alone:
             return SurrogateBrake(stages=stages, consist=consist)
-        return ValveSurrogateBrake(stages=stages, consist=consist)
+        return ValveSurrogateBrake(stages=stages, consist=consist, variant=variant)
 
     make()  # What does not fit is told before anything is run.
     return make

@@ -98,7 +98,7 @@ class Evaluating:
         chosen, chosen_by = self.trained.chosen, self.trained.selection
         whole = self._chosen()
         stressed, worst, sequences = self._stressed(whole)
-        line = self._line(whole)
+        line = self._line(whole, data)
         exported = self._export(whole, cases, evaluate_cascade(whole, cases), data)
         candidates = self.trained.candidates
         members = []
@@ -198,12 +198,13 @@ class Evaluating:
             for stage, whole in wholes.items()
         }
 
-    def _line(self, whole: Cascade) -> InterpolationScores | None:
+    def _line(self, whole: Cascade, data: AssemblyData) -> InterpolationScores | None:
         asked = self.context.config.interpolation
         if asked is None:
             return None
         line, cases = interpolation_of(asked, whole), self.context.load(asked.data)
-        write_json(self.context.store.path / LINE, StoredInterpolation.of(asked, line, next(iter(cases))).to_dict())
+        stored = StoredInterpolation.of(asked, line, next(iter(cases)), data.data.estimation)
+        write_json(self.context.store.path / LINE, stored.to_dict())
         return self.context.compute(
             INTERPOLATION,
             lambda _: score_interpolation(asked, line, cases),

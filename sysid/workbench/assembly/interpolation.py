@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.export.manifest import ranges_in
 from sysid.models import Cascade, Interpolation
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference
@@ -46,14 +47,18 @@ class StoredInterpolation:
         line: The line.
         inputs: Channels of the inputs of the whole.
         outputs: Channels that are had at every position.
+        ranges: Least and greatest value of each input in the traces that it was trained on, where that is known.
     """
 
     line: Interpolation
     inputs: tuple[Channel, ...]
     outputs: tuple[Channel, ...]
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, asked: InterpolationConfig, line: Interpolation, case: Trace) -> StoredInterpolation:
+    def of(
+        cls, asked: InterpolationConfig, line: Interpolation, case: Trace, fitted: Sequence[Trace]
+    ) -> StoredInterpolation:
         """A line with the channels of a trace.
 
         Args:
@@ -61,6 +66,7 @@ class StoredInterpolation:
             line: The line.
             case: A trace with the inputs of the whole, and the outputs under the names of the first instance or at some
                 position.
+            fitted: What the line was trained on.
 
         Returns:
             The line with its channels.
@@ -70,14 +76,19 @@ class StoredInterpolation:
             there = name if name in case.channel_names else next(iter(positions_of(case, name).values()), None)
             unit = Channel(name=name, unit=line.at_place.units[name])
             outputs.append(replace(case.channel(there), name=name, description="") if there else unit)
-        return cls(line=line, inputs=tuple(case.channel(name) for name in line.inputs), outputs=tuple(outputs))
+        inputs = tuple(case.channel(name) for name in line.inputs)
+        return cls(line=line, inputs=inputs, outputs=tuple(outputs), ranges=ranges_in(line.inputs, fitted))
+
+    @property
+    def _sides(self) -> dict[str, tuple[Channel, ...]]:
+        return {"inputs": self.inputs, "outputs": self.outputs}
 
     def to_dict(self) -> dict[str, Any]:
         """The line and its channels as JSON values."""
-        channels = {
-            side: [{"name": one.name, "unit": one.unit, "reference": one.reference.value} for one in some]
-            for side, some in (("inputs", self.inputs), ("outputs", self.outputs))
-        }
+        channels = {side: [_said(one) for one in some] for side, some in self._sides.items()}
+        for entry in channels["inputs"]:
+            if entry["name"] in self.ranges:
+                entry["range"] = list(self.ranges[entry["name"]])
         return {**self.line.to_dict(), "channels": channels}
 
     @classmethod
@@ -108,7 +119,12 @@ class StoredInterpolation:
                 got=", ".join(channel.name for channel in sides["inputs"]) or "none",
                 remedy="let the pipeline that makes it run again",
             )
-        return cls(line=line, **sides)
+        known = {one["name"]: one["range"] for one in channels["inputs"] if one.get("range")}
+        return cls(line=line, **sides, ranges={name: (low, high) for name, (low, high) in known.items()})
+
+
+def _said(channel: Channel) -> dict[str, Any]:
+    return {"name": channel.name, "unit": channel.unit, "reference": channel.reference.value}
 
 
 def interpolation_of(asked: InterpolationConfig, whole: Cascade) -> Interpolation:

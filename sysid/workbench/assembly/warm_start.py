@@ -1,18 +1,23 @@
-"""A whole to go on from, out of a bundle."""
+"""A whole to go on from, out of a bundle or a line."""
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 from sysid.errors import ConfigError
-from sysid.models import Cascade
+from sysid.models import Cascade, Interpolation
+from sysid.models.ends import Ends
+from sysid.workbench.assembly.evaluation import LINE
+from sysid.workbench.runner.store import read_json
 
 
 def read_whole(bundle: Path) -> tuple[Cascade, str]:
-    """The whole of a bundle.
+    """The whole of a bundle, or of a line.
 
     Args:
-        bundle: Its folder or its zip, as a run of an assembly leaves it, or ``sysid publish`` beside a report.
+        bundle: Its folder or its zip, as a run of an assembly leaves it, or ``sysid publish`` beside a report; or a
+            folder with a line.
 
     Returns:
         The whole, and a sentence on where it comes from.
@@ -23,6 +28,9 @@ def read_whole(bundle: Path) -> tuple[Cascade, str]:
     """
     from sysid.export import read_bundle
 
+    if (line := bundle / LINE).is_file():
+        digest = hashlib.sha256(line.read_bytes()).hexdigest()[:12]
+        return _whole_of(Interpolation.from_dict(read_json(line))), f"Begun from the line {bundle.name} ({digest}...)."
     read = read_bundle(bundle)
     if not isinstance(read.model, Cascade):
         raise ConfigError(
@@ -35,3 +43,11 @@ def read_whole(bundle: Path) -> tuple[Cascade, str]:
     command = (read.metadata.get("provenance") or {}).get("command", "an unknown command")
     digest = str(read.metadata["digest"])[:12]
     return read.model, f"Begun from the networks of {bundle.name} ({command}; digest {digest}...)."
+
+
+def _whole_of(line: Interpolation) -> Cascade:
+    """What runs along a line, and what else stands at a position; rest and limits are declared anew."""
+    known = set(line.along.outputs)
+    return Cascade(
+        models=(*line.along.models, *(m for m in line.at_place.models if not set(Ends.of(m).outputs) & known))
+    )

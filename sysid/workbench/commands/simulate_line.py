@@ -10,6 +10,7 @@ import numpy as np
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError
+from sysid.export.bundle import said_outside
 from sysid.export.command_table import read_command
 from sysid.ingest import write_trace
 from sysid.traces import Channel, Trace
@@ -58,7 +59,11 @@ def simulate_line_command(wish: Wish, asked: str) -> None:
     trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
     write_trace(replace(trace, name=out.stem), out)
     names = ", ".join(channel.name for channel in stored.outputs)
+    units, values = {one.name: one.unit for one in stored.inputs}, trace.columns([one.name for one in stored.inputs])
+    told = said_outside(values, units, stored.ranges)
     console().print(f"{len(trace)} samples of {names} at {len(positions)} positions written to {out}", soft_wrap=True)
+    if told:
+        console().print(told, soft_wrap=True)
     _draw(stored, trace, positions, wish.plot or out.with_suffix(".png"), title=wish.bundle.name)
 
 

@@ -16,8 +16,12 @@ from sysid.workbench.runner.kept_steps import KeptStep
 
 GROUP = "sysid.judges"
 
-Subjects = Mapping[str, Sequence[tuple[AbstractModel | Cascade | Interpolation, Mapping[str, Any]]]]
-"""Models, cascades and lines by the name of what they are together, each with the options of its pipeline."""
+Given = tuple[AbstractModel | Cascade | Interpolation, Mapping[str, Any], Mapping[str, tuple[float, float]]]
+"""A model, cascade or line, its options in the pipeline, and the range of each of its inputs in the traces that it was
+fitted on, where that is known."""
+
+Subjects = Mapping[str, Sequence[Given]]
+"""What is judged, by the name of what the models are together."""
 
 
 class Judge(Protocol):

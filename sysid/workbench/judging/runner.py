@@ -90,7 +90,8 @@ class _Judging:
         found = run.do(self._loading(run)).value
         subjects = {
             subject.name: [
-                (one.model, part.options) for one, part in zip(found[subject.name], subject.parts, strict=True)
+                (one.model, part.options, one.ranges)
+                for one, part in zip(found[subject.name], subject.parts, strict=True)
             ]
             for subject in self.config.subjects
         }

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from sysid.errors import ConfigError
 from sysid.export.reading import read_bundle
 from sysid.models import AbstractModel, Cascade, Interpolation
 from sysid.reporting.results import read_results
+from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.judging.config import PartConfig
 from sysid.workbench.runner.store import RunFolder, read_json
@@ -30,6 +31,7 @@ class Found:
     Args:
         model: The model.
         said: Where it lies, in words.
+        ranges: Of each input in the traces that it was fitted on; nothing of a fit of a run.
         run_folder: The folder of the run that fitted it, where that is known.
         fit_key: Key under which that fit is tracked, where that is known.
         tracked_as: Run of the tracking store, where that is known.
@@ -37,6 +39,7 @@ class Found:
 
     model: AbstractModel | Cascade | Interpolation
     said: str
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     run_folder: Path | None = None
     fit_key: str | None = None
     tracked_as: str | None = None
@@ -65,7 +68,8 @@ def find_model(part: PartConfig, *, workspace: Path, fetch: Fetch) -> Found:
         return _of_bundle((workspace / part.bundle).resolve(), part.bundle)
     address = str(part.model)
     folder, run_id = fetch(address)
-    return Found(model=read_bundle(folder).model, said=address, tracked_as=run_id)
+    bundle = read_bundle(folder)
+    return Found(model=bundle.model, said=address, ranges=bundle.ranges, tracked_as=run_id)
 
 
 def run_folder_of(given: str, workspace: Path) -> Path:
@@ -127,7 +131,8 @@ def _of_line(workspace: Path, given: str) -> Found:
             got=file.parent,
             remedy="give reports/whole-train, or run such a pipeline first: sysid run whole-train",
         )
-    return Found(model=Interpolation.from_dict(read_json(file)), said=f"line {given}")
+    stored = StoredInterpolation.from_dict(read_json(file))
+    return Found(model=stored.line, said=f"line {given}", ranges=stored.ranges)
 
 
 def _of_bundle(folder: Path, given: str) -> Found:
@@ -137,7 +142,9 @@ def _of_bundle(folder: Path, given: str) -> Found:
     store = RunFolder(path=folder.parent)
     key = _key_of_fit(store, str(name), bundle.model) if name is not None else None
     said = f"bundle {given}" + (f", fit {name}" if name else "")
-    return Found(model=bundle.model, said=said, run_folder=store.path if key else None, fit_key=key)
+    return Found(
+        model=bundle.model, said=said, ranges=bundle.ranges, run_folder=store.path if key else None, fit_key=key
+    )
 
 
 def _key_of_fit(store: RunFolder, name: str, model: AbstractModel | Cascade) -> str | None:

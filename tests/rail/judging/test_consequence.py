@@ -49,7 +49,7 @@ def options(train: str, **changes: object) -> ConsequenceOptions:
     return ConsequenceOptions(**{**given, "errors_in": ("full service",), **changes})
 
 
-SUBJECTS = {"simple": [(handle_to_cylinder(), {})]}
+SUBJECTS = {"simple": [(handle_to_cylinder(), {}, {})]}
 
 
 def test_a_judgement_of_a_simple_brake(train: str) -> None:
@@ -82,6 +82,22 @@ def test_a_judgement_of_a_simple_brake(train: str) -> None:
     told = {*found["full service"]["differences"], *found["full service"]["measures"], "speed"}
     assert told == set(document["quantities"])
     assert all(one["name"] and one["meaning"] for one in document["quantities"].values())
+
+
+@pytest.mark.parametrize(("said", "answers"), [({}, False), ({"beyond": True}, True)])
+def test_a_handle_beyond_what_was_fitted_is_told_of_and_run_only_if_that_is_meant(
+    train: str, said: dict[str, bool], answers: bool
+) -> None:
+    subjects = {"service": [(handle_to_cylinder(), said, {"STP": (64.2, 90.0)})]}
+    steps = JUDGE.steps(options(train, scenarios=("full service", "emergency")), subjects)
+    found = {step.name: step.run() for step in steps[:2]}
+    assert "refused" not in found["service: full service"]
+    assert ("refused" not in found["service: emergency"]) is answers
+    if not answers:
+        assert "STP goes to 0 psi" in found["service: emergency"]["refused"]
+        assert "64.2 to 90" in found["service: emergency"]["refused"]
+    terms = [steps[0].terms, JUDGE.steps(options(train, scenarios=("full service", "emergency")), SUBJECTS)[0].terms]
+    assert (terms[0] == terms[1]) is answers
 
 
 @pytest.mark.parametrize(

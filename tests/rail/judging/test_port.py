@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.variant import VARIANTS
 from sysid.errors import ConfigError
 from sysid.models import ARX, ARXModel, Cascade, Interpolation, Limit, Mapping
+from sysid.rail.dynamics.brake import ReferenceBrake
 from sysid.rail.dynamics.cascade_brake import CascadeBrake, LineBrake
 from sysid.rail.dynamics.surrogate import SurrogateBrake, ValveSurrogateBrake
 from sysid.rail.end_of_train.tail_unit import TwoEndedBrake
@@ -158,6 +160,47 @@ def test_a_whole_that_was_made_for_one_place_is_refused_for_others() -> None:
     with pytest.raises(ConfigError, match="made for one place is asked for every car"):
         brake_of([Part(model=whole())], TRAIN)
     assert isinstance(brake_of([Part(model=whole())], Consist(pairs=1))(), CascadeBrake)
+
+
+# --- what was fitted
+
+
+def test_a_brake_stays_where_its_handle_was_fitted_or_is_run_because_it_is_meant() -> None:
+    known = {"STP": (64.0, 90.0)}
+    part = Part(model=whole(), everywhere=True, ranges=known)
+    within, slightly, far = np.full(3, 64.0), np.full(3, 63.0), np.array([90.0, 70.0, 0.0])
+    made = brake_of([part], TRAIN)
+    plain = brake_of([Part(model=whole(), everywhere=True)], TRAIN)
+    for command in (within, slightly):
+        np.testing.assert_array_equal(made().advance(command).cylinders, plain().advance(command).cylinders)
+    with pytest.raises(ConfigError, match=r"STP goes to 0 psi, and the traces that fitted it have 64 to 90"):
+        made().advance(far)
+    meant = brake_of([replace(part, beyond=True)], TRAIN)()
+    np.testing.assert_array_equal(meant.advance(far).cylinders, plain().advance(far).cylinders)
+
+
+def test_valves_on_the_reference_s_pipe_are_refused_where_it_leaves_what_fitted_them() -> None:
+    made = brake_of([Part(model=CYLINDER, ranges={"BP": (64.0, 90.0)})], TRAIN)
+    made().advance(np.full(100, 70.0))
+    with pytest.raises(ConfigError, match="BP goes to"):
+        made().advance(np.full(100, 0.0))
+
+
+def test_all_parts_have_to_have_been_fitted_there() -> None:
+    ranges = ({"BP": (64.0, 90.0)}, {"BP": (80.0, 95.0)})
+    two = [Part(model=one, ranges=known) for one, known in zip((RESERVOIR, CYLINDER), ranges, strict=True)]
+    with pytest.raises(ConfigError, match="80 to 90"):
+        brake_of(two, TRAIN)().advance(np.full(300, 70.0))
+
+
+def test_models_stand_on_the_pipe_of_the_physics_that_is_asked_for() -> None:
+    command = np.full(60, 70.0)
+    found = [brake_of(parts(CYLINDER), TRAIN, one)().advance(command).head_pipe for one in VARIANTS.values()]
+    expected = [ReferenceBrake(consist=TRAIN, variant=one).advance(command).head_pipe for one in VARIANTS.values()]
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(
+        found[list(VARIANTS).index("acoustic")], brake_of(parts(CYLINDER), TRAIN)().advance(command).head_pipe
+    )
 
 
 # --- lines

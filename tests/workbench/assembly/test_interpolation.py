@@ -11,7 +11,12 @@ from numpy.testing import assert_allclose
 from sysid.composite.members import assembled
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Role, Trace, TraceSet
-from sysid.workbench.assembly.interpolation import interpolation_of, positions_of, score_interpolation
+from sysid.workbench.assembly.interpolation import (
+    StoredInterpolation,
+    interpolation_of,
+    positions_of,
+    score_interpolation,
+)
 from sysid.workbench.assembly.proof_config import InterpolationConfig
 from tests.composite.composites import models, pipe, trace
 from tests.workbench.assembly.test_config import TWO_PLACES, config
@@ -44,6 +49,13 @@ def test_what_the_knots_need_runs_along_and_what_the_outputs_need_stands_at_a_pl
     assert set(line.at_place.inputs) == {"BP", "STP"}
     assert line.at_place.limits["AR"].high == "BP"
     assert dict(line.knots) == {"BP": 1.0, "BP9": 9.0}
+
+
+def test_it_knows_what_it_was_trained_on():
+    line, fitted = interpolation_of(ASKED, whole()), [trace(seed=5), trace(seed=6)]
+    stored = StoredInterpolation.of(ASKED, line, next(iter(positions())), fitted)
+    values = np.concatenate([one["STP"] for one in fitted])
+    assert stored.ranges == {"STP": (values.min(), values.max())}
 
 
 def test_positions_are_the_numbers_behind_an_output():

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
+from numpy.testing import assert_array_equal
 
+from sysid.composite import Composite, started_from
 from sysid.errors import BundleError, ConfigError
 from sysid.export import export_bundle
 from sysid.ingest import load_dataset
 from sysid.reporting import publish_run
 from sysid.workbench.assembly.runner import read_assembly
+from sysid.workbench.assembly.warm_start import read_whole
 from sysid.workbench.commands.run import run_request
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
+from tests.composite.composites import member, trace
+from tests.models.test_interpolation import line
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results, fill
 
 QUICK = PIPELINE.replace("candidates: 2", "candidates: 1").replace(
@@ -67,6 +73,22 @@ def test_its_rounds_are_found_again_until_it_begins_from_another_whole(workspace
     run(workspace, "tanks", FIRST.replace("max_iterations: 4", "max_iterations: 2"))
     run(workspace, "further", SECOND)
     assert file.stat().st_mtime_ns != stamp
+
+
+def test_a_line_is_begun_from_as_well(tmp_path: Path) -> None:
+    """What runs along it, and once what stands at every position, whose weights each instance begins with."""
+    (tmp_path / "line.json").write_text(json.dumps(line().to_dict()), encoding="utf-8")
+    given, said = read_whole(tmp_path)
+    assert said.startswith(f"Begun from the line {tmp_path.name} (")
+    assert set(given.outputs) == {"BP", "BP10", "BP25", "BP50", "AR", "BC"}
+    places = Composite(
+        members=(member("BP -> AR", instances=("", "10")), member("STP -> BP", instances=("", "10"), shared=("STP",)))
+    )
+    whole = started_from(places, given, trace())
+    for name in ("BP", "BP10"):
+        assert whole.member(name).theta is given.member(name).theta
+    assert str(whole.member("AR10").mapping) == "BP10 -> AR10"
+    assert_array_equal(whole.member("AR10").theta, given.member("AR").theta)
 
 
 def test_what_is_declared_is_the_new_pipelines(workspace: Path, trained: Path) -> None:

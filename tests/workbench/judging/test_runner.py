@@ -63,7 +63,7 @@ class OvershootJudge:
 
     def steps(self, options: Options, subjects: Mapping[str, Sequence[Any]]) -> list[Step]:
         return [
-            Step(name, {"level": options.level, "models": [m.to_dict() for m, _ in parts]}, self._run(options, parts))
+            Step(name, {"level": options.level, "models": [m.to_dict() for m, *_ in parts]}, self._run(options, parts))
             for name, parts in subjects.items()
         ]
 
