@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from sysid.airbrake.consist import BrakeValve
-from sysid.airbrake.variant import PHYSICAL, Variant
+from sysid.airbrake.variant import USUAL, Variant
 from sysid.units import PSI_IN_PA
 
 BAR = 1e5
@@ -30,14 +30,14 @@ class Equipment:
         about: What it is, for the docs.
     """
 
-    variant: Variant = PHYSICAL
+    variant: Variant = USUAL
     valve: BrakeValve = field(default_factory=BrakeValve)
     running_pressure: float = 90.0
     about: str
 
 
 _UIC = dataclasses.replace(
-    PHYSICAL,
+    USUAL,
     graduated_release=True,
     quick_service_limit=0.5 * BAR,
     equalising_rate=0.3 * BAR,
@@ -54,12 +54,12 @@ _POSITION_P = BrakeValve(
 
 EQUIPMENT: Mapping[str, Equipment] = {
     "ab": Equipment(
-        variant=dataclasses.replace(PHYSICAL, accelerated_service=False, accelerated_emergency=False),
+        variant=dataclasses.replace(USUAL, accelerated_service=False, accelerated_emergency=False),
         about="AB: a release is carried on by the pipe alone",
     ),
-    "abd": Equipment(about="ABD: each valve gives air back to the pipe as it releases; the variant physical"),
+    "abd": Equipment(about="ABD: each valve gives air back to the pipe as it releases; the usual valve"),
     "abdw": Equipment(
-        variant=dataclasses.replace(PHYSICAL, accelerated_application=True),
+        variant=dataclasses.replace(USUAL, accelerated_application=True),
         about="ABDW, and ABDX with what it has of it: each valve vents the pipe for as long as an application goes on",
     ),
     "uic-p": Equipment(

@@ -6,8 +6,10 @@ models stand at every position, all of them run side by side. A position at whic
 than one at which all was.
 
 The field is interpolated by the cubic spline through the knots (not-a-knot ends), which is linear in the values: a
-position is a row of fixed weights. Limits: no faster change along the line than the knots resolve (a front that takes
-many samples from one knot to the next is smeared for that long), and no position beyond the outer knots.
+position is a row of fixed weights. A front that takes some samples from one knot to the next is smeared for that long,
+unless it is said how fast it runs (``delay``): each knot is then heard at a position as much later or earlier as the
+front passes it, and what is interpolated is what the knots have at the same time of their own. Limits: no faster change
+along the line than the knots resolve, and no position beyond the outer knots.
 """
 
 from __future__ import annotations
@@ -38,6 +40,7 @@ class Interpolation:
         knots: Position of each knot, increasing, by the channel that is the field there.
         at_place: The cascade that stands at every position. It reads :attr:`channel`, and may read inputs of ``along``.
         channel: Name under which it reads the field.
+        delay: Seconds that a front takes from one position to the next.
 
     Raises:
         ConfigError: If the knots are fewer than two or do not increase, or the cascades do not fit each other.
@@ -60,6 +63,7 @@ class Interpolation:
     knots: Dict[str, float]
     at_place: Cascade
     channel: str
+    delay: float = 0.0
 
     kind = "Interpolation"
     OLD_KIND = "Line"
@@ -77,6 +81,11 @@ class Interpolation:
                 got=", ".join(f"{name}: {position:g}" for name, position in knots.items()) or "none",
                 remedy="give each knot its position, in order",
             )
+        if not 0.0 <= self.delay < np.inf:
+            raise ConfigError(
+                "no front runs so", where="delay of the line",
+                expected="seconds from one position to the next, from 0 on", got=self.delay,
+            )  # fmt: skip
         strangers = [name for name in knots if name not in self.along.outputs]
         if strangers:
             raise ChannelError(strangers, self.along.outputs, where="knots of the line")
@@ -160,11 +169,24 @@ class Interpolation:
             ConfigError: If a position is not on the line.
         """
         weights, along = self.weights(positions), self.along.simulate(inputs)
-        fields = weights @ np.stack([along[name] for name in self.knots])
+        fields = self._fields(np.stack([along[name] for name in self.knots]), weights, np.atleast_1d(positions))
         records = np.empty((*fields.shape, len(self.at_place.inputs)))
         for column, name in enumerate(self.at_place.inputs):
             records[..., column] = fields if name == self.channel else along[name]
         return self.at_place.simulate_batch(records, workers=workers)
+
+    def _fields(
+        self, knots: NDArray[np.float64], weights: NDArray[np.float64], positions: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The field at positions, ``(n_places, n_samples)``; before the first sample and after the last it rests."""
+        if not self.delay:
+            return weights @ knots
+        samples, found = np.arange(knots.shape[1]), np.zeros((len(positions), knots.shape[1]))
+        for place, position in enumerate(positions):
+            for k, at in enumerate(self.knots.values()):
+                later = self.delay / self.sample_time * (position - at)
+                found[place] += weights[place, k] * np.interp(samples - later, samples, knots[k])
+        return found
 
     def simulate_trace(
         self, trace: Trace, positions: Sequence[float] | NDArray[np.float64], *, workers: int = 2
@@ -201,6 +223,7 @@ class Interpolation:
             "knots": dict(self.knots),
             "at_place": self.at_place.to_dict(),
             "channel": self.channel,
+            **({"delay": self.delay} if self.delay else {}),
         }
 
     @classmethod
@@ -230,4 +253,5 @@ class Interpolation:
             knots=fields["knots"],
             at_place=cascade_from_dict(fields["at_place"]),
             channel=fields["channel"],
+            delay=float(fields.get("delay", 0.0)),
         )

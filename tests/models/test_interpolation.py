@@ -55,6 +55,40 @@ def test_between_knots_the_field_is_the_cubic_spline_through_them():
     assert_allclose(run["BC"][1], valve().simulate(spline(17.5)[:, None])["BC"], atol=1e-9)
 
 
+def test_a_front_that_runs_along_the_line_arrives_at_each_position_at_its_own_time():
+    """One shape at every knot, two samples later from each position to the next: it is the same at all of them."""
+    shape = network("STP -> BP", seed=3)
+    delayed = [
+        replace(
+            shape,
+            network=replace(shape.network, input_delays=((2 * k, 2 * k + 1, 2 * k + 3),)),
+            mapping=Mapping(inputs=("STP",), output=name),
+        )
+        for k, name in enumerate(("BP", "BP1", "BP2", "BP3"))
+    ]
+    assert delayed[0].recursion.lags.inputs == ((0, 1, 3),)
+    knots = {"BP": 0.0, "BP1": 1.0, "BP2": 2.0, "BP3": 3.0}
+    smeared = Interpolation(along=Cascade(models=tuple(delayed)), knots=knots, at_place=valve(), channel="BP")
+    running = replace(smeared, delay=2 * smeared.sample_time)
+    command, first = np.repeat([90.0, 70.0, 90.0], [140, 60, 60])[:, None], delayed[0]
+    here = Cascade(models=(first,)).simulate(command)["BP"]
+    for position in (0.5, 1.5, 3.0):
+        steps = int(2 * position)
+        expected = np.concatenate([np.full(steps, here[0]), here[:-steps]])
+        errors = [
+            np.abs(one.simulate(command, [position])["BP"][0] - expected)[139:250].max() for one in (running, smeared)
+        ]
+        assert errors[0] < 1e-9
+        assert errors[1] > 0.1 or position == 3.0
+    again = Interpolation.from_dict(running.to_dict())
+    assert_allclose(again.simulate(command, [1.5])["BC"], running.simulate(command, [1.5])["BC"], rtol=0, atol=0)
+
+
+def test_a_front_does_not_run_backwards():
+    with pytest.raises(ConfigError, match="no front runs so"):
+        replace(line(), delay=-0.1)
+
+
 def test_a_straight_field_is_kept_straight_and_rows_of_weights_add_up_to_one():
     positions = np.linspace(1.0, 50.0, 99)
     weights = line().weights(positions)

@@ -30,7 +30,8 @@ class TailSettings:
         emergency_delay: Time in s from the order to the open valve: at most 1 s (49 CFR 232.405).
         service_area: In m2 (ours: 5 mm across; a service rate at the end of a long train).
         service_band: Pipe above the target in psi from which the service valve is fully open, in proportion below
-            (ours): a valve that is open or shut makes waves that apply the last cars deeper than was asked for.
+            (ours): a valve that is open or shut makes waves that apply the last cars deeper than was asked for, and so
+            does one with a band of 3 psi at the end of a short train, whose air has mass.
         service_delay: Time in s from a service order to the valve (ours).
         minimum_reduction: Of a minimum application in psi (ours: the 26-L brake valve's is 6 to 8 psi by the
             description of the San Diego Railroad Museum).
@@ -45,7 +46,7 @@ class TailSettings:
     emergency_hold: float = 15.0
     emergency_delay: float = 1.0
     service_area: float = 2.0e-5
-    service_band: float = 3.0
+    service_band: float = 12.0
     service_delay: float = 1.0
     minimum_reduction: float = 6.0
     refusal: float = 2.0

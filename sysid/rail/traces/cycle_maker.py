@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.variant import USUAL_VARIANT
 from sysid.code_digest import code_digest
 from sysid.rail.dynamics.train import heavy_haul
 from sysid.rail.traces.cycles import HabitSettings, command_of, drive_cycle, line_cycle
@@ -141,7 +142,7 @@ class CycleMaker:
             "channels": [dict(channel) for channel in options.channels],
             "source": {
                 "generator": "abdx",
-                "options": {"variant": "physical", "pairs": options.pairs, "quantities": dict(options.quantities)},
+                "options": {"variant": USUAL_VARIANT, "pairs": options.pairs, "quantities": dict(options.quantities)},
             },
             "cases": {case.name: {"role": case.role, "recipe": results[case.name]} for case in options.cases},
             "provenance": "The command vectors are what simulated drivers did with the handle: "

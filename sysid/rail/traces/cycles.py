@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.variant import USUAL, Variant
 from sysid.errors import ConfigError
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.brake import ReferenceBrake
@@ -191,6 +192,7 @@ def drive_cycle(
     seed: int,
     duration: float = 900.0,
     settings: HabitSettings | None = None,
+    variant: Variant = USUAL,
 ) -> Run:
     """Drive a train over a hilly line with the reference brake.
 
@@ -200,13 +202,15 @@ def drive_cycle(
         seed: Of line and driver.
         duration: In s.
         settings: Habits.
+        variant: The reading of the brake.
 
     Returns:
         The run; its ``handle`` is the cycle.
     """
     settings = settings or HabitSettings(running=consist.running_pressure)
     driver = CycleBrakingDriver(settings=settings, seed=seed)
-    return _driven(train, consist, driver, seed=seed, duration=duration, speed=settings.target)
+    brake = ReferenceBrake(consist=consist, variant=variant)
+    return _driven(train, brake, driver, seed=seed, duration=duration, speed=settings.target)
 
 
 def line_cycle(
@@ -231,12 +235,15 @@ def line_cycle(
     """
     settings = settings or HabitSettings(running=consist.running_pressure)
     driver = NotchAndBrakeDriver(train=train, track=rolling_line(seed), settings=settings, seed=seed)
-    return _driven(train, consist, driver, seed=seed, duration=duration, speed=settings.target)
+    brake = ReferenceBrake(consist=consist)
+    return _driven(train, brake, driver, seed=seed, duration=duration, speed=settings.target)
 
 
-def _driven(train: Train, consist: Consist, driver: AbstractDriver, *, seed: int, duration: float, speed: float) -> Run:
+def _driven(
+    train: Train, brake: ReferenceBrake, driver: AbstractDriver, *, seed: int, duration: float, speed: float
+) -> Run:
     moving = MovingTrain(train=train, track=rolling_line(seed), speed=speed)
-    return drive(moving, ReferenceBrake(consist=consist), driver, Limits(duration=duration, until_still=False, block=1))
+    return drive(moving, brake, driver, Limits(duration=duration, until_still=False, block=1))
 
 
 def command_of(handle: NDArray[np.float64], sample_time: float) -> Command:

@@ -150,7 +150,13 @@ def interpolation_of(asked: InterpolationConfig, whole: Cascade) -> Interpolatio
             got=f"{', '.join(asked.outputs)} from {', '.join(there.inputs)}",
             remedy="name the channel that the positions read, and outputs of members that stand there",
         )
-    return Interpolation(along=whole.upstream_of(asked.knots), knots=asked.knots, at_place=there, channel=asked.channel)
+    return Interpolation(
+        along=whole.upstream_of(asked.knots),
+        knots=asked.knots,
+        at_place=there,
+        channel=asked.channel,
+        delay=asked.delay,
+    )
 
 
 def positions_of(case: Trace, output: str) -> dict[float, str]:

@@ -37,6 +37,8 @@ class InterpolationConfig(BaseModel):
         outputs: What is had at every position, by the names in the first instance.
         data: Data set with the reference: the output at position 17 is the output's name with 17 behind it.
         judged: Outputs that are scored there; all by default.
+        delay: Seconds that a front of the channel takes from one position to the next: it is then not smeared between
+            knots.
     """
 
     model_config = STRICT
@@ -46,6 +48,7 @@ class InterpolationConfig(BaseModel):
     outputs: tuple[str, ...] = Field(min_length=1)
     data: str
     judged: tuple[str, ...] = ()
+    delay: float = Field(default=0.0, ge=0.0, allow_inf_nan=False)
 
     @model_validator(mode="after")
     def _check(self) -> InterpolationConfig:

@@ -9,7 +9,7 @@ from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import Probe
 from sysid.airbrake.simulate import simulate
-from sysid.airbrake.variant import PHYSICAL
+from sysid.airbrake.variant import USUAL
 from sysid.errors import ConfigError
 from sysid.models import ARX, NARX, AbstractModel, ARXModel, History, Mapping, NARXModel, Scaling, parameter_count
 from sysid.rail.dynamics.brake import AbstractBrake, RecordedBrake, ReferenceBrake, valve_of_vehicle
@@ -109,7 +109,7 @@ def test_the_reference_is_the_simulation_of_the_air_brake() -> None:
     command = Command.from_rows([[0, 90], [2, 64.2], [20, 64.2]])
     output = ReferenceBrake(consist=TRAIN).advance(command.sampled(sample_time=0.1))
     probes = [Probe(quantity="cylinder", node=5), Probe(quantity="pipe", node=7), Probe(quantity="pipe", node=1)]
-    record = simulate(command, consist=TRAIN, variant=PHYSICAL, probes=tuple(probes))
+    record = simulate(command, consist=TRAIN, variant=USUAL, probes=tuple(probes))
     np.testing.assert_array_equal(output.cylinders[:, 3], record["cylinder", 5] - 101_325.0)
     assert output.tail_pipe is not None
     assert output.equalising is not None
@@ -178,7 +178,7 @@ def test_surrogate_valves_are_their_model_on_the_reference_s_pressures() -> None
         command.sampled(sample_time=0.1)
     )
     probes = tuple(Probe(quantity=quantity, node=5) for quantity in ("pipe", "auxiliary"))
-    inputs = (simulate(command, consist=TRAIN, variant=PHYSICAL, probes=probes).pressures - 101_325.0) / PSI_IN_PA
+    inputs = (simulate(command, consist=TRAIN, variant=USUAL, probes=probes).pressures - 101_325.0) / PSI_IN_PA
     alone = model.simulate(inputs, History.at_rest(inputs=[90.0, 90.0], output=0.0))
     np.testing.assert_allclose(output.cylinders[:, 3], np.maximum(alone, 0.0) * PSI_IN_PA, rtol=1e-9, atol=1e-3)
 

@@ -44,8 +44,8 @@ def test_the_target_follows_the_reduction_at_the_head() -> None:
     unit = charged_unit(88.0)
     assert order(unit, Order.SERVICE, reduction=20.0) is Answer.DONE
     assert unit.target == pytest.approx(68.0)
-    assert unit.step(72.0) == SETTINGS.service_area
-    assert 0.0 < unit.step(68.3) < 0.2 * SETTINGS.service_area
+    assert unit.step(68.0 + SETTINGS.service_band) == SETTINGS.service_area
+    assert 0.0 < unit.step(68.0 + 0.1 * SETTINGS.service_band) < 0.2 * SETTINGS.service_area
     assert unit.step(68.0) == 0.0
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.variant import PHYSICAL
 from sysid.errors import ConfigError
 from sysid.ingest import find_dataset, load_dataset, read_description
 from sysid.rail.constants import KMH
@@ -76,9 +77,9 @@ def test_impossible_habits_are_refused(wrong: dict[str, float]) -> None:
 
 
 def test_the_data_set_holds_such_a_cycle() -> None:
-    """The first command vector in the data set is the one that the driver makes today."""
+    """The first command vector in the data set is the one that the driver makes today on its physics."""
     described = read_description(find_dataset("abdx-drive-cycles"))
     assert {case.role for case in described.cases.values()} == {Role.ESTIMATION, Role.SELECTION}
     traces = load_dataset("abdx-drive-cycles", cases=["CYC01"])
-    run = drive_cycle(heavy_haul(pairs=50), Consist(pairs=50), seed=1, duration=250.0)
+    run = drive_cycle(heavy_haul(pairs=50), Consist(pairs=50), seed=1, duration=250.0, variant=PHYSICAL)
     np.testing.assert_array_equal(traces["CYC01"]["STP"][:2500], run.handle)
