@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,7 +81,7 @@ class Bundle:
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Least and greatest value of each input in the traces that it was fitted on, where that is known."""
-        return {str(one["name"]): (one["range"][0], one["range"][1]) for one in self.inputs if one.get("range")}
+        return ranges_of(self.inputs)
 
     def simulate(self, u: Any, *, initial: Initial = None, start: StartLike | None = None, warn: bool = True) -> Any:
         """Free run of the model over inputs that are in memory.
@@ -155,6 +155,18 @@ class Bundle:
         check_units({channel.name: channel.unit for channel in outputs}, record)
         columns = {name: record[name] for name in measured}
         return run_measured(surrogate, inputs, columns, start, record.usable_samples).computed
+
+
+def ranges_of(channels: Sequence[Dict[str, Any]]) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of channels as a bundle or a line stores them.
+
+    Args:
+        channels: What is said of each; ``range`` is left out or null where it is not known.
+
+    Returns:
+        By name, of those that have one.
+    """
+    return {str(one["name"]): (one["range"][0], one["range"][1]) for one in channels if one.get("range")}
 
 
 def said_outside(inputs: NDArray[np.float64], units: Dict[str, str], ranges: Dict[str, tuple[float, float]]) -> str:

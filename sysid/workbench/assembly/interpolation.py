@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.export.bundle import ranges_of
 from sysid.export.manifest import ranges_in
 from sysid.models import Cascade, Interpolation
 from sysid.traces import Channel, Trace, TraceSet
@@ -119,8 +120,7 @@ class StoredInterpolation:
                 got=", ".join(channel.name for channel in sides["inputs"]) or "none",
                 remedy="let the pipeline that makes it run again",
             )
-        known = {one["name"]: one["range"] for one in channels["inputs"] if one.get("range")}
-        return cls(line=line, **sides, ranges={name: (low, high) for name, (low, high) in known.items()})
+        return cls(line=line, **sides, ranges=ranges_of(channels["inputs"]))
 
 
 def _said(channel: Channel) -> dict[str, Any]:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sysid.errors import ConfigError
+from sysid.export.bundle import ranges_of
 from sysid.export.reading import read_bundle
 from sysid.models import AbstractModel, Cascade, Interpolation
 from sysid.reporting.results import read_results
-from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.judging.config import PartConfig
 from sysid.workbench.runner.store import RunFolder, read_json
@@ -131,8 +131,9 @@ def _of_line(workspace: Path, given: str) -> Found:
             got=file.parent,
             remedy="give reports/whole-train, or run such a pipeline first: sysid run whole-train",
         )
-    stored = StoredInterpolation.from_dict(read_json(file))
-    return Found(model=stored.line, said=f"line {given}", ranges=stored.ranges)
+    fields = read_json(file)
+    known = ranges_of(fields.get("channels", {}).get("inputs", ()))
+    return Found(model=Interpolation.from_dict(fields), said=f"line {given}", ranges=known)
 
 
 def _of_bundle(folder: Path, given: str) -> Found:
