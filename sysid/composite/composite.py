@@ -12,10 +12,10 @@ from typing import Any
 
 from sysid.composite.fixed_member import FixedMember, Standing, parameters_of
 from sysid.composite.limit_expressions import named_limits
-from sysid.composite.parameters import check_names, declared, values_in
+from sysid.composite.parameters import check_names, declared
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training, estimators
-from sysid.models import NARX, AbstractStructure, Cascade, Limit, Mapping
+from sysid.models import NARX, AbstractStructure, Limit, Mapping
 from sysid.models.cascade_run import Level
 from sysid.models.grey_box import Parameter
 
@@ -176,18 +176,6 @@ class Composite:
     def free(self) -> tuple[str, ...]:
         """Names of the parameters that are estimated."""
         return tuple(dict.fromkeys(parameter.name for one in self.fixed for parameter in one.free))
-
-    def fixed_in(self, whole: Cascade) -> tuple[FixedMember, ...]:
-        """The fixed submodels with the parameters that a whole has.
-
-        Args:
-            whole: A trained one.
-
-        Returns:
-            The submodels.
-        """
-        values = values_in(whole) if self.free else {}
-        return tuple(one.at(values) for one in self.fixed)
 
     @property
     def standing(self) -> tuple[Standing, ...]:

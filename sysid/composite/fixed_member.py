@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from sysid.composite.fixed_expressions import moving
@@ -173,23 +173,14 @@ class FixedMember(Standing):
         return GreyBox(equations=equations, tables=self.tables, parameters=self.parameters)
 
     @property
+    def named(self) -> tuple[Parameter, ...]:
+        """The parameters."""
+        return self.parameters  # type: ignore[return-value]  # brought into this form when it was made
+
+    @property
     def free(self) -> tuple[Parameter, ...]:
         """What is estimated."""
-        return self.grey_box.free if self.equation else ()
-
-    def at(self, values: Dict[str, float]) -> FixedMember:
-        """The same submodel at other values of its parameters.
-
-        Args:
-            values: By name, in their units; a parameter that is not among them keeps its own.
-
-        Returns:
-            The submodel.
-        """
-        if not self.free:
-            return self
-        named = self.grey_box.named
-        return replace(self, parameters=tuple(replace(one, start=values.get(one.name, one.start)) for one in named))
+        return tuple(one for one in self.named if not one.fixed)
 
     def _check_equation(self) -> None:
         system = self.grey_box.system

@@ -39,7 +39,9 @@ from sysid.models import NARX, Cascade, GreyBoxModel, NARXModel, Scaling
 from sysid.traces import Channel, Trace
 
 
-def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = None) -> NARXModel | GreyBoxModel:
+def fixed_model(
+    fixed: FixedMember, like: Trace, units: Dict[str, str] | None = None, values: Dict[str, float] | None = None
+) -> NARXModel | GreyBoxModel:
     """A fixed submodel in its first instance, as a model that runs and is exported like the others.
 
     A sum is a network without neurons, and what is no sum a grey box, its parameters where they start.
@@ -48,6 +50,8 @@ def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = 
         fixed: What is declared.
         like: A trace with its inputs, for their units and the sample time.
         units: Units of inputs that the trace need not have.
+        values: Of parameters by name, in their units; those that are not among them, or beyond their bounds, stand
+            where they start, or at the bound.
 
     Returns:
         The model, without its bounds.
@@ -65,9 +69,11 @@ def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = 
         "rest_output": fixed.rest,
     }
     if fixed.equation:
+        given = values or {}
+        theta = np.array([min(max(given.get(one.name, one.start), one.low), one.high) for one in fixed.free])
         return GreyBoxModel(
             grey=fixed.grey_box,
-            theta=np.array([one.start for one in fixed.free]),
+            theta=theta,
             norms=(),
             levels=(),
             spans=(),
@@ -84,12 +90,15 @@ def fixed_model(fixed: FixedMember, like: Trace, units: Dict[str, str] | None = 
     )
 
 
-def with_fixed(fixed: Sequence[FixedMember], traces: Sequence[Trace]) -> list[Trace]:
+def with_fixed(
+    fixed: Sequence[FixedMember], traces: Sequence[Trace], values: Dict[str, float] | None = None
+) -> list[Trace]:
     """Traces with what fixed submodels say of their measured channels, as further channels.
 
     Args:
         fixed: The submodels; they may read each other, in a circle through the past too.
         traces: Measured traces.
+        values: Of parameters by name, in their units; by default where they start.
 
     Returns:
         As many traces, the new channels in the order of the submodels, each in all its instances. A channel that is
@@ -103,7 +112,7 @@ def with_fixed(fixed: Sequence[FixedMember], traces: Sequence[Trace]) -> list[Tr
 
     def one(trace: Trace) -> Trace:
         units = {name: member.unit_in(trace) for member in fixed for name in member.outputs}
-        first = [(member, fixed_model(member, trace, units)) for member in fixed]
+        first = [(member, fixed_model(member, trace, units, values)) for member in fixed]
         declared = tuple(placed(member, model, there) for member, model in first for there in member.instances)
         run = Cascade(models=declared, limits=bounds).simulate_trace(trace)
         # What is measured stays as measured: the whole is held against it, and the others are fitted to it.

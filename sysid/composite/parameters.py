@@ -28,7 +28,7 @@ def declared(fixed: Sequence[FixedMember], more: Iterable[Parameter] = ()) -> di
         ConfigError: If one of a name has other terms than another.
     """
     found: dict[str, Parameter] = {}
-    for one in (*more, *(one for member in fixed if member.equation for one in member.grey_box.named)):
+    for one in (*more, *(one for member in fixed for one in member.named)):
         if found.setdefault(one.name, one) != one:
             raise ConfigError(
                 f"the parameter {one.name} is declared in two ways",

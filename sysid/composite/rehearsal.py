@@ -12,7 +12,7 @@ from sysid.composite.plan import RoundPlan, TrainingPlan
 from sysid.composite.shared_weights import SharedWeights
 from sysid.composite.stages import reading_more
 from sysid.errors import ConfigError
-from sysid.models import NARXModel, Scaling, parameter_count
+from sysid.models import Cascade, NARXModel, Scaling, parameter_count
 from sysid.traces import Trace
 
 
@@ -41,7 +41,7 @@ def rehearse(composite: Composite, plan: TrainingPlan, like: Trace) -> None:
         whole = reading_more(whole, one.reads)
         if one.share_weights:
             SharedWeights.of(composite, one, whole)
-    _check_estimated(composite, plan)
+    _check_estimated(composite, plan, whole)
 
 
 def _check_names(composite: Composite, asked: RoundPlan, outputs: tuple[str, ...]) -> None:
@@ -55,20 +55,23 @@ def _check_names(composite: Composite, asked: RoundPlan, outputs: tuple[str, ...
     _check_known(outputs, "reads", tuple(name for output, more in asked.reads.items() for name in (output, *more)))
 
 
-def _check_estimated(composite: Composite, plan: TrainingPlan) -> None:
+def _check_estimated(composite: Composite, plan: TrainingPlan, whole: Cascade) -> None:
     """Refuse parameters that would stay where they start."""
     trained = {
         parameter.name
         for one in plan.rounds
         if not one.share_weights
+        for moved in (whole.upstream_of(one.targets, given=one.measured).outputs if composite.free else (),)
         for equation in trained_equations(composite.fixed, one.members or None)
+        if not set(equation.outputs).isdisjoint(moved)
         for parameter in equation.free
     }
     if left := [name for name in composite.free if name not in trained]:
         raise ConfigError(
             f"no round estimates the parameter {left[0]}",
             where=f"parameters, {left[0]}",
-            expected="a round of training end to end that names no members, or among them the output of its equation",
+            expected="a round of training end to end with a target that depends on it, and no members, or the output of "
+            "its equation among them",
             got=f"{len(plan.rounds)} rounds",
             remedy="add such a round, or write fixed: true",
         )

@@ -103,7 +103,7 @@ class TrainedComposite:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """What was estimated in equations, by name, in its unit."""
+        """What the equations of :attr:`model` have for parameters that are estimated, by name, in their units."""
         return values_in(self.model)
 
     @property
@@ -180,7 +180,7 @@ def _fitted(composite: Composite, data: TrainingData, seen: TrainingData, whole:
     """All that was fitted, with what the fixed submodels say in the end."""
     given = data if composite.free else seen
     traces = [*given.estimation, *chain.from_iterable(one for one, _ in given.also.values())]
-    return with_fixed(composite.fixed_in(whole), traces) if composite.free else traces
+    return with_fixed(composite.fixed, traces, values_in(whole)) if composite.free else traces
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from sysid.composite.composite import Composite, Member
 from sysid.composite.fixed_members import fixed_model
 from sysid.composite.members import network_of, placed, wired
+from sysid.composite.parameters import values_in
 from sysid.errors import ConfigError
 from sysid.models import NARX, Cascade, NARXModel
 from sysid.traces import Trace
@@ -31,8 +32,8 @@ def started_from(composite: Composite, given: Cascade, like: Trace) -> Cascade:
         ConfigError: If a member is not there, is of another kind or reads what nothing here writes.
     """
     networks = [_network(given, member, there) for member in composite.members for there in member.instances]
-    known = composite.fixed_in(given)
-    fixed = [placed(one, fixed_model(one, like), there) for one in known for there in one.instances]
+    known = [(one, fixed_model(one, like, values=values_in(given))) for one in composite.fixed]
+    fixed = [placed(one, model, there) for one, model in known for there in one.instances]
     whole = wired(composite, [*networks, *fixed])
     declared = {
         one.channel(name, there) for one in composite.standing for there in one.instances for name in one.mapping.inputs

@@ -17,6 +17,7 @@ from sysid.composite import (
     TrainingData,
     TrainingPlan,
     fixed_by_equations,
+    started_from,
     train,
     train_round,
 )
@@ -114,6 +115,15 @@ def test_a_limit_may_be_a_parameter():
     assert found.parameters["edge"] == pytest.approx(edge, abs=0.02)
 
 
+def test_a_whole_to_begin_from_gives_its_values_and_the_prior_stays_as_declared(found):
+    (like,) = TrainingData(estimation=[noisy(0)], selection=[noisy(1)]).with_fixed(tanks()).estimation
+    begun = started_from(tanks(), found.model, like)
+    assert values_in(begun) == found.parameters
+    assert begun.member("flow").grey.free[0].start == 0.1
+    narrow = tanks(fixed=fixed_by_equations(FLOW, parameters=KNOWN | {"share": {"start": 0.1, "high": 0.2}}, unit="cm"))
+    assert values_in(started_from(narrow, found.model, like))["share"] == 0.2
+
+
 def test_equations_that_share_a_parameter_are_trained_together():
     fixed = fixed_by_equations("a = p*u; b = p*q*u; c = q*u; d = r*u; e = 2*u", parameters=dict.fromkeys("pqr", 1.0))
     assert [one.output for one in trained_equations(fixed, None)] == ["a", "b", "c", "d"]
@@ -139,6 +149,7 @@ def test_parameters_that_cannot_be_are_refused(changes, says):
     ("asked", "says"),
     [
         (plan(members=("lower",)), "no round estimates the parameter k"),
+        (plan(targets={"lower": 0.01}, measured=("flow",)), "no round estimates the parameter k"),
         (TrainingPlan(outputs=("lower",)), "no round estimates the parameter k"),
         (plan(members=("lower", "flow"), share_weights=True), "shares weights estimates no parameters"),
     ],

@@ -124,7 +124,7 @@ def _points(fixed: FixedMember) -> dict[str, list[list[float]]]:
 
 
 def _parameters(fixed: FixedMember) -> dict[str, Any]:
-    return {one.name: one.to_dict() for one in fixed.grey_box.named} if fixed.equation else {}
+    return {one.name: one.to_dict() for one in fixed.named}
 
 
 def equations_text(members: Sequence[FixedMember]) -> str:
