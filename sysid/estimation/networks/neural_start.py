@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,6 +49,10 @@ LOUD_SPREAD = 0.5
 makes its neurons move it as far. A system that switches has a linear model from which small neurons do not lead away;
 ``python -m tests.benchmarks state_space_peers`` fits a pneumatic cylinder from it alone, and from these too."""
 
+LOST, QUIETER = 4.0, 12
+"""Times the loss of a start without its neurons from which they are too loud for it, and how often they are halved
+then: those that grow without bound lead a resonance away for good, from where no gradient leads back."""
+
 TIME_CONSTANTS = (100.0, 5.0, 0.5)
 """How many times faster than the slowest of the random time constants the fastest one is; fewest samples of the
 fastest; and the spread of each around its place between the two, as a natural logarithm."""
@@ -69,11 +74,13 @@ class NeuralLayout(AbstractLayout):
         base: The linear model with neurons that do nothing, the records' initial states behind it, shape
             ``(n_parameters,)``.
         longest: Samples of the longest record: no time constant can be known that is longer.
+        loss: Of a free run over the records, where neurons can lead it away for good; ``None`` where they are bounded.
     """
 
     sizes: Sizes
     base: NDArray[np.float64]
     longest: int
+    loss: Callable[[NDArray[np.float64]], float] | None = None
 
     def centre(self) -> NDArray[np.float64]:
         """What the prior draws the model's parameters to: the linear model, and neurons that do nothing."""
@@ -125,15 +132,28 @@ class NeuralLayout(AbstractLayout):
         forgets = 1.0 - np.minimum(np.abs(np.diag(base[s.linear].reshape(s.states, -1))), LARGEST_POLE)
         theta = self.draw(rng, base)
         theta[s.readout] = (LOUD_SPREAD * forgets[:, None] * rng.standard_normal((s.states, s.neurons))).ravel()
-        return theta, base
+        return self._quietened(theta, base), base
+
+    def _quietened(self, theta: NDArray[np.float64], base: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same start, its neurons so quiet that they do not lead its free run away from all that is measured."""
+        if self.loss is None:
+            return theta
+        theta, most = theta.copy(), LOST * self.loss(base)
+        for _ in range(QUIETER):
+            if self.loss(theta) <= most:
+                break
+            theta[self.sizes.readout] *= 0.5
+        return theta
 
     def _random_dynamics(self, rng: np.random.Generator) -> NDArray[np.float64]:
         """States of their own time constants, from the slowest that the linear model has down to fast ones.
 
-        Each is driven by the inputs so that it ranges as far as they do; each output is a random sum of them.
+        As many pairs as swing in the linear model swing here, near its frequencies. Each state is driven by the inputs
+        so that it ranges as far as they do; each output is a random sum of them.
         """
         s = self.sizes
-        radius = min(float(np.abs(linalg.eigvals(self.base[s.linear].reshape(s.states, -1)[:, : s.states])).max()), 1.0)
+        linear = linalg.eigvals(self.base[s.linear].reshape(s.states, -1)[:, : s.states])
+        radius = min(float(np.abs(linear).max()), 1.0)
         ratio, least, spread = TIME_CONSTANTS
         slowest = min(max(-1.0 / np.log(max(radius, 1e-3)) if radius < 1.0 else np.inf, least), max(self.longest, 1))
         fastest = min(max(slowest / ratio, least), slowest)
@@ -141,7 +161,8 @@ class NeuralLayout(AbstractLayout):
         poles = np.exp(-np.exp(-(places + spread * rng.standard_normal(s.states))))
         gains = rng.standard_normal((s.states, s.inputs))
         base = np.zeros(len(self.base))
-        base[s.linear] = np.column_stack([np.diag(poles), gains * (1.0 - poles)[:, None], np.zeros(s.states)]).ravel()
+        A = _swinging(np.diag(poles), linear, spread, rng)
+        base[s.linear] = np.column_stack([A, gains * (1.0 - poles)[:, None], np.zeros(s.states)]).ravel()
         base[s.output_linear].reshape(s.outputs, s.row)[:, : s.states] = 0.5 * rng.standard_normal(
             (s.outputs, s.states)
         )
@@ -175,6 +196,20 @@ class NeuralLayout(AbstractLayout):
             theta[hidden] = np.column_stack([weights, biases]).ravel()
             theta[readout] = READOUT_SPREAD * rng.standard_normal(readout.stop - readout.start)
         return theta
+
+
+def _swinging(
+    A: NDArray[np.float64], linear: NDArray[np.complex128], spread: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Real poles, as many pairs of which swing as do in a linear model: those that turn by more than they die away."""
+    turns, dies = np.angle(linear), -np.log(np.clip(np.abs(linear), 1e-12, 1.0))
+    swings = turns[(turns > dies) & (turns < np.pi)]
+    A = A.copy()
+    for pair, turn in enumerate(np.sort(swings)):
+        both = slice(len(A) - 2 * pair - 2, len(A) - 2 * pair)
+        radius, angle = float(np.sqrt(np.prod(np.diag(A)[both]))), min(turn * np.exp(spread * rng.standard_normal()), 3)
+        A[both, both] = radius * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return A
 
 
 def linear_start(provider: NeuralProvider, *, until: float = math.inf) -> NDArray[np.float64]:

@@ -29,6 +29,7 @@ from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult
+from sysid.kernels.neurons import NEURONS
 from sysid.models import (
     AbstractStructure,
     Mapping,
@@ -237,7 +238,12 @@ def _fit(
     provider = weighed(provider, base)
     multistart = starts.Multistart(
         training=training,
-        layout=NeuralLayout(sizes=template.recursion.sizes, base=base, longest=max(len(e.output) for e in experiments)),
+        layout=NeuralLayout(
+            sizes=template.recursion.sizes,
+            base=base,
+            longest=max(len(e.output) for e in experiments),
+            loss=None if NEURONS[template.network.activation].bounded else provider.loss,
+        ),
         provider=provider,
         to_plain=np.eye(template.n_parameters, provider.n_parameters),
         template=template,

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 FAST = {"reassoc", "contract", "arcp", "nsz"}
 """Sums may be reordered, which is what lets the compiler vectorise them; NaN and infinity keep their meaning."""
+FAR = 1e6
+"""A sum that no bounded neuron makes as much of."""
 
 
 class Graph(Protocol):
@@ -54,3 +56,8 @@ class Neuron:
     jax: Callable[[], Callable[[Any], Any]]
     matlab: str
     st: str
+
+    @property
+    def bounded(self) -> bool:
+        """Whether what comes out stays below some number, however large the sum is."""
+        return bool(np.abs(self.value(np.array([-FAR, FAR]))).max() < FAR)

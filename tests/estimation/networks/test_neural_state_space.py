@@ -260,6 +260,52 @@ def test_random_dynamics_are_stable_and_span_the_linear_models_time_constants(n:
     assert np.abs(theta[sizes.readout]).max() > 1e-3 * (1.0 - poles.max())
 
 
+def test_random_dynamics_swing_where_the_linear_model_does() -> None:
+    sizes = NeuralStateSpace(states=3, neurons=2).sizes(1)
+    A = np.zeros((3, 3))
+    A[:2, :2] = 0.98 * np.array([[np.cos(0.6), -np.sin(0.6)], [np.sin(0.6), np.cos(0.6)]])
+    A[2, 2] = 0.9
+    base = np.zeros(sizes.count + 3)
+    base[sizes.linear] = np.column_stack([A, np.zeros((3, 2))]).ravel()
+    layout = NeuralLayout(sizes=sizes, base=base, longest=1000)
+    for seed in range(10):
+        _, centre = layout.start(1, np.random.default_rng(seed), layout.centre())
+        poles = np.linalg.eigvals(centre[sizes.linear].reshape(3, -1)[:, :3])
+        turns = np.sort(np.angle(poles))
+        assert np.abs(poles).max() < 1.0
+        assert turns[1] == 0.0 and 0.1 < turns[2] < np.pi and turns[0] == -turns[2]
+
+
+def hardening_spring(seed: int, n: int = 1500) -> Trace:
+    """A hardly damped mass on a spring that stiffens."""
+    rng = np.random.default_rng(seed)
+    u, x, v = steps(n, rng), 0.0, 0.0
+    y = np.empty(n)
+    for t in range(n):
+        y[t] = x
+        v += 0.3 * (0.06 * u[t] - 0.5 * x - 0.3 * x**3 - 0.05 * v)
+        x += 0.3 * v
+    return a_trace(f"spring {seed}", u, y)
+
+
+def test_cubes_begin_so_quiet_that_no_start_is_lost() -> None:
+    """Loud ones led a resonance away to where no gradient leads back from: the error stayed the output's own."""
+    network = NeuralStateSpace(states=2, neurons=2, activation="cubic")
+    experiments = experiments_of([hardening_spring(0)], MAPPING, Start(), 0.0)
+    scaling = Scaling.to_unit_range([experiments[0].inputs], [experiments[0].output])
+    form = NeuralForm(sizes=network.sizes(1), theta=np.zeros(network.sizes(1).count), scaling=scaling)
+    provider = NeuralProvider(template=form, experiments=experiments)
+    base = linear_start(provider)
+    loud, quiet = (
+        [NeuralLayout(sizes=form.sizes, base=base, longest=1500, loss=loss).start(2, np.random.default_rng(seed), base)[0]
+         for seed in range(10)]
+        for loss in (None, provider.loss)
+    )  # fmt: skip
+    assert max(map(provider.loss, loud)) > 10.0 * provider.loss(base)
+    assert max(map(provider.loss, quiet)) <= neural_start.LOST * provider.loss(base)
+    assert all((np.abs(one[form.sizes.readout]) > 0.0).all() for one in quiet)
+
+
 BOTH = Mapping.parse("u+w -> y+z")
 
 

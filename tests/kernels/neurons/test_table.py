@@ -47,6 +47,10 @@ def test_the_slope_is_the_derivative(kind):
     assert_allclose(neuron.slope(SUMS), expected, rtol=1e-6, atol=1e-8)
 
 
+def test_a_kind_says_whether_it_stays_below_some_number():
+    assert {name: neuron.bounded for name, neuron in NEURONS.items()} == {"tanh": True, "cubic": False}
+
+
 @kinds
 def test_the_compiled_slope_is_the_one_of_numpy(kind):
     a, slope = SUMS.copy(), np.empty(len(SUMS))
