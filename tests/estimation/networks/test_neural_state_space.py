@@ -297,10 +297,11 @@ def test_cubes_begin_so_quiet_that_no_start_is_lost() -> None:
     provider = NeuralProvider(template=form, experiments=experiments)
     base = linear_start(provider)
     loud, quiet = (
-        [NeuralLayout(sizes=form.sizes, base=base, longest=1500, loss=loss).start(2, np.random.default_rng(seed), base)[0]
-         for seed in range(10)]
-        for loss in (None, provider.loss)
-    )  # fmt: skip
+        [layout.start(2, np.random.default_rng(seed), base)[0] for seed in range(10)]
+        for layout in (
+            NeuralLayout(sizes=form.sizes, base=base, longest=1500, loss=loss) for loss in (None, provider.loss)
+        )
+    )
     assert max(map(provider.loss, loud)) > 10.0 * provider.loss(base)
     assert max(map(provider.loss, quiet)) <= neural_start.LOST * provider.loss(base)
     assert all((np.abs(one[form.sizes.readout]) > 0.0).all() for one in quiet)
