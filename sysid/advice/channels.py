@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, stacked
-from sysid.estimation.held_output import held_for
+from sysid.estimation.held_output import held_for, straight_for
+from sysid.estimation.wrapped import jumping, period_of
 
 COARSE = 0.1
 """Of a channel's standard deviation: a step of its converter that is larger is coarse."""
@@ -37,22 +38,39 @@ def check_channels(record: Record) -> Iterator[Finding]:
         found += list(_channel(record, name))
     found += list(_trends(record))
     found += list(_held(record))
+    found += list(_wraps(record))
     if not any(one.verdict is Verdict.LOOK for one in found):
         yield Finding(topic=Topic.CHANNELS, code="channels.sound", verdict=Verdict.FINE)
     yield from found
 
 
 def _held(record: Record) -> Iterator[Finding]:
-    """An output that is measured more slowly than it is recorded."""
-    samples = held_for(record.segments)
+    """An output that is measured more slowly than it is recorded, by holds or by lines between its samples."""
+    held = held_for(record.segments)
+    samples = held if held > 1 else straight_for(record.segments)
     if samples > 1:
         yield Finding(
             topic=Topic.CHANNELS,
-            code="channel.held",
+            code="channel.held" if held > 1 else "channel.interpolated",
             verdict=Verdict.LOOK,
             subject=(record.mapping.output,),
             figures={"samples": samples, "seconds": samples * record.sample_time},
         )
+
+
+def _wraps(record: Record) -> Iterator[Finding]:
+    """Angles and counters that jump where they wrap."""
+    moved = [jumping(segment.inputs) for segment in record.segments]
+    for name in (*record.mapping.inputs, record.mapping.output):
+        found = period_of(record.values(name), moved if name == record.mapping.output else ())
+        if found is not None:
+            yield Finding(
+                topic=Topic.CHANNELS,
+                code="channel.wraps",
+                verdict=Verdict.LOOK,
+                subject=(name,),
+                figures={"period": found[0], "jumps": found[1]},
+            )
 
 
 def _channel(record: Record, name: str) -> Iterator[Finding]:

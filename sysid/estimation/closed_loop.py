@@ -64,7 +64,8 @@ def _by_prediction(model: AbstractModel, training: object) -> bool:
 
 
 def _said(model: AbstractModel, output: str, names: Sequence[str], early: Sequence[str], direct: bool) -> str:
-    begun = f"{output} acts on {' and '.join(names)} in these records: they are of a closed loop"
+    acts = f"{output} acts on {' and '.join(names)} in these records"
+    begun = f"{acts}: they are of a closed loop (or the inputs are recorded late)"
     if early:
         late = "feedthrough: false" if getattr(model.structure, "feedthrough", False) else at_lag(model, 1)
         return (

@@ -11,11 +11,13 @@ from sysid.estimation.closed_loop import feedback_told
 from sysid.estimation.error_causes import causes
 from sysid.estimation.error_lags import left_out
 from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.held_output import held_for
+from sysid.estimation.held_output import held_for, straight_for
 from sysid.estimation.informative import informative, own_part, still
 from sysid.estimation.nonparametric.excitation_order import MOST, excitation_order
 from sysid.estimation.nonparametric.segments import segments_of
 from sysid.estimation.record_levels import levels_told
+from sysid.estimation.wrapped import jumping, period_of
+from sysid.estimation.wrapped import told as wrapped
 from sysid.models import AbstractModel, Mapping, Start
 from sysid.traces import Trace
 
@@ -71,7 +73,30 @@ def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
                 "of them out, or record them moving apart."
             )
     columns = zip((*mapping.inputs, *mapping.outputs), (*inputs.T, *outputs.T), strict=True)
-    return (*told, *(told_ for name, column in columns for told_ in _far_off(name, column)))
+    return (*told, *(told_ for name, column in columns for told_ in _far_off(name, column)), *wraps(traces, mapping))
+
+
+def wraps(traces: Sequence[Trace], mapping: Mapping) -> list[str]:
+    """Which channels wrap, as angles and counters do.
+
+    Args:
+        traces: The records.
+        mapping: Which channels go in, which come out.
+
+    Returns:
+        One sentence for each.
+    """
+    found = list[str]()
+    for one in mapping.each:
+        segments = segments_of(traces, one)
+        moved = [jumping(segment.inputs) for segment in segments]
+        for name, parts, beside in (
+            *((name, [s.inputs[:, j] for s in segments], ()) for j, name in enumerate(one.inputs)),
+            (one.output, [s.output for s in segments], moved),
+        ):
+            period = period_of(parts, beside)
+            found += [] if period is None else [wrapped(name, *period)]
+    return list(dict.fromkeys(found))
 
 
 def _far_off(name: str, column: NDArray[np.float64]) -> list[str]:
@@ -144,7 +169,7 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
 
 
 def held(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...]:
-    """Which outputs are measured more slowly than they are recorded.
+    """Which outputs are measured more slowly than they are recorded, and records that were interpolated.
 
     Args:
         model: The fitted model.
@@ -153,8 +178,15 @@ def held(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...]:
     Returns:
         One sentence for each such output.
     """
-    found = {mapping.output: held_for(segments_of(traces, mapping)) for mapping in model.mapping.each}
-    return tuple(
+    each = {mapping.output: segments_of(traces, mapping) for mapping in model.mapping.each}
+    found = {name: held_for(segments) for name, segments in each.items()}
+    straight = max(map(straight_for, each.values()), default=1) if max(found.values(), default=1) == 1 else 1
+    drawn = (
+        f"All channels go in straight lines of {straight} samples ({straight * traces[0].sample_time:.3g} s): they "
+        "were interpolated. The samples between were never measured, and intervals are too narrow: take every "
+        f"{straight}th sample.",
+    ) * (straight > 1)
+    return drawn + tuple(
         f"{name} changes only after {samples} samples ({samples * traces[0].sample_time:.3g} s): it is measured more "
         "slowly than it is recorded, and the model takes the hold for the plant's own lag, in intervals that are too "
         f"narrow. Count new values alone, by repairs: {{repeats: {{{name}: mask}}}}, and fit a structure that needs no "

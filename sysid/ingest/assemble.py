@@ -209,7 +209,8 @@ def _onto_grid(record: Record, wanted: Wanted, grid: GridOptions, repairs: Repai
             got=f"{timing.median_step:g} s",
             remedy="choose grid: {method: linear} or {method: hold}, or a longer sample_time",
         )
-    longest = grid.longest_step or 1.5 * timing.median_step
+    # What the survey found no gaps in has none, however uneven its steps.
+    longest = grid.longest_step or (1.5 * timing.median_step if len(timing.gaps) else float(np.diff(stamps).max()))
     gridded = resample(
         stamps,
         record.values,

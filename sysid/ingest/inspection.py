@@ -18,6 +18,7 @@ from sysid.ingest.findings import CaseFinding, ColumnFinding, FileFinding, count
 from sysid.ingest.headers import is_unit, split_reference, unit_in_name
 from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions, TimeOptions
+from sysid.ingest.readers.leaves import step_in
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.restarts import finer_than_clock, records_by_clock
 from sysid.ingest.second_clocks import counts_rows, is_counter, without_second_clocks
@@ -29,7 +30,6 @@ _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though n
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
 _EMPTY_SHARE = 0.8  # of a column, above which its missing values are no reason to leave samples out
 _FAR, _FEW = 20.0, 0.2  # spans of all other values, and the share of samples that a mark of missing ones may have
-_STEP_NAMES = frozenset({"ts", "dt", "sample_time", "sampling_time", "sampletime"})
 
 
 def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileFinding:
@@ -248,12 +248,12 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
 
 
 def _step_in_a_column(columns: Sequence[RawColumn]) -> float | None:
-    """The sample time, where it stands in a column of its own, as public benchmarks have it: ``Ts`` with one value."""
+    """The sample time, where it or a rate stands in a column of its own, as public benchmarks have it: ``Ts``."""
     for column in columns:
-        if column.name.lower() in _STEP_NAMES:
-            values = np.unique(_finite(column.values))
-            if len(values) == 1 and values[0] > 0.0:
-                return float(values[0])
+        first = column.values[0]
+        step = step_in(f"{column.name} [{column.unit}]" if column.unit else column.name, float(first))
+        if step is not None and bool((_finite(column.values) == first).all()):
+            return step
     return None
 
 

@@ -5,6 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+_EITHER = (
+    r"sampling|sampled(?:[ _]at)?|abtastung"
+    r"|(?:scan|log(?:ging)?|record(?:ing)?|acquisition|data|update)[ _-]?(?:rate|frequency|interval|period|time)"
+)
+"""Words that may say a rate or a time: which, says the unit."""
 _RATE = r"fs|f_s|sampl(?:e|ing)[ _-]?(?:rate|frequency)|scan[ _-]?rate|abtast(?:rate|frequenz)|sps"
 _PERIOD = (
     r"ts|t_s|dt|delta[ _]?t|delta[ _]?x|sampl(?:e|ing)[ _-]?(?:time|interval|period)|time[ _-]?step"
@@ -13,7 +18,7 @@ _PERIOD = (
 _IN_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "sa/s": 1.0, "samples/s": 1.0}
 _IN_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0}
 _LINE = re.compile(
-    rf"[^\w]*(?:(?P<rate>{_RATE})|(?P<period>{_PERIOD}))\s*(?:[\[(](?P<head>[^\])]*)[\])])?\s*[:=;,\s]\s*"
+    rf"[^\w]*(?:(?P<rate>{_RATE})|(?P<period>{_PERIOD})|(?P<either>{_EITHER}))\s*(?:[\[(](?P<head>[^\])]*)[\])])?\s*[:=;,\s]\s*"
     r"[\"']?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)[\s,;]*[\[(]?(?P<tail>[\w/µ]*)[\])]?[\"';,\s]*",
     re.IGNORECASE,
 )
@@ -41,8 +46,11 @@ def _step(line: str) -> float | None:
     if match is None:
         return None
     unit = (match["head"] or match["tail"] or "").strip().lower()
-    factor = (_IN_HERTZ if match["rate"] else _IN_SECONDS).get(unit)
+    rate = bool(match["rate"]) or (bool(match["either"]) and unit in _IN_HERTZ)
+    if match["either"] and not unit:
+        return None
+    factor = (_IN_HERTZ if rate else _IN_SECONDS).get(unit)
     value = float(match["number"].replace(",", "."))
     if factor is None or not 0.0 < value * factor < float("inf"):
         return None
-    return 1.0 / (value * factor) if match["rate"] else value * factor
+    return 1.0 / (value * factor) if rate else value * factor

@@ -72,6 +72,14 @@ SAID: Final[dict[str, Words]] = {
         "{who} changes only after {samples:.0f} samples ({seconds:.3g} s): it is measured more slowly than recorded.",
         "A model takes the hold for the plant's lag. Count new values alone: repairs: {{repeats: {{{who}: mask}}}}.",
     ),
+    "channel.wraps": Words(
+        "{who} jumps by {period:.6g} {jumps:.0f} times and goes on from there, as an angle or counter that wraps does.",
+        "No model follows that: if it is one, put it together first, numpy.unwrap({who}, period={period:.6g}).",
+    ),
+    "channel.interpolated": Words(
+        "{who} and the inputs go in straight lines of {samples:.0f} samples ({seconds:.3g} s): they were interpolated.",
+        "The samples between were never measured, and intervals are too narrow: take every {samples:.0f}th sample.",
+    ),
     "output.jump": Words(
         "{who}: at {seconds:.4g} s the level shifts by {size:.3g} {unit}, and no input did it.",
         "Cut the record there into two experiments, or add what changed as an input.",

@@ -266,3 +266,30 @@ def test_counts_may_be_hexadecimal(write: Write) -> None:
     trace = proposed(path).traces[0]
     assert trace["u"].tolist() == [250.0 * i for i in range(20)]
     assert trace.channels[1].unit == "percent"
+
+
+def test_a_table_that_lies_on_its_side_is_read_by_its_lines(write: Write) -> None:
+    numbers = range(20)
+    text = "".join(f"{name},{','.join(str(f(i)) for i in numbers)}\n" for name, f in SIDES.items())
+    trace = proposed(write("side.csv", text)).traces[0]
+    assert (trace.sample_time, trace.channel_names) == (0.5, ("u", "y"))
+    assert trace["y"].tolist() == [float(i * i) for i in numbers]
+
+
+SIDES = {"t [s]": lambda i: 0.5 * i, "u [V]": lambda i: i % 3, "y [V]": lambda i: i * i}
+
+
+def test_stamps_that_are_uneven_by_a_third_of_a_step_lack_no_sample(write: Write) -> None:
+    stamps = np.arange(60) * 0.1 + np.random.default_rng(1).uniform(-0.03, 0.03, 60)
+    path = write("uneven.csv", "t [s],u [V]\n" + rows(60, lambda i: f"{stamps[i]:.4f},{i % 7}"))
+    found = inspect_file(path)
+    assert (found.sample_time, found.needed.gaps, found.needed.jitter) == (0.1, None, "resample")
+    assert len(proposed(path).traces[0]) == 59  # from the first stamp on, as far as the last
+
+
+@pytest.mark.parametrize(
+    ("head", "first"),
+    [("dt_ms,u", "50"), ("fs,u", "20"), ("# Sampling: 20 Hz\nv,u", "3"), ("# Log interval (ms): 50\nv,u", "3")],
+)
+def test_a_rate_is_understood_by_its_unit(write: Write, head: str, first: str) -> None:
+    assert inspect_file(write("rig.csv", f"{head}\n" + rows(20, lambda i: f"{first},{i % 3}"))).sample_time == 0.05

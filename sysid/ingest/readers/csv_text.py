@@ -20,6 +20,7 @@ from sysid.ingest.rates import said_step
 from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
 from sysid.ingest.readers.csv_cells import Kind, unit_text
 from sysid.ingest.readers.csv_layout import Layout, recognise
+from sysid.ingest.readers.csv_sideways import sideways
 from sysid.ingest.readers.reader import Reader
 from sysid.ingest.readers.sheets import SheetText
 from sysid.ingest.readers.text_source import TextFile, ZeroBytesError, encodings, not_text
@@ -58,6 +59,9 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
     """
     path = file.path
     lines, whole = file.head()
+    lying = sideways(path, lines, comment=options.comment) if whole else None
+    if lying is not None:
+        return lying
     layout = recognise(lines, options, path, whole=whole)
     headers = _headers(layout, options, path)
     time = _calendar_column(headers, layout, options)

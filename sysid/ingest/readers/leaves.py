@@ -127,7 +127,7 @@ def step_in(name: str, number: float | None) -> float | None:
     """
     if number is None or not (number > 0.0 and np.isfinite(number)):
         return None
-    plain = name.casefold().strip()
+    plain = re.sub(r"(?<=[a-z])(Ms|Us|Hz|KHz|Sec)$", r"_\1", name.strip()).casefold()
     match = None if plain in _STEPS | _RATES else _IN_UNIT.fullmatch(plain)
     stem, unit = (match["stem"], match["unit"]) if match else (plain, "")
     if stem in _STEPS and unit in _IN_SECONDS:

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 from sysid.ingest.headers import parse_header
 from sysid.ingest.options import FileOptions
+from sysid.ingest.rates import said_step
 from sysid.ingest.readers.forms import understood
-from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, step_in
+from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, step_in, texts_of
 from sysid.ingest.readers.records import Found, joined, records_of
 from sysid.ingest.table import RawTable, array_column, by_length, distinct, recognise_time
 
@@ -162,7 +163,10 @@ class _Walk:
         if not isinstance(node, Mapping):
             return outer
         for key, value in node.items():
-            step = step_in(str(key), _of_element(value, index))
+            if isinstance(value, str):  # "10 Hz"
+                step = said_step([f"{key} = {value}"])
+            else:
+                step = step_in(str(key), _of_element(value, index))
             if step is not None:
                 return step
         said = {self.step_beside(part, None, index) for part in _saying(node)} - {None}
@@ -199,7 +203,10 @@ class _Walk:
         leaves = {str(key): leaf for key, value in node.items() if (leaf := leaf_of(value)) is not None}
         cells = {str(key): parts for key, value in node.items() if (parts := _cell(value)) is not None}
         elements = [leaf for cell in cells.values() for _, leaf in cell]
-        lengths = {len(leaf.values) for leaf in (*leaves.values(), *elements) if leaf.vector}
+        numbers = (
+            leaf for leaf in (*leaves.values(), *elements) if leaf.vector and leaf.values.dtype.kind not in "USO"
+        )
+        lengths = {len(leaf.values) for leaf in numbers}
         names = _names_beside(node)
         leaves = {key: replace(leaf, names=leaf.names or names) for key, leaf in leaves.items()}
         for key, value in node.items():
@@ -307,9 +314,12 @@ def _names_beside(node: Mapping[str, Any]) -> tuple[str, ...]:
     """A list of texts that is called names, or channels, gives the columns of a matrix theirs."""
     for part in (node, *_saying(node)):
         for key, value in part.items():
-            leaf = leaf_of(value) if str(key).casefold().strip() in _NAMES else None
-            if leaf is not None and leaf.vector and all(isinstance(text, str) for text in leaf.values):
-                return tuple(map(str, leaf.values))
+            if str(key).casefold().strip() not in _NAMES:
+                continue
+            leaf = leaf_of(value)
+            texts = texts_of(value if leaf is None else leaf.values.tolist())
+            if texts and len(texts) == len(value if leaf is None else leaf.values):
+                return texts
     return ()
 
 
