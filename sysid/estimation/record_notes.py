@@ -33,9 +33,9 @@ HARDLY_OWN = 0.01
 """Part of an input's movement that others do not explain, below which its effect is told by hardly anything."""
 DIVERGED = 1e12
 """Mean squared error, over the output's variance, of a run that is lost: a million times the output's movements."""
-WORSE, HARDLY = 1.1, 0.9
+WORSE, HARDLY, POOR = 1.1, 0.9, 0.3
 """Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt; and
-above which it does as well, all but a twentieth of the output's movement."""
+above which it does as well, all but a twentieth of the output's movement; and by how much less a run is still poor."""
 
 
 def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
@@ -239,9 +239,19 @@ def contradicted(
     fed = feedback_told(model, traces, longest, training)
     levels = levels_told(model, traces[:MOST_TRACES], runs)
     lags = left_out(model, longest, fed)
-    # A lag that is left out is a cause, and the nearer one.
-    rest = lags or causes(model, longest, (*fed, *levels))
+    # A lag that is left out is a cause, and the nearer one; not of a run that has next to nothing of the output.
+    worth = not lags or _ratio(runs) > HARDLY - POOR
+    rest = (*lags, *(causes(model, longest, (*fed, *levels)) if worth else ()))
     return (*_beside_a_constant(model, runs), *fed.values(), *levels.values(), *rest)
+
+
+def _ratio(runs: Sequence[FreeRun]) -> float:
+    """Mean squared error of free runs, over the outputs' variance, of the output that has the least."""
+    y = np.concatenate([run.output[run.usable] for run in runs])
+    simulated = np.concatenate([run.simulated[run.usable] for run in runs])
+    with np.errstate(all="ignore"):
+        ratios = np.mean((simulated - y) ** 2, axis=0) / np.var(y, axis=0)
+    return float(np.nanmin(ratios)) if np.isfinite(ratios).any() else 0.0
 
 
 def _beside_a_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[str]:

@@ -64,7 +64,8 @@ class Parity:
         largest_difference: Over all samples of all cases, in the output's unit; of several outputs, of the one that is
             nearest to what is allowed.
         case: Where it occurred.
-        random_difference: The same over the random sequences.
+        random_difference: The same over the random sequences; where their outputs are larger than in all cases, as many
+            times less.
         random_sequences: Their number.
         tolerance: What is allowed, in the same unit, in cases and sequences.
         share: The same as a share of the output's size; ``None`` where it was given in the output's unit.
@@ -109,6 +110,19 @@ class Allowed:
 
     each: NDArray[np.float64]
     share: float | None = None
+
+    def over(self, run: ParityCase) -> NDArray[np.float64]:
+        """What is allowed in a run: more where its outputs are larger than in all cases, as an unstable model's become.
+
+        Args:
+            run: The model's.
+
+        Returns:
+            Shape ``(n_outputs,)``.
+        """
+        if self.share is None:
+            return self.each
+        return np.maximum(self.each, self.share * np.abs(run.output).max(axis=0, initial=0.0))
 
     @classmethod
     def of(cls, cases: Sequence[ParityCase], dtype: str, given: float | None = None) -> Allowed:
@@ -310,11 +324,13 @@ def check_parity(
     sequences = tuple(case for case in sequences if np.isfinite(case.output).all())
     drawn = _compare(runner, sequences) if sequences else differences[:0]
     for found, runs in ((differences, cases), (drawn, sequences)):
+        larger = np.array([allowed.over(run) for run in runs]).reshape(found.shape) / allowed.each
+        np.divide(found, larger, out=found)
         ratios = found / allowed.each
         if (ratios > 1.0).any():
             row, column = divmod(int(ratios.argmax()), ratios.shape[1])
-            each, port = float(allowed.each[column]), outputs[column]
-            found_there = float(found[row, column])
+            each, port = float((allowed.each * larger[row])[column]), outputs[column]
+            found_there = float(found[row, column] * larger[row, column])
             coarse, grown = file.dtype == "float32", runs[row].amplification
             raise ParityError(
                 file.name, runs[row].name, found_there, each, port.unit, coarse=coarse,

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import signal
 
+import sysid
 from sysid.errors import ParityError
 from sysid.export import EXPORTERS, Surrogate, check_parity, parity_cases, random_cases
 from sysid.export.parity import SHARES, Allowed, ParityCase, largest_difference
@@ -206,3 +209,11 @@ def test_amplification_is_what_becomes_of_a_small_change(pole, expected):
     case = random_cases(Surrogate.of(model), sequences=1)[0]
     assert case.amplification == pytest.approx(expected, rel=1e-6)
     assert case.reached == (399 if pole > 1.0 else 0)
+
+
+def test_an_unstable_model_is_held_to_the_size_that_its_outputs_have(tmp_path: Path) -> None:
+    u = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, 6), 10)
+    y = signal.lfilter([0.0, 0.1], [1.0, -1.05], u)
+    fitted = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.ARX(na=1, nb=(1,), nk=(1,)))
+    fitted.save(tmp_path / "unstable", formats=("c",))
+    assert (tmp_path / "unstable" / "model.json").is_file()
