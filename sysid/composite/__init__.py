@@ -11,6 +11,7 @@ from sysid.composite.active_learning import ActiveLearned, Assessment, learn_act
 from sysid.composite.candidates import Candidate, Candidates, fit_candidates
 from sysid.composite.committee import DoubtFigures, committee, doubt_figures, doubt_threshold
 from sysid.composite.composite import Composite, Member
+from sysid.composite.doubting import Doubt, Doubting, Perturbation, doubting
 from sysid.composite.fixed_equations import equation_of, fixed_by_equations
 from sysid.composite.fixed_member import FixedMember, Standing
 from sysid.composite.fixed_members import fixed_model, with_fixed
@@ -36,7 +37,9 @@ __all__ = [
     "Candidates",
     "Choice",
     "Composite",
+    "Doubt",
     "DoubtFigures",
+    "Doubting",
     "FixedMember",
     "Holding",
     "JointRound",
@@ -46,6 +49,7 @@ __all__ = [
     "Member",
     "MonteCarlo",
     "OneStep",
+    "Perturbation",
     "Retrained",
     "Retraining",
     "RoundPlan",
@@ -62,6 +66,7 @@ __all__ = [
     "dealt",
     "doubt_figures",
     "doubt_threshold",
+    "doubting",
     "equation_of",
     "fit_candidates",
     "fit_member",

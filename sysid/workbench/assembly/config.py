@@ -13,7 +13,7 @@ from sysid.models import Limit
 from sysid.models.grey_box import Parameter, parameters_from
 from sysid.workbench.assembly.extending import extending_schema
 from sysid.workbench.assembly.member_config import FixedConfig, MemberConfig, ParametersField, StandingConfig
-from sysid.workbench.assembly.proof_config import InterpolationConfig, MonteCarloConfig, PublishedConfig
+from sysid.workbench.assembly.proof_config import DoubtConfig, InterpolationConfig, MonteCarloConfig, PublishedConfig
 from sysid.workbench.assembly.stage_config import (
     AblationConfig,
     ActiveLearningConfig,
@@ -76,6 +76,7 @@ class AssemblyConfig(Words):
         active_learning: Adding to its data what the whole is worst at.
         interpolation: Positions between those that are modelled.
         monte_carlo: Random sequences on which the whole has to hold.
+        doubt: Where the exported whole says that it does not know.
         published: Published figures by output.
         published_models: A table of ``reports/published`` with models of single members: where it has one of the same
             mapping and structure as a candidate, its figures stand beside the candidate's.
@@ -111,6 +112,7 @@ class AssemblyConfig(Words):
     active_learning: ActiveLearningConfig | None = None
     interpolation: InterpolationConfig | None = None
     monte_carlo: MonteCarloConfig | None = None
+    doubt: DoubtConfig | None = None
     published: dict[str, PublishedConfig] = Field(default_factory=dict)
     published_models: str | None = None
     published_whole: str | None = None
@@ -171,7 +173,8 @@ class AssemblyConfig(Words):
             if self.interpolation
             else ()
         )
-        return tuple(dict.fromkeys((*self.outputs, *self.choose_on, *stressed, *line)))
+        doubted = (self.doubt.output,) if self.doubt else ()
+        return tuple(dict.fromkeys((*self.outputs, *self.choose_on, *stressed, *doubted, *line)))
 
     @model_validator(mode="after")
     def _check_published(self) -> AssemblyConfig:
@@ -228,12 +231,29 @@ class AssemblyConfig(Words):
             )
         return self
 
+    @model_validator(mode="after")
+    def _check_doubt(self) -> AssemblyConfig:
+        training = (self.training,) if isinstance(self.training, str) else self.training
+        fitted = (*training, *(self.together.data if self.together else ()))
+        if self.doubt is not None and self.doubt.data in fitted:
+            raise FieldError(
+                "the threshold of the doubt would be found on what was trained on, where the whole errs less",
+                expected="a data set that trained nothing",
+                got=f"doubt, data: {self.doubt.data}",
+                remedy="name another one, with other kinds of sequence",
+            )
+        return self
+
     @property
     def _data(self) -> dict[str, str]:
         """Every data set but the pool, and which field names it."""
         training = (self.training,) if isinstance(self.training, str) else self.training
         also = self.together.data if self.together else ()
-        beside = {"monte_carlo, data": self.monte_carlo, "interpolation, data": self.interpolation}
+        beside = {
+            "monte_carlo, data": self.monte_carlo,
+            "interpolation, data": self.interpolation,
+            "doubt, data": self.doubt,
+        }
         return {
             self.data: "data",
             **{one.data: field for field, one in beside.items() if one},
@@ -259,6 +279,7 @@ class AssemblyConfig(Words):
             "limits": tuple(self.limits),
             "published": tuple(self.published),
             "monte_carlo": (self.monte_carlo.output,) if self.monte_carlo else (),
+            "doubt, output": (self.doubt.output,) if self.doubt else (),
             "active_learning, outputs": self.active_learning.outputs if self.active_learning else (),
             "interpolation": (self.interpolation.channel, *self.interpolation.knots, *self.interpolation.outputs)
             if self.interpolation

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.composite.active_learning import Assessment, sequence_errors
+from sysid.composite.doubting import doubting
 from sysid.composite.keeper import Decision
 from sysid.composite.limits_held import holding
 from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
@@ -22,6 +23,7 @@ from sysid.workbench.assembly.ablation import ablations_of
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.data import AssemblyData
 from sysid.workbench.assembly.interpolation import (
+    LINE,
     InterpolationScores,
     StoredInterpolation,
     interpolation_of,
@@ -29,6 +31,7 @@ from sysid.workbench.assembly.interpolation import (
 )
 from sysid.workbench.assembly.member_scores import score_candidates
 from sysid.workbench.assembly.record import Outcome, assembly_results, write_signals
+from sysid.workbench.assembly.warm_start import read_whole
 from sysid.workbench.runner import events
 from sysid.workbench.runner.steps import Outlined, Step, Work
 from sysid.workbench.runner.store import digest, strict, write_json
@@ -37,13 +40,14 @@ if TYPE_CHECKING:
     from sysid.export import Bundle
     from sysid.workbench.fits.config import ExportConfig
 
-ASSEMBLY, LINE = "assembly.json", "line.json"
-"""In the run folder: the chosen whole, and its line."""
+ASSEMBLY = "assembly.json"
+"""In the run folder: the chosen whole."""
 
 SCORING = Outlined(name="scoring", title="Scoring every stage")
 WHOLE = Outlined(name="assembly", title="Choosing the stage that does best", called="assembly")
 MONTE_CARLO = Outlined(name="monte_carlo", title="Running the whole on random sequences")
 INTERPOLATION = Outlined(name="interpolation", title="Running every position of the line")
+DOUBT = Outlined(name="doubt", title="Finding where it does not know")
 MEMBERS = Outlined(name="member-scores", title="Scoring the members alone")
 
 
@@ -99,7 +103,7 @@ class Evaluating:
         whole = self._chosen()
         stressed, worst, sequences = self._stressed(whole)
         line = self._line(whole, data)
-        exported = self._export(whole, cases, evaluate_cascade(whole, cases), data)
+        exported = self._export(self._doubting(whole), cases, evaluate_cascade(whole, cases), data)
         candidates = self.trained.candidates
         members = []
         if candidates is not None:
@@ -210,6 +214,20 @@ class Evaluating:
             lambda _: score_interpolation(asked, line, cases),
             outcome=lambda scores: f"all positions of the longest case in {max(scores.timing.values()):.3g} s",
         )
+
+    def _doubting(self, whole: Cascade) -> Cascade:
+        """What is exported: the whole, with its doubts if it is to have some."""
+        asked = self.context.config.doubt
+        if asked is None:
+            return whole
+        sequences = tuple(self.context.load(asked.data))
+        beside = [read_whole(self.context.beside / one)[0] for one in asked.beside]
+        found = self.context.compute(
+            DOUBT,
+            lambda _: doubting(whole, asked.asked(), sequences, beside=beside),
+            outcome=lambda one: one.sentence,
+        )
+        return found.whole
 
     def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any, data: AssemblyData) -> Bundle | None:
         from sysid.export import export_bundle

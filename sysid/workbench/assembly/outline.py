@@ -11,7 +11,7 @@ from sysid.names import slug, task_slug
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import new_runs_outlined
 from sysid.workbench.assembly.estimates import RoundEstimates
-from sysid.workbench.assembly.evaluation import INTERPOLATION, MEMBERS, MONTE_CARLO, SCORING, WHOLE, export_step
+from sysid.workbench.assembly.evaluation import DOUBT, INTERPOLATION, MEMBERS, MONTE_CARLO, SCORING, WHOLE, export_step
 from sysid.workbench.fits.data import unmade_data
 from sysid.workbench.runner.run import REPORT
 from sysid.workbench.runner.steps import Estimate, Outlined
@@ -95,6 +95,8 @@ def _proof(config: AssemblyConfig, beside: Path) -> Iterator[Outlined]:
         yield from (_loading(config.monte_carlo.data, beside), MONTE_CARLO)
     if config.interpolation is not None:
         yield from (_loading(config.interpolation.data, beside), INTERPOLATION)
+    if config.doubt is not None:
+        yield from (_loading(config.doubt.data, beside), DOUBT)
     if config.export is not None:
         yield export_step(config.export)
     if config.warm_start is None:

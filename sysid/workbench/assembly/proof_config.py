@@ -6,6 +6,7 @@ from itertools import pairwise
 
 from pydantic import BaseModel, Field, model_validator
 
+from sysid.composite import Doubt, Perturbation
 from sysid.field_checks import FieldError
 from sysid.workbench.old_words import STRICT
 
@@ -74,6 +75,60 @@ class InterpolationConfig(BaseModel):
     def scored(self) -> tuple[str, ...]:
         """Outputs that are scored at positions."""
         return self.judged or self.outputs
+
+
+class PerturbationConfig(BaseModel):
+    """A channel that the whole reads a little more and a little less.
+
+    Args:
+        channel: An input, or an output that members read.
+        by: About as much as it is usually wrong, in its unit.
+        readers: Outputs of the members that read it so; all that read it by default. For a switch, the switch.
+    """
+
+    model_config = STRICT
+
+    channel: str
+    by: float = Field(gt=0.0, allow_inf_nan=False)
+    readers: tuple[str, ...] = ()
+
+
+class DoubtConfig(BaseModel):
+    """The whole says where it does not know: what is exported has the flag IN_DOUBT.
+
+    Args:
+        output: The output that is judged.
+        error: Largest error of a right answer, in its unit.
+        false: Share of the right answers that may be in doubt.
+        data: Data set with sequences that trained nothing, of more than one kind: all of them find the threshold.
+        perturb: Channels that may decide; it doubts where it parts from itself with one of them moved.
+        beside: Bundles of wholes that were trained apart, seen from the folder of the YAML.
+    """
+
+    model_config = STRICT
+
+    output: str
+    error: float = Field(gt=0.0)
+    false: float = Field(default=0.05, gt=0.0, lt=1.0)
+    data: str
+    perturb: tuple[PerturbationConfig, ...] = ()
+    beside: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> DoubtConfig:
+        if not self.perturb and not self.beside:
+            raise FieldError(
+                "nobody doubts",
+                expected="perturb, or wholes beside it",
+                got="neither",
+                remedy="write for example perturb: [{channel: BP, by: 0.3, readers: [RL]}]",
+            )
+        return self
+
+    def asked(self) -> Doubt:
+        """What the whole is to doubt."""
+        moved = tuple(Perturbation(channel=one.channel, by=one.by, readers=one.readers) for one in self.perturb)
+        return Doubt(output=self.output, error=self.error, false=self.false, perturb=moved)
 
 
 class PublishedConfig(BaseModel):

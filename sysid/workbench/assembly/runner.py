@@ -17,9 +17,9 @@ from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.data import AssemblyData
 from sysid.workbench.assembly.estimates import RoundEstimates
-from sysid.workbench.assembly.evaluation import ASSEMBLY, LINE, Evaluating
+from sysid.workbench.assembly.evaluation import ASSEMBLY, Evaluating
 from sysid.workbench.assembly.extending import read_joined
-from sysid.workbench.assembly.interpolation import StoredInterpolation
+from sysid.workbench.assembly.interpolation import LINE, StoredInterpolation
 from sysid.workbench.assembly.outline import outline
 from sysid.workbench.assembly.swept import swept
 from sysid.workbench.assembly.warm_start import read_whole
