@@ -14,9 +14,10 @@ LOOKED_AT = 20_000
 """Samples of a stretch that are looked at."""
 FEWEST, HALF = 2, 0.5
 """Jumps that it takes to say so, and the part of the channel's span that a jump goes over."""
-FULL, BEYOND, SMOOTH = 1.1, 1.2, 0.1
+FULL, BEYOND, SMOOTH, FAST = 1.1, 1.2, 0.1, 0.3
 """Spans that a period is at most, spans that the channel goes over when it is put together, at least, and the part of a
-period that it moves in a sample, at most: what moves faster cannot be told from a jump."""
+period that it moves in a sample, at most, and where the period is a known one: what moves faster cannot be told from a
+jump."""
 KNOWN = (360.0, 2.0 * np.pi, *(2.0**k for k in range(8, 33)))
 """Periods of angles and counters."""
 NEAR = 0.01
@@ -59,7 +60,7 @@ def period_of(
     period = period if known is None else known
     gone = max(float(np.ptp(np.unwrap(part, period=period))) for part in parts)
     alike = np.mean(np.abs(np.array(jumps) - period) <= SMOOTH * period) > 1.0 - SMOOTH
-    calm = float(np.quantile(np.concatenate(others), 0.99)) <= SMOOTH * period
+    calm = float(np.quantile(np.concatenate(others), 0.99)) <= (SMOOTH if known is None else FAST) * period
     return (period, len(jumps)) if alike and calm and gone > BEYOND * span else None
 
 

@@ -122,7 +122,7 @@ class Allowed:
         """
         if self.share is None:
             return self.each
-        return np.maximum(self.each, self.share * np.abs(run.output).max(axis=0, initial=0.0))
+        return np.asarray(np.maximum(self.each, self.share * np.abs(run.output).max(axis=0, initial=0.0)))
 
     @classmethod
     def of(cls, cases: Sequence[ParityCase], dtype: str, given: float | None = None) -> Allowed:

@@ -20,6 +20,11 @@ SQUARE = np.sign(np.sin(0.05 * np.arange(N)))
 
 WRAPPED = {
     "degrees": (U, TURNED % 360.0, "y jumps by 360 "),
+    "fast turns": (
+        U,
+        np.cumsum(20.0 + 40.0 * lfilter([0.0, 0.1, 0.05], [1.0, -1.5, 0.6], U)) % 360.0,
+        "y jumps by 360 ",
+    ),
     "half turns": (U, (TURNED + 180.0) % 360.0 - 180.0, "y jumps by 360 "),
     "radians": (U, np.angle(np.exp(1j * np.radians(TURNED))), "y jumps by 6.28319 "),
     "a counter of 8 bits": (U, TURNED.astype(np.int64).astype(np.int8).astype(np.float64), "y jumps by 256 "),
