@@ -70,8 +70,8 @@ def _check_estimated(composite: Composite, plan: TrainingPlan, whole: Cascade) -
         raise ConfigError(
             f"no round estimates the parameter {left[0]}",
             where=f"parameters, {left[0]}",
-            expected="a round of training end to end with a target that depends on it, and no members, or the output of "
-            "its equation among them",
+            expected="a round of training end to end with a target that depends on it, and no members, or the output "
+            "of its equation among them",
             got=f"{len(plan.rounds)} rounds",
             remedy="add such a round, or write fixed: true",
         )
