@@ -38,6 +38,7 @@ def period_of(
     Returns:
         The period and the number of jumps; ``None`` where it does not wrap.
     """
+    moved = [one[: LOOKED_AT - 1] for one, part in zip(moved, parts, strict=True) if len(part) > 3] if moved else ()
     parts = [part[:LOOKED_AT] for part in parts if len(part) > 3]
     span = max((float(np.ptp(part)) for part in parts), default=0.0)
     if not span > 0.0:
@@ -50,7 +51,7 @@ def period_of(
         beside = 0.5 * (np.r_[0.0, usual[:-1]] + np.r_[usual[1:], 0.0])
         jumps += (np.abs(steps - beside)[at]).tolist()
         others.append(np.abs(usual))
-        with_input += int(np.count_nonzero(at & moved[number][: LOOKED_AT - 1])) if moved else 0
+        with_input += int(np.count_nonzero(at & moved[number])) if moved else 0
     if len(jumps) < FEWEST or with_input > HALF * len(jumps):
         return None
     period = float(np.median(jumps))

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 import sysid
 from sysid.estimation.record_notes import wraps
+from sysid.estimation.wrapped import period_of
 from sysid.models import Mapping
 
 N = 1000
@@ -42,6 +43,12 @@ def test_angles_and_counters_that_wrap_are_told(case: str) -> None:
     traces = sysid.data((u, y), sample_time=0.1)
     found = wraps(traces.traces, Mapping.parse("u -> y"))
     assert [one[: len(said)] for one in found] == [said] * bool(said)
+
+
+def test_stretches_of_any_length_are_looked_at() -> None:
+    parts = [TURNED[:1] % 360.0, TURNED[:3] % 360.0, TURNED % 360.0, np.zeros(0)]
+    moved = [np.zeros(max(len(part) - 1, 0), dtype=np.bool_) for part in parts]
+    assert period_of(parts, moved) == period_of([TURNED % 360.0], [np.zeros(N - 1, dtype=np.bool_)])
 
 
 def test_a_fit_and_advice_say_so() -> None:
