@@ -44,6 +44,7 @@ def equation_values(stage: Stage, number: int) -> dict[str, Any]:
         "neuron": NEURONS["tanh"],
         "adds": form.n_continuous > 0,
         "n": form.n_state,
+        "remembers": layout.size > 0,
         "n_c": form.n_continuous,
         "n_given": max(1, len(form.given)),
         "states": form.states,

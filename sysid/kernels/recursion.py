@@ -58,16 +58,20 @@ def _run(
     u, first, y, out, depth, n_steps, input_channel, input_lag, output_lag, weights, gate_blocks, readout, w, constant,
     kind, low, high, kept, held,
 ):  # fmt: skip
-    """The recursion over the rows of ``y`` after the first ``depth``, which are rows ``first`` on of ``u``."""
-    n_in, n_out, wide = len(input_lag), len(output_lag), len(readout)
+    """The recursion over the rows of ``y`` after the first ``depth``, which are rows ``first`` on of ``u``.
+
+    Lags and channels are unsigned: of others numba looks at the sign, each time.
+    """
+    n_in, n_out, wide = np.uintp(len(input_lag)), np.uintp(len(output_lag)), len(readout)
     n_x = n_in + n_out
     x, h, g = np.empty(n_x), from_a_line(wide), from_a_line(wide)
     copy_numbers(readout, g)
     for t in range(n_steps):
+        row, own = np.uintp(first + depth + t), np.uintp(depth + t)
         for i in range(n_in):
-            x[i] = u[first + depth + t - input_lag[i], input_channel[i]]
+            x[i] = u[row - input_lag[i], input_channel[i]]
         for i in range(n_out):
-            x[n_in + i] = y[depth + t - output_lag[i]]
+            x[n_in + i] = y[own - output_lag[i]]
         total = constant
         for i in range(n_x):
             total += w[i] * x[i]
@@ -110,8 +114,8 @@ def free_run(
     n_x = len(input_lag) + len(output_lag)
     weights, gate_blocks, readout, w = _packed(theta, n_neurons, n_x)
     _run(
-        u, 0, y, out, depth, n_steps, input_channel, input_lag, output_lag, weights, gate_blocks, readout, w,
-        theta[n_neurons * (n_x + 2)], kind, low, high, kept, held,
+        u, 0, y, out, depth, n_steps, input_channel.view(np.uintp), input_lag.view(np.uintp), output_lag.view(np.uintp),
+        weights, gate_blocks, readout, w, theta[n_neurons * (n_x + 2)], kind, low, high, kept, held,
     )  # fmt: skip
 
 
@@ -145,13 +149,14 @@ def predict(
     n_x = len(input_lag) + len(output_lag)
     weights, gate_blocks, readout, w = _packed(theta, n_neurons, n_x)
     constant, window = theta[n_neurons * (n_x + 2)], np.empty(depth + steps)
+    channels, lags, own_lags = input_channel.view(np.uintp), input_lag.view(np.uintp), output_lag.view(np.uintp)
     for t in range(n_steps):
         run = min(steps, t + 1)
         first = t + 1 - run
         for i in range(depth):
             window[i] = measured[first + i]
         _run(
-            u, first, window, window, depth, run, input_channel, input_lag, output_lag, weights, gate_blocks, readout,
-            w, constant, kind, low, high, kept, held,
+            u, first, window, window, depth, run, channels, lags, own_lags, weights, gate_blocks, readout, w, constant,
+            kind, low, high, kept, held,
         )  # fmt: skip
         y[depth + t] = window[depth + run - 1]
