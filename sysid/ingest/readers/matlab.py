@@ -19,7 +19,6 @@ from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers import hdf5
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.leaves import Leaf, number_of, refused
-from sysid.ingest.readers.mat5_check import check_mat5
 from sysid.ingest.readers.modelica import is_result, result_tree
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
@@ -84,6 +83,8 @@ def _load(path: Path) -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it sets an option of pandas that is on its way out
         from matio import load_from_mat, whosmat
+
+        from sysid.ingest.readers.mat5_check import check_mat5
 
     try:
         with warnings.catch_warnings():

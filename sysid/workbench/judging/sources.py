@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import sysid
 from sysid.errors import ConfigError
 from sysid.export.bundle import ranges_of
 from sysid.export.reading import read_bundle
@@ -19,6 +20,9 @@ from sysid.workbench.runner.store import RunFolder, read_json
 Fetch = Callable[[str], "tuple[Path, str]"]
 """From a registered model's address to a folder with its bundle, and the run that tracks it."""
 
+
+PUBLISHED = Path(sysid.__file__).resolve().parent.parent
+"""Where ``reports/...`` of a checkout lies."""
 
 LINE = "line.json"
 """What an assembly with interpolation leaves in its run folder."""
@@ -65,7 +69,7 @@ def find_model(part: PartConfig, *, workspace: Path, fetch: Fetch) -> Found:
     if part.line is not None:
         return _of_line(workspace, part.line)
     if part.bundle is not None:
-        return _of_bundle((workspace / part.bundle).resolve(), part.bundle)
+        return _of_bundle(_folder(part.bundle, workspace).resolve(), part.bundle)
     address = str(part.model)
     folder, run_id = fetch(address)
     bundle = read_bundle(folder)
@@ -82,8 +86,16 @@ def run_folder_of(given: str, workspace: Path) -> Path:
     Returns:
         The folder.
     """
-    folder = workspace / given
+    folder = _folder(given, workspace)
     return folder if folder.is_dir() else workspace / "runs" / given
+
+
+def _folder(given: str, workspace: Path) -> Path:
+    """A folder of the workspace; where that has none, what is published in the checkout."""
+    published = (PUBLISHED / given).resolve()
+    inside = not Path(given).is_absolute() and published.is_relative_to(PUBLISHED / "reports")
+    folder = workspace / given
+    return published if inside and published.is_dir() and not folder.is_dir() else folder
 
 
 def _of_run(part: PartConfig, workspace: Path) -> Found:
