@@ -10,6 +10,7 @@ import numpy as np
 
 from sysid.composite.fixed_member import FixedMember, Standing
 from sysid.errors import ConfigError
+from sysid.estimation.named import check_alike
 from sysid.models import Cascade, GreyBoxModel
 from sysid.models.grey_box import Parameter
 
@@ -29,14 +30,7 @@ def declared(fixed: Sequence[FixedMember], more: Iterable[Parameter] = ()) -> di
     """
     found: dict[str, Parameter] = {}
     for one in (*more, *(one for member in fixed for one in member.named)):
-        if found.setdefault(one.name, one) != one:
-            raise ConfigError(
-                f"the parameter {one.name} is declared in two ways",
-                where=f"parameters, {one.name}",
-                expected=f"{found[one.name].to_dict()} everywhere: one parameter has one name in the whole",
-                got=str(one.to_dict()),
-                remedy="declare it alike where it is the same, or give the other another name",
-            )
+        check_alike(one, found.setdefault(one.name, one))
     return found
 
 

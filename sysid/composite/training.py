@@ -94,7 +94,7 @@ class TrainedComposite:
     @property
     def chosen(self) -> str:
         """The stage that does best on the traces that choose."""
-        return min(self.selection, key=lambda stage: self.selection[stage])
+        return _best(self.selection)
 
     @property
     def model(self) -> Cascade:
@@ -165,22 +165,23 @@ def train(
     rehearse(composite, plan, seen.estimation[0])
     training = _Training(composite=composite, plan=plan, data=seen, keeper=keeper or MakeAll())
     training.run(begin, given)
+    selection = {name: whole_score(one, seen.choosing, plan.outputs) for name, one in training.stages.items()}
+    whole = training.stages[_best(selection)]
     return TrainedComposite(
         stages=training.stages,
-        selection={name: whole_score(one, seen.choosing, plan.outputs) for name, one in training.stages.items()},
+        selection=selection,
         candidates=training.candidates[0] if training.candidates else None,
         retrained=tuple(training.retrained),
         rounds=tuple(training.rounds),
         active_learning=training.active_learning[0] if training.active_learning else None,
-        limits=check_limits(composite, _fitted(composite, data, seen, list(training.stages.values())[-1])),
+        limits=check_limits(
+            composite, with_fixed(composite.fixed, data.fitted, values_in(whole)) if composite.free else seen.fitted
+        ),
     )
 
 
-def _fitted(composite: Composite, data: TrainingData, seen: TrainingData, whole: Cascade) -> list[Trace]:
-    """All that was fitted, with what the fixed submodels say in the end."""
-    given = data if composite.free else seen
-    traces = [*given.estimation, *chain.from_iterable(one for one, _ in given.also.values())]
-    return with_fixed(composite.fixed, traces, values_in(whole)) if composite.free else traces
+def _best(selection: Dict[str, float]) -> str:
+    return min(selection, key=lambda stage: selection[stage])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

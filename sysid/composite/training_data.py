@@ -55,6 +55,11 @@ class TrainingData:
             )
 
     @property
+    def fitted(self) -> list[Trace]:
+        """All traces that are fitted."""
+        return [*self.estimation, *chain.from_iterable(one for one, _ in self.also.values())]
+
+    @property
     def choosing(self) -> tuple[Trace, ...]:
         """All traces that choose between wholes."""
         return (*self.selection, *chain.from_iterable(chosen_by for _, chosen_by in self.also.values()), *self.held_out)

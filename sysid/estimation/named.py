@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sysid.errors import ConfigError
 from sysid.models.grey_box import GreyBox, Parameter
 
 FLAT_ALPHA = 1e-10
@@ -14,6 +15,26 @@ FLAT_ALPHA = 1e-10
 def precision_of(parameter: Parameter) -> float:
     """What is known of a parameter before the data, in scaled numbers."""
     return FLAT_ALPHA if parameter.prior is None else (parameter.scale / parameter.prior) ** 2
+
+
+def check_alike(one: Parameter, other: Parameter) -> None:
+    """Refuse a parameter that has other terms than one of its name.
+
+    Args:
+        one: The parameter.
+        other: The one that was declared before.
+
+    Raises:
+        ConfigError: If they differ.
+    """
+    if one != other:
+        raise ConfigError(
+            f"the parameter {one.name} is declared in two ways",
+            where=f"parameters, {one.name}",
+            expected=f"{other.to_dict()} everywhere: one parameter has one name in the whole",
+            got=str(one.to_dict()),
+            remedy="declare it alike where it is the same, or give the other another name",
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,9 +34,9 @@ HARDLY_OWN = 0.01
 """Part of an input's movement that others do not explain, below which its effect is told by hardly anything."""
 DIVERGED = 1e12
 """Mean squared error, over the output's variance, of a run that is lost: a million times the output's movements."""
-WORSE, HARDLY, POOR = 1.1, 0.9, 0.3
-"""Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt; and
-above which it does as well, all but a twentieth of the output's movement; and by how much less a run is still poor."""
+WORSE, HARDLY, POOR = 1.1, 0.9, 0.6
+"""Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt; above
+which it does as well, all but a twentieth of the output's movement; and above which a run is poor."""
 
 
 def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
@@ -238,31 +239,31 @@ def contradicted(
     longest = max(runs, key=lambda run: len(run.output))
     fed = feedback_told(model, traces, longest, training)
     levels = levels_told(model, traces[:MOST_TRACES], runs)
-    lags = left_out(model, longest, fed)
+    lags, ratios = left_out(model, longest, fed), _beside_constants(runs)
     # A lag that is left out is a cause, and the nearer one; not of a run that has next to nothing of the output.
-    worth = not lags or _ratio(runs) > HARDLY - POOR
+    worth = not lags or min(ratios.values(), default=0.0) > POOR
     rest = (*lags, *(causes(model, longest, (*fed, *levels)) if worth else ()))
-    return (*_beside_a_constant(model, runs), *fed.values(), *levels.values(), *rest)
+    return (*_told_beside_constants(model, ratios), *fed.values(), *levels.values(), *rest)
 
 
-def _ratio(runs: Sequence[FreeRun]) -> float:
-    """Mean squared error of free runs, over the outputs' variance, of the output that has the least."""
+def _beside_constants(runs: Sequence[FreeRun]) -> dict[int, float]:
+    """Mean squared error of free runs, over the output's variance, by the place of each output that moves."""
     y = np.concatenate([run.output[run.usable] for run in runs])
     simulated = np.concatenate([run.simulated[run.usable] for run in runs])
-    with np.errstate(all="ignore"):
-        ratios = np.mean((simulated - y) ** 2, axis=0) / np.var(y, axis=0)
-    return float(np.nanmin(ratios)) if np.isfinite(ratios).any() else 0.0
+    if len(y) < LEAST_SAMPLES:
+        return {}
+    with np.errstate(over="ignore", invalid="ignore"):
+        return {
+            i: float(np.mean((simulated[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
+            for i in range(y.shape[1])
+            if not still(y[:, i])
+        }
 
 
-def _beside_a_constant(model: AbstractModel, runs: Sequence[FreeRun]) -> list[str]:
-    y = np.concatenate([run.output[run.usable] for run in runs])
-    simulated = np.concatenate([run.simulated[run.usable] for run in runs])
+def _told_beside_constants(model: AbstractModel, ratios: Dict[int, float]) -> list[str]:
     told = []
-    for i, name in enumerate(model.mapping.outputs):
-        if len(y) < LEAST_SAMPLES or still(y[:, i]):
-            continue
-        with np.errstate(over="ignore", invalid="ignore"):
-            ratio = float(np.mean((simulated[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
+    for i, ratio in ratios.items():
+        name = model.mapping.outputs[i]
         if not ratio <= HARDLY:
             lost = not ratio < DIVERGED
             fit = "it diverges" if lost else f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %"

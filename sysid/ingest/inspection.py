@@ -250,10 +250,11 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
 def _step_in_a_column(columns: Sequence[RawColumn]) -> float | None:
     """The sample time, where it or a rate stands in a column of its own, as public benchmarks have it: ``Ts``."""
     for column in columns:
-        first = column.values[0]
-        step = step_in(f"{column.name} [{column.unit}]" if column.unit else column.name, float(first))
-        if step is not None and bool((_finite(column.values) == first).all()):
-            return step
+        known = np.unique(_finite(column.values))
+        if len(known) == 1:
+            step = step_in(f"{column.name} [{column.unit}]" if column.unit else column.name, float(known[0]))
+            if step is not None:
+                return step
     return None
 
 

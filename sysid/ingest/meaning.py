@@ -14,7 +14,7 @@ from sysid.ingest.table import RawColumn, RawTable, time_unit
 from sysid.ingest.words import Words, states_for
 from sysid.units import convert
 
-_RATED = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+_RATED = ("s", "ms", "us", "ns", "min", "h")
 """Units in which a time beside a rate may count."""
 _NEAR = 0.02
 """Share of a sample time by which the steps of a clock may be off it."""
@@ -92,8 +92,8 @@ def _beside_a_rate(table: RawTable, column: RawColumn, step: float) -> RawTable 
     if not len(known):
         return None
     usual = (float(np.median(known)), float(np.mean(known)))
-    units = _RATED if column.unit is None else {column.unit: _RATED.get(column.unit, _in_seconds(column.unit))}
-    for unit, seconds in units.items():
+    for unit in _RATED if column.unit is None else (column.unit,):
+        seconds = _in_seconds(unit)
         if any(abs(seconds * pace - step) <= _NEAR * step for pace in usual):
             if column.unit is not None:
                 return table

@@ -15,8 +15,9 @@ _PERIOD = (
     r"ts|t_s|dt|delta[ _]?t|delta[ _]?x|sampl(?:e|ing)[ _-]?(?:time|interval|period)|time[ _-]?step"
     r"|abtast(?:zeit|intervall)"
 )
-_IN_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "sa/s": 1.0, "samples/s": 1.0}
-_IN_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0}
+IN_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "sa/s": 1.0, "samples/s": 1.0}
+IN_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0}
+"""What a number of a rate, or a time, is multiplied with by the unit beside it; empty for none."""
 _LINE = re.compile(
     rf"[^\w]*(?:(?P<rate>{_RATE})|(?P<period>{_PERIOD})|(?P<either>{_EITHER}))\s*(?:[\[(](?P<head>[^\])]*)[\])])?\s*[:=;,\s]\s*"
     r"[\"']?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)[\s,;]*[\[(]?(?P<tail>[\w/µ]*)[\])]?[\"';,\s]*",
@@ -46,10 +47,10 @@ def _step(line: str) -> float | None:
     if match is None:
         return None
     unit = (match["head"] or match["tail"] or "").strip().lower()
-    rate = bool(match["rate"]) or (bool(match["either"]) and unit in _IN_HERTZ)
+    rate = bool(match["rate"]) or (bool(match["either"]) and unit in IN_HERTZ)
     if match["either"] and not unit:
         return None
-    factor = (_IN_HERTZ if rate else _IN_SECONDS).get(unit)
+    factor = (IN_HERTZ if rate else IN_SECONDS).get(unit)
     value = float(match["number"].replace(",", "."))
     if factor is None or not 0.0 < value * factor < float("inf"):
         return None

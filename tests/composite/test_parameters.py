@@ -78,6 +78,8 @@ def test_it_is_told_and_survives_storing(found):
     again = CascadeFit.from_dict(json.loads(json.dumps(fit.to_dict())))
     assert again.told_of_equations == fit.told_of_equations
     assert values_in(again.model) == found.parameters
+    kept = replace(fit, uncertainty=None, warnings=("The start was kept.",))
+    assert CascadeFit.from_dict(json.loads(json.dumps(kept.to_dict()))).told_of_equations == kept.warnings
 
 
 def test_a_bound_that_binds_and_a_prior_are_as_in_a_grey_box():

@@ -115,8 +115,10 @@ def test_a_file_without_time_gets_a_step_to_be_corrected(write: Write) -> None:
     assert len(proposed(path)["run"]) == 20
 
 
-def test_a_sample_time_in_a_column_of_its_own_is_taken_and_is_no_channel(write: Write) -> None:
-    path = write("run.csv", "u [V],y [V],Ts\n0,0,4\n" + rows(19, lambda i: f"{i % 4},{i % 3},"))
+@pytest.mark.parametrize("at", [0, 7])
+def test_a_sample_time_in_a_column_of_its_own_is_taken_and_is_no_channel(write: Write, at: int) -> None:
+    said = rows(20, lambda i: f"{i % 4},{i % 3},{'4' if i == at else ''}")
+    path = write("run.csv", f"u [V],y [V],Ts\n{said}")
     found = inspect_file(path)
     assert (found.time.step, found.time_guessed) == (4.0, True)
     assert found.problems == ("no time stamps", "Ts: one value only, 4")

@@ -70,11 +70,9 @@ class CascadeFit:
             else {name: getattr(self.evidence, name) for name in Evidence.__dataclass_fields__},
             "notes": list(self.notes),
             "attempts": [attempt.to_dict() for attempt in self.attempts],
-        } | (
-            {}
-            if self.uncertainty is None
-            else {"uncertainty": self.uncertainty.to_dict(), "warnings": list(self.warnings)}
-        )
+            **({} if self.uncertainty is None else {"uncertainty": self.uncertainty.to_dict()}),
+            **({"warnings": list(self.warnings)} if self.warnings else {}),
+        }
 
     @classmethod
     def from_dict(cls, fields: dict[str, Any]) -> CascadeFit:

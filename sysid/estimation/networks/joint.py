@@ -133,9 +133,7 @@ class Joint:
     def _advance(
         self, where: Solution | NDArray[np.float64], checkpoint: int, began: float, which: str, name: str
     ) -> Solution:
-        provider = RebasedProvider(
-            inner=self.provider, to_plain=self.layout.to_plain, between=self.layout.bounds
-        )  # fmt: skip
+        provider = RebasedProvider(inner=self.provider, to_plain=self.layout.to_plain, between=self.layout.bounds)
         keep = checkpoints_of(self.on_progress)
         # The run's own time counts towards its limit by itself; what is left of the whole is without it.
         engine = self._engine(checkpoint, began + keep.spent_s(name), which)

@@ -9,9 +9,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.named import Named, precision_of
+from sysid.estimation.named import Named, check_alike, precision_of
 from sysid.estimation.networks.equation_layout import EquationLayout
 from sysid.estimation.networks.member_layout import MemberLayout, basis_of
 from sysid.models import Member
@@ -73,8 +72,7 @@ class JointLayout:
             own = []
             for one in equation.parameters:
                 at, same = known.get(one.name, (count, one)) if one.name in shared else (count, one)
-                if same != one:
-                    raise _otherwise(one, same)
+                check_alike(one, same)
                 known[one.name] = (at, one)
                 own.append(at)
                 count = max(count, at + 1)
@@ -182,13 +180,3 @@ class JointLayout:
             if isinstance(layout, MemberLayout):
                 found[places] = layout.draw(rng, found[places])
         return found
-
-
-def _otherwise(one: Parameter, other: Parameter) -> ConfigError:
-    return ConfigError(
-        f"the parameter {one.name} is declared in two ways",
-        where=f"parameters, {one.name}",
-        expected=str(other.to_dict()),
-        got=str(one.to_dict()),
-        remedy="declare it alike where it is the same, or give the other another name",
-    )

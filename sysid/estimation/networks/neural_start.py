@@ -53,6 +53,9 @@ LOST, QUIETER = 4.0, 12
 """Times the loss of a start without its neurons from which they are too loud for it, and how often they are halved
 then: those that grow without bound lead a resonance away for good, from where no gradient leads back."""
 
+FASTEST_TURN = 3.0
+"""Radians a sample that a pair turns at most: beyond a half turn it would be another pair."""
+
 TIME_CONSTANTS = (100.0, 5.0, 0.5)
 """How many times faster than the slowest of the random time constants the fastest one is; fewest samples of the
 fastest; and the spread of each around its place between the two, as a natural logarithm."""
@@ -161,7 +164,7 @@ class NeuralLayout(AbstractLayout):
         poles = np.exp(-np.exp(-(places + spread * rng.standard_normal(s.states))))
         gains = rng.standard_normal((s.states, s.inputs))
         base = np.zeros(len(self.base))
-        A = _swinging(np.diag(poles), linear, spread, rng)
+        A = _swinging(poles, linear, spread, rng)
         base[s.linear] = np.column_stack([A, gains * (1.0 - poles)[:, None], np.zeros(s.states)]).ravel()
         base[s.output_linear].reshape(s.outputs, s.row)[:, : s.states] = 0.5 * rng.standard_normal(
             (s.outputs, s.states)
@@ -199,15 +202,16 @@ class NeuralLayout(AbstractLayout):
 
 
 def _swinging(
-    A: NDArray[np.float64], linear: NDArray[np.complex128], spread: float, rng: np.random.Generator
+    poles: NDArray[np.float64], linear: NDArray[np.complex128], spread: float, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """Real poles, as many pairs of which swing as do in a linear model: those that turn by more than they die away."""
     turns, dies = np.angle(linear), -np.log(np.clip(np.abs(linear), 1e-12, 1.0))
     swings = turns[(turns > dies) & (turns < np.pi)]
-    A = A.copy()
+    A = np.diag(poles)
     for pair, turn in enumerate(np.sort(swings)):
         both = slice(len(A) - 2 * pair - 2, len(A) - 2 * pair)
-        radius, angle = float(np.sqrt(np.prod(np.diag(A)[both]))), min(turn * np.exp(spread * rng.standard_normal()), 3)
+        radius = float(np.sqrt(np.prod(poles[both])))
+        angle = min(turn * np.exp(spread * rng.standard_normal()), FASTEST_TURN)
         A[both, both] = radius * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return A
 

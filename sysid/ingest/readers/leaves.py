@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
+from sysid.ingest.rates import IN_HERTZ, IN_SECONDS
 from sysid.units import Reference
 
 _STEPS = {"ts", "dt", "sample_time", "sampletime", "sampling_time", "samplingtime", "sample_period", "sampling_period"}
 _STEPS |= {"samplingperiod", "sampleperiod", "sampling_interval", "sample_interval", "wf_increment", "t_s", "delta_t"}
 _RATES = {"fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "samplingrate", "sampling_frequency"}
 _RATES |= {"sample_frequency", "samplingfrequency", "samplefrequency", "sfreq"}
-_IN_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
-_IN_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}
 _IN_UNIT = re.compile(r"(?P<stem>\w+?)[_ ]*[_ (\[.](?P<unit>[a-z]+)[)\]]?")
 
 
@@ -130,9 +129,9 @@ def step_in(name: str, number: float | None) -> float | None:
     plain = re.sub(r"(?<=[a-z])(Ms|Us|Hz|KHz|Sec)$", r"_\1", name.strip()).casefold()
     match = None if plain in _STEPS | _RATES else _IN_UNIT.fullmatch(plain)
     stem, unit = (match["stem"], match["unit"]) if match else (plain, "")
-    if stem in _STEPS and unit in _IN_SECONDS:
-        return number * _IN_SECONDS[unit]
-    return 1.0 / (number * _IN_HERTZ[unit]) if stem in _RATES and unit in _IN_HERTZ else None
+    if stem in _STEPS and unit in IN_SECONDS:
+        return number * IN_SECONDS[unit]
+    return 1.0 / (number * IN_HERTZ[unit]) if stem in _RATES and unit in IN_HERTZ else None
 
 
 def texts_of(value: Any) -> tuple[str, ...]:

@@ -23,7 +23,6 @@ from sysid.workbench.assembly.ablation import ablations_of
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.data import AssemblyData
 from sysid.workbench.assembly.interpolation import (
-    LINE,
     InterpolationScores,
     StoredInterpolation,
     interpolation_of,
@@ -34,7 +33,7 @@ from sysid.workbench.assembly.record import Outcome, assembly_results, write_sig
 from sysid.workbench.assembly.warm_start import read_whole
 from sysid.workbench.runner import events
 from sysid.workbench.runner.steps import Outlined, Step, Work
-from sysid.workbench.runner.store import digest, strict, write_json
+from sysid.workbench.runner.store import LINE, digest, strict, write_json
 
 if TYPE_CHECKING:
     from sysid.export import Bundle

@@ -19,9 +19,6 @@ from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference
 from sysid.workbench.assembly.proof_config import InterpolationConfig
 
-LINE = "line.json"
-"""In the run folder: the line."""
-
 WORKERS = 2
 """Threads of the timed runs."""
 

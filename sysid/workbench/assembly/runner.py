@@ -19,14 +19,14 @@ from sysid.workbench.assembly.data import AssemblyData
 from sysid.workbench.assembly.estimates import RoundEstimates
 from sysid.workbench.assembly.evaluation import ASSEMBLY, Evaluating
 from sysid.workbench.assembly.extending import read_joined
-from sysid.workbench.assembly.interpolation import LINE, StoredInterpolation
+from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.assembly.outline import outline
 from sysid.workbench.assembly.swept import swept
 from sysid.workbench.assembly.warm_start import read_whole
 from sysid.workbench.judging.runner import closing
 from sysid.workbench.runner.program import Program
 from sysid.workbench.runner.run import Run
-from sysid.workbench.runner.store import read_json
+from sysid.workbench.runner.store import LINE, read_json
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest

@@ -8,8 +8,7 @@ from pathlib import Path
 from sysid.errors import ConfigError
 from sysid.models import Cascade, Interpolation
 from sysid.models.ends import Ends
-from sysid.workbench.assembly.interpolation import LINE
-from sysid.workbench.runner.store import read_json
+from sysid.workbench.runner.store import LINE, read_json
 
 
 def read_whole(bundle: Path) -> tuple[Cascade, str]:

@@ -15,7 +15,7 @@ from sysid.models import AbstractModel, Cascade, Interpolation
 from sysid.reporting.results import read_results
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.judging.config import PartConfig
-from sysid.workbench.runner.store import RunFolder, read_json
+from sysid.workbench.runner.store import LINE, RunFolder, read_json
 
 Fetch = Callable[[str], "tuple[Path, str]"]
 """From a registered model's address to a folder with its bundle, and the run that tracks it."""
@@ -23,9 +23,6 @@ Fetch = Callable[[str], "tuple[Path, str]"]
 
 PUBLISHED = Path(sysid.__file__).resolve().parent.parent
 """Where ``reports/...`` of a checkout lies."""
-
-LINE = "line.json"
-"""What an assembly with interpolation leaves in its run folder."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

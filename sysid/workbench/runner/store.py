@@ -29,6 +29,9 @@ from sysid import bounded_text
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, UserError
 
+LINE = "line.json"
+"""What an assembly with interpolation leaves in its run folder."""
+
 
 class BusyError(UserError):
     """Another process is working in the same folder."""
