@@ -78,6 +78,12 @@ def chart_pictures(charts: Sequence[Chart], anchor: str) -> list[Picture]:
     return [chart.picture(f"{anchor}-chart-{number}") for number, chart in enumerate(charts)]
 
 
+SHORT = 20
+"""Letters of a name of which three surely fit beside each other above a chart."""
+BESIDE = 0.9
+"""Part of a chart's width that its names may take: they begin at its axis."""
+
+
 def chart_figure(chart: Chart) -> Figure:
     """Draw a chart; series differ in colour, dashes and marks, so that it is read in grey too."""
     with styled():
@@ -92,8 +98,16 @@ def chart_figure(chart: Chart) -> Figure:
         axes.set_xlabel(chart.x)
         axes.set_ylabel(chart.y)
         if chart.lines:
-            axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+            _name_all(figure, axes, max(len(line.name) for line in chart.lines))
         return figure
+
+
+def _name_all(figure: Figure, axes: Axes, longest: int) -> None:
+    """The names above a chart, in as many columns as it is wide enough for."""
+    for columns in (3, 2, 1):
+        legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2)
+        if longest <= SHORT or legend.get_window_extent().width <= BESIDE * figure.bbox.width:
+            return
 
 
 def _draw(axes: Axes, line: Line, index: int) -> None:
