@@ -4,9 +4,10 @@ What a surrogate never saw it answers all the same. Where several that were trai
 structures) agree, the answer is mostly right; where they do not, none of them knows. The first answers; it is in doubt
 at a sample where
 
-.. math:: \Bigl| y_1 - \frac{1}{n - 1} \sum_{k=2}^{n} y_k \Bigr| \ge d,
+.. math:: \Bigl| y_1 - \operatorname{med}(y_2, \dots, y_n) \Bigr| \ge d,
 
-query by committee (Seung, Opper and Sompolinsky 1992; ensemble variance of Krogh and Vedelsby 1995) at run time. The
+query by committee (Seung, Opper and Sompolinsky 1992; ensemble variance of Krogh and Vedelsby 1995) at run time, by the
+median: one of three others that runs away raises neither a doubt of its own nor the threshold of all. The
 difference is a channel of the whole like any other, held between :math:`\pm d`, so that every export computes it and
 raises the flag ``IN_DOUBT``. With ``each`` it is in doubt where it is as far from any one of them: the others may then
 be the first itself, what its switches compare moved up and down (:func:`sysid.composite.perturbed`), whose mean says
@@ -18,7 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -40,12 +41,13 @@ def committee(
 
     Args:
         wholes: Two or more with the same inputs, units and sample time.
-        thresholds: By output, in its unit: the difference from the mean of the others from which an answer is in doubt.
+        thresholds: By output, in its unit: the difference from the median of the others from which it is in doubt.
         each: Whether it is the difference from any one of the others.
 
     Returns:
         The channels of the first under their names; of the others with their number behind them (``BC_2``); and for
-        each judged output the difference (``BC_apart``), or those from each of the others (``BC_apart_2``).
+        judged output the difference (``BC_apart``), or those from each of the others (``BC_apart_2``); of three others
+        and more, what puts them in order (``BC_lower``, ``BC_upper``).
 
     Raises:
         ConfigError: If there are fewer than two, they have not the same inputs, one of them does not compute a judged
@@ -66,6 +68,11 @@ def committee(
     for output, threshold in thresholds.items():
         first, *others = (own[output] for own in names)
         groups = {f"_{k}": [other] for k, other in enumerate(others, 2)} if each else {"": others}
+        if not each and len(others) > 2:
+            ordering = _Ordering(output=output, like=cascades[0], taken=taken)
+            groups = {"": ordering.median(others)}
+            models += ordering.models
+            limits |= ordering.limits
         for behind, group in groups.items():
             name = _free(f"{output}{APART}{behind}", taken)
             models.append(_difference([first, *group], name, cascades[0], output))
@@ -122,14 +129,56 @@ def _limit(limit: Limit, names: Dict[str, str]) -> Limit:
     return replace(limit, low=low, high=high)
 
 
+@dataclass(kw_only=True, eq=False)
+class _Ordering:
+    """Channels in order, by exchanges of neighbours: the lower of two is one that the other holds from above.
+
+    Args:
+        output: Which they answer.
+        like: A whole with it.
+        taken: Names that are given.
+        models: What has been made.
+        limits: What holds it.
+    """
+
+    output: str
+    like: Cascade
+    taken: set[str]
+    models: list[NARXModel] = field(default_factory=list)
+    limits: dict[str, Limit] = field(default_factory=dict)
+
+    def median(self, channels: Sequence[str]) -> list[str]:
+        """The one in the middle, or the two."""
+        row = list(channels)
+        for last in range(len(row) - 1, 0, -1):
+            for k in range(last):
+                a, b = row[k : k + 2]
+                row[k] = self._held(a, "_lower", Limit(high=b))
+                row[k + 1] = self._held(a, "_upper", Limit(low=b))
+        half = (len(row) - 1) // 2
+        return row[half : len(row) - half]
+
+    def _held(self, channel: str, behind: str, limit: Limit) -> str:
+        name = _free(f"{self.output}{behind}", self.taken)
+        self.models.append(_sum({channel: 1.0}, name, self.like, self.output))
+        self.limits[name] = limit
+        return name
+
+
 def _difference(judged: Sequence[str], name: str, like: Cascade, output: str) -> NARXModel:
-    """The first less the mean of the others, as a network without neurons: it is run and exported like the others."""
-    unit, n = like.units[output], len(judged)
+    """The first less the mean of the others."""
+    first, *others = judged
+    return _sum({first: 1.0, **dict.fromkeys(others, -1.0 / len(others))}, name, like, output)
+
+
+def _sum(gains: Dict[str, float], name: str, like: Cascade, output: str) -> NARXModel:
+    """A weighted sum of channels, as a network without neurons: it is run and exported like the others."""
+    unit, n = like.units[output], len(gains)
     return NARXModel(
         network=NARX(input_delays=[[0]] * n, output_delays=1, neurons=0),
-        theta=np.array([0.0, 1.0, *[-1.0 / (n - 1)] * (n - 1), 0.0]),
+        theta=np.array([0.0, *gains.values(), 0.0]),
         scaling=Scaling.identity(n),
-        mapping=Mapping(inputs=judged, output=name),
+        mapping=Mapping(inputs=tuple(gains), output=name),
         sample_time=like.sample_time,
         input_units=(unit,) * n,
         output_unit=unit,

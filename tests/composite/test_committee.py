@@ -37,6 +37,18 @@ def measured(seed: int, by: Cascade, apart: float = 0.0) -> Trace:
     return Trace(name=f"T{seed}", sample_time=0.1, channels=channels, values=values)
 
 
+@pytest.mark.parametrize("count", [3, 4, 5])
+def test_of_three_others_and_more_it_is_the_median(count: int) -> None:
+    """One that runs away raises no doubt of its own."""
+    wholes = [whole(seed) for seed in range(count + 1)]
+    handle = measured(0, wholes[0])["STP"][:, None]
+    both = committee(wholes, {"AR": 100.0})
+    run, others = both.simulate(handle), np.stack([one.simulate(handle)["AR"] for one in wholes[1:]])
+    np.testing.assert_allclose(run["AR_apart"], run["AR"] - np.median(others, axis=0), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(simulate_cascade(both, handle)["AR_apart"], run["AR_apart"], rtol=0.0, atol=1e-9)
+    assert cascade_from_dict(both.to_dict()).to_dict() == both.to_dict()
+
+
 def test_it_answers_as_its_first_member_does() -> None:
     handle = measured(0, WHOLES[0])["STP"][:, None]
     run = committee(WHOLES, {"AR": 0.5}).simulate(handle)
