@@ -6,11 +6,11 @@ All three hold the same layout, ``<kind>/<name>/...``. The workspace comes first
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
 import sysid
+from sysid.errors import near_words
 
 
 def content_folders(kind: str, *, workspace: Path | None = None) -> tuple[Path, ...]:
@@ -78,7 +78,7 @@ def nearest_name(wanted: str, groups: Iterable[Iterable[str]]) -> str | None:
         >>> nearest_name("tanks", [["tank"], ["tanks-2"]])
         'tank'
     """
-    found = (difflib.get_close_matches(wanted, list(names), n=1) for names in groups)
+    found = (near_words(wanted, names) for names in groups)
     return next((near[0] for near in found if near), None)
 
 

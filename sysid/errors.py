@@ -7,7 +7,7 @@ line leaves with exit code 2), any other :class:`SysidError` is ours (exit code 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 
 def shortened(value: object, limit: int = 80) -> str:
@@ -29,6 +29,68 @@ def shortened(value: object, limit: int = 80) -> str:
     except (ValueError, RecursionError, MemoryError):  # 5,000 digits, a thousand brackets
         return f"a {type(value).__name__} that is too large to show"
     return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+LEAST = 0.6
+"""How alike two words are that may be meant for each other, of 1 (the usual cutoff of :mod:`difflib`)."""
+
+
+def near_words(given: object, known: Iterable[str], also: Mapping[str, Sequence[str]] | None = None) -> tuple[str, ...]:
+    """The known words that were probably meant; capitals, blanks and dashes make no difference.
+
+    Args:
+        given: What was written.
+        known: The words that there are.
+        also: What some of them are called elsewhere, in small letters without blanks and dashes.
+
+    Returns:
+        Those that are nearest, all where several are as near; else those that hold what was written, three at most.
+
+    Example:
+        >>> near_words("Fmi-3", ["onnx", "fmi2", "fmi3"]), near_words("fmi", ["onnx", "fmi2", "fmi3"])
+        (('fmi3',), ('fmi2', 'fmi3'))
+        >>> near_words("fmu", ["onnx", "fmi2", "fmi3"], {"fmu": ("fmi3", "fmi2")})
+        ('fmi3', 'fmi2')
+    """
+    word, meant = _folded(given), dict[str, list[str]]()
+    for one in known:
+        meant.setdefault(_folded(one), []).append(one)
+    for other, ones in (also or {}).items():
+        meant.setdefault(other, []).extend(ones)
+    if word in meant:
+        return tuple(meant[word])
+    ratios = {one: difflib.SequenceMatcher(None, one, word).ratio() for one in meant}
+    best = max(ratios.values(), default=0.0)
+    if best >= LEAST:
+        return tuple(dict.fromkeys(one for key, ratio in ratios.items() if ratio == best for one in meant[key]))
+    holding = [one for key, ones in meant.items() if len(word) > 1 and word in key for one in ones]
+    return tuple(dict.fromkeys(holding)) if len(holding) <= 3 else ()
+
+
+def did_you_mean(
+    given: object, known: Iterable[str], otherwise: str, *, also: Mapping[str, Sequence[str]] | None = None
+) -> str:
+    """What to do about a word that is not known.
+
+    Args:
+        given: What was written.
+        known: The words that there are.
+        otherwise: What to do where none of them is near.
+        also: What some of them are called elsewhere; see :func:`near_words`.
+
+    Returns:
+        The remedy of an error.
+
+    Example:
+        >>> did_you_mean("neuron", ["neurons", "input_delays"], "remove it")
+        'did you mean neurons?'
+    """
+    near = near_words(given, known, also)
+    return f"did you mean {' or '.join(near)}?" if near else otherwise
+
+
+def _folded(word: object) -> str:
+    return "".join(letter for letter in str(word).casefold() if letter not in " -_'\"")
 
 
 class SysidError(Exception):
@@ -115,8 +177,7 @@ class ChannelError(UserError):
     def __init__(self, missing: Sequence[str], available: Sequence[str], *, where: object = None) -> None:
         self.missing = tuple(missing)
         self.available = tuple(available)
-        near = {name: difflib.get_close_matches(name, available, n=1) for name in missing}
-        guesses = [match[0] for match in near.values() if match]
+        guesses = [near[0] for name in missing if (near := near_words(name, available))]
         remedy = f"did you mean {', '.join(guesses)}?" if guesses else "name one of the channels that are there"
         super().__init__(
             f"missing channel {', '.join(missing)}",

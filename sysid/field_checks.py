@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import types
 import typing
@@ -12,7 +11,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from sysid.errors import ConfigError, shortened
+from sysid.errors import ConfigError, did_you_mean, shortened
 from sysid.yaml_files import line_of
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -95,9 +94,8 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
     remedy = "correct the value"
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, loc[:-1])
-        near = difflib.get_close_matches(str(loc[-1]), known, n=1)
         what, expected, got = f"unknown field {loc[-1]!r}", f"one of {', '.join(known)}", str(loc[-1])
-        remedy = f"did you mean {near[0]}?" if near else "remove it, or use one of the fields that are known"
+        remedy = did_you_mean(loc[-1], known, "remove it, or use one of the fields that are known")
     elif first["type"] == "missing":
         what, expected, got = (
             f"the field {loc[-1]!r} is missing",
@@ -151,10 +149,7 @@ _CHANGES: dict[str, tuple[str, str]] = {
 def _choice(given: str, expected: str) -> str:
     """The one of some words that was probably meant, or the first of them."""
     words = re.findall(r"'([^']*)'", expected)
-    near = difflib.get_close_matches(given, words, n=1)
-    if near:
-        return f"did you mean {near[0]}?"
-    return f"write one of them, such as {words[0]}" if words else "correct the value"
+    return did_you_mean(given, words, f"write one of them, such as {words[0]}" if words else "correct the value")
 
 
 def _beside(first: Sequence[str | int], loc: Sequence[str | int], origins: Origins) -> str:

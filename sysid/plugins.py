@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib.metadata
 from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints
 from typing import Any
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 
 
 @cache
@@ -43,15 +42,16 @@ def find_entry(group: str, name: str, *, what: str, where: object) -> EntryPoint
     """
     found = {entry.name: entry for entry in entry_points(group)}
     if name not in found:
-        near = difflib.get_close_matches(name, found, n=1)
         raise ConfigError(
             f"no {what} named {name} is installed",
             where=where,
             expected=f"one of {', '.join(sorted(found))}" if found else f"an installed {what}; there is none at all",
             got=name,
-            remedy=f"did you mean {near[0]}?"
-            if near
-            else "install the package that brings it; for what is built in, the workbench itself (pip install -e .)",
+            remedy=did_you_mean(
+                name,
+                found,
+                "install the package that brings it; for what is built in, the workbench itself (pip install -e .)",
+            ),
         )
     return found[name]
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.errors import ChannelError, ConfigError, TraceError, did_you_mean
 from sysid.units import Reference, is_same_unit
 
 SMALLEST, LARGEST = 1e-150, 1e150
@@ -359,7 +359,7 @@ class TraceSet:
                 where=f"data set {self.name}",
                 expected=f"one of {', '.join(names)}",
                 got=", ".join(strangers),
-                remedy="correct the name in roles",
+                remedy=did_you_mean(strangers[0], names, "correct the name in roles"),
             )
         first = self.traces[0]
         for trace in self.traces[1:]:
@@ -408,7 +408,7 @@ class TraceSet:
             where=f"data set {self.name}",
             expected=f"one of {', '.join(self.names)}",
             got=name,
-            remedy="correct the name of the case",
+            remedy=did_you_mean(name, self.names, "correct the name of the case"),
         )
 
     @property

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 
 EMERGENCY = 0.0
 """The command in psi gauge that means an emergency."""
@@ -106,6 +106,7 @@ class Command:
                 where="command, time_unit",
                 expected=f"one of {', '.join(TIME_UNITS)}",
                 got=time_unit,
+                remedy=did_you_mean(time_unit, TIME_UNITS, "write one of these"),
             )
         try:
             table = np.array([[float(value) for value in row] for row in rows], dtype=np.float64)

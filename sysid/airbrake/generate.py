@@ -17,7 +17,7 @@ from sysid.airbrake.radio import Radio
 from sysid.airbrake.sequences import RandomCommand
 from sysid.airbrake.simulate import AirBrakeRecord, simulate
 from sysid.airbrake.variant import USUAL_VARIANT, VARIANTS
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.excitation import excite
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
@@ -176,7 +176,11 @@ def _equipment(options: _Options) -> Equipment:
     ):
         if given is not None and given not in rows:
             raise ConfigError(
-                f"unknown {name}", where=f"options, {name}", expected=f"one of {', '.join(rows)}", got=given
+                f"unknown {name}",
+                where=f"options, {name}",
+                expected=f"one of {', '.join(rows)}",
+                got=given,
+                remedy=did_you_mean(given, rows, "name one of these"),
             )
     if options.equipment is not None and options.variant is not None:
         raise ConfigError(

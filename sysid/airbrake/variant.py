@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.units import PSI_IN_PA
 
 
@@ -163,7 +163,11 @@ class Variant:
         for name, value in options.items():
             if name not in fields:
                 raise ConfigError(
-                    f"unknown switch {name}", where="variant", expected=f"one of {', '.join(fields)}", got=name
+                    f"unknown switch {name}",
+                    where="variant",
+                    expected=f"one of {', '.join(fields)}",
+                    got=name,
+                    remedy=did_you_mean(name, fields, "name one of these"),
                 )
             changes[name] = self._checked(name, value)
         return dataclasses.replace(self, **changes)
@@ -173,9 +177,13 @@ class Variant:
             try:
                 return QuickService(value)
             except ValueError:
-                choices = ", ".join(choice.value for choice in QuickService)
+                choices = [choice.value for choice in QuickService]
                 raise ConfigError(
-                    "unknown quick service", where="variant", expected=f"one of {choices}", got=value
+                    "unknown quick service",
+                    where="variant",
+                    expected=f"one of {', '.join(choices)}",
+                    got=value,
+                    remedy=did_you_mean(value, choices, "name one of these"),
                 ) from None
         printed = getattr(LISTING, name)
         if isinstance(printed, bool) and isinstance(value, bool):

@@ -45,9 +45,9 @@ def committee(
         each: Whether it is the difference from any one of the others.
 
     Returns:
-        The channels of the first under their names; of the others with their number behind them (``BC_2``); and for
-        judged output the difference (``BC_apart``), or those from each of the others (``BC_apart_2``); of three others
-        and more, what puts them in order (``BC_lower``, ``BC_upper``).
+        The channels of the first under their names; of the others with their number behind them (``BC_2``); and of
+        each judged output the difference (``BC_apart``), or those from each of the others (``BC_apart_2``), and of
+        three others and more what puts them in order (``BC_lower``, ``BC_upper``).
 
     Raises:
         ConfigError: If there are fewer than two, they have not the same inputs, one of them does not compute a judged

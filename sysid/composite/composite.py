@@ -13,7 +13,7 @@ from typing import Any
 from sysid.composite.fixed_member import FixedMember, Standing, parameters_of
 from sysid.composite.limit_expressions import named_limits
 from sysid.composite.parameters import check_names, declared
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation import StabilityOptions, Training, estimators
 from sysid.models import NARX, AbstractStructure, Limit, Mapping
 from sysid.models.cascade_run import Level
@@ -202,5 +202,5 @@ class Composite:
             where="members",
             expected=f"one of {', '.join(one.output for one in self.members)}",
             got=output,
-            remedy="correct the name, or add a member",
+            remedy=did_you_mean(output, [one.output for one in self.members], "correct the name, or add a member"),
         )

@@ -62,18 +62,21 @@ class Doubting:
 
     Args:
         whole: The committee, which answers as the whole did.
+        output: What is judged.
         figures: On the sequences that its threshold was found on.
     """
 
     whole: Cascade
+    output: str
     figures: DoubtFigures
 
     @property
     def sentence(self) -> str:
         """What it does, in words."""
-        one = self.figures
+        one, unit = self.figures, self.whole.units[self.output]
         return (
-            f"in doubt from a difference of {one.threshold:.3g} on; wrong by more than {one.error:g} are "
+            f"{self.output} in doubt from a difference of {one.threshold:.3g} {unit} on; "
+            f"where the threshold was found, wrong by more than {one.error:g} {unit} are "
             f"{100 * one.wrong:.2g} % of the samples, of these in doubt {100 * one.flagged:.3g} %, "
             f"of the others {100 * one.false:.2g} %"
         )
@@ -93,7 +96,7 @@ def doubting(
         asked: What it is to doubt.
         traces: Sequences that trained nothing, of more than one kind, with the measured output: the threshold is found
             on them.
-        beside: Wholes that were trained apart. Alone they are one committee, from whose mean it parts; with
+        beside: Wholes that were trained apart. Alone they are one committee, from whose median it parts; with
             perturbations it doubts where it is as far from any one.
 
     Returns:
@@ -110,4 +113,6 @@ def doubting(
     members, each = [whole, *beside, *moved], bool(moved)
     threshold = doubt_threshold(members, traces, asked.output, error=asked.error, false=asked.false, each=each)
     found = committee(members, {asked.output: threshold}, each=each)
-    return Doubting(whole=found, figures=doubt_figures(found, traces, asked.output, error=asked.error))
+    return Doubting(
+        whole=found, output=asked.output, figures=doubt_figures(found, traces, asked.output, error=asked.error)
+    )

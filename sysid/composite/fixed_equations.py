@@ -33,7 +33,7 @@ from sysid.equations.syntax import (
     nodes_of,
 )
 from sysid.equations.system import written_name
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.models import Mapping
 from sysid.models.grey_box import Parameter
 
@@ -177,7 +177,7 @@ def _check_known(what: str, given: list[str], known: list[str]) -> None:
             where=what,
             expected=f"one of {', '.join(dict.fromkeys(known))}",
             got=strangers[0],
-            remedy="correct the name, or write its equation",
+            remedy=did_you_mean(strangers[0], known, "correct the name, or write its equation"),
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from sysid.equations.syntax import (
     equation_error,
     nodes_of,
 )
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean, near_words
 
 MOST_STATES = 100
 """States with a name."""
@@ -142,7 +141,7 @@ class System:
                 )
         for name in outputs:
             if name not in computed:
-                near = difflib.get_close_matches(name, computed, n=1)
+                near = near_words(name, computed)
                 raise ConfigError(
                     f"no equation computes the output {name}",
                     where="equations",
@@ -153,7 +152,7 @@ class System:
         for name in self.others:
             if name not in inputs:
                 known = (*inputs, *computed, *self.parameters)
-                near = difflib.get_close_matches(name, known, n=1)
+                near = near_words(name, known)
                 raise equation_error(
                     f"nothing says what {name} is",
                     self.text,
@@ -239,28 +238,27 @@ class System:
                 )
             return
         known = (*FUNCTIONS, *OWN, *self.tables)
-        near = difflib.get_close_matches(name, known, n=1)
         value = name in {*self.states, *self.definitions, *self.parameters}
         raise equation_error(
             f"there is no function {name}",
             self.text,
             node.at,
             expected="one of " + ", ".join(known),
-            remedy=f"write {name}*(...) for a product" if value else f"did you mean {near[0]}?" if near
-            else "write * between factors, or give a table of that name in tables",
+            remedy=f"write {name}*(...) for a product" if value else did_you_mean(
+                name, known, "write * between factors, or give a table of that name in tables"
+            ),
         )  # fmt: skip
 
     def _check_used(self) -> None:
         read = {name for name, _ in self._reads}
         for name in self.parameters:
             if name not in read:
-                near = difflib.get_close_matches(name, self.others, n=1)
                 raise ConfigError(
                     f"no equation reads the parameter {name}",
                     where="parameters",
                     expected="parameters that the equations read",
                     got=name,
-                    remedy=f"did you mean {near[0]}?" if near else f"remove {name} from the parameters",
+                    remedy=did_you_mean(name, self.others, f"remove {name} from the parameters"),
                 )
 
     @cached_property

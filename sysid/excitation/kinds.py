@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Mapping
 from enum import Enum
 from typing import Any, Final, get_args, get_type_hints
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.excitation.manoeuvres import Pulses, Ramps, Sine
 from sysid.excitation.noise import Chirp, FilteredNoise
 from sysid.excitation.plan import AbstractExcitation
@@ -46,12 +45,11 @@ def kind_of(name: str, options: Mapping[str, Any]) -> AbstractExcitation:
         PRBS(clock=4, order=None)
     """
     if name not in KINDS:
-        near = difflib.get_close_matches(name.lower(), KINDS, n=1)
         raise ConfigError(
             "there is no such excitation",
             expected=f"one of {', '.join(KINDS)}",
             got=name,
-            remedy=f"did you mean {near[0]}?" if near else "name one of these",
+            remedy=did_you_mean(name, KINDS, "name one of these"),
         )
     kind: Any = KINDS[name]
     hints = get_type_hints(kind)
@@ -63,7 +61,7 @@ def kind_of(name: str, options: Mapping[str, Any]) -> AbstractExcitation:
             f"{name} has no option {strangers[0]}",
             expected=f"one of {', '.join(known)}",
             got=", ".join(strangers),
-            remedy="leave it out, or choose another kind",
+            remedy=did_you_mean(strangers[0], known, "leave it out, or choose another kind"),
         )
     made: AbstractExcitation = kind(**{key: _checked(key, value, known[key]) for key, value in given.items()})
     return made

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.export.arduino_exporter import ArduinoExporter
 from sysid.export.c_exporter import CExporter
 from sysid.export.casadi_exporter import CasadiExporter
@@ -42,6 +42,17 @@ EXPORTERS: dict[str, AbstractExporter] = {
     )
 }
 """Every format by name."""
+
+ELSEWHERE = {
+    **dict.fromkeys(("fmu", "fmi", "modelica", "simulink"), ("fmi3", "fmi2")),
+    **dict.fromkeys(("pytorch", "torch", "pt"), ("torchscript", "torch-export")),
+    **dict.fromkeys(("onnxruntime", "tensorrt", "tflite", "tensorflow"), ("onnx",)),
+    **dict.fromkeys(("plc", "scl", "structuredtext", "iec61131"), ("st",)),
+    **dict.fromkeys(("js", "javascript", "webassembly"), ("wasm",)),
+    **dict.fromkeys(("octave", "m"), ("matlab",)),
+    **dict.fromkeys(("c++", "h"), ("cpp",)),
+}
+"""What formats are called elsewhere."""
 
 USUAL = ("onnx", "c")
 """What is written where nobody names a format, as far as it can be written here."""
@@ -137,5 +148,5 @@ def exporter(name: str) -> AbstractExporter:
             "unknown export format",
             expected=f"one of {', '.join(EXPORTERS)}",
             got=name,
-            remedy="correct the name in formats",
+            remedy=did_you_mean(name, EXPORTERS, "correct the name in formats", also=ELSEWHERE),
         ) from None

@@ -12,6 +12,8 @@ from importlib import metadata, resources
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
 import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
@@ -112,6 +114,30 @@ def describe(
         "provenance": {**provenance, "data": _data(recorded or traces), "software": software()},
     }
     return {name: _json(value) for name, value in manifest.items()}
+
+
+def of_another(manifest: Dict[str, Any], surrogate: Surrogate) -> dict[str, Any]:
+    """What ``model.json`` says, with another model in place of its own, which answers as that does.
+
+    Args:
+        manifest: Its content.
+        surrogate: The other model, whose members are told with the fits of the same mappings.
+
+    Returns:
+        The content.
+    """
+    stored, fits = surrogate.source.to_dict(), {stage["mapping"]: stage["fit"] for stage in manifest["stages"]}
+    levels = {port.name: port.level for port in surrogate.channels}
+    first = np.array([port.start for port in surrogate.inputs])
+    values = dict(zip(levels, surrogate.levels(first).tolist(), strict=True))
+    changed = {
+        "structure": stored["structure"],
+        "stages": [_stage(one, None) | {"fit": fits.get(str(one.model.mapping))} for one in surrogate.stages],
+        "model": stored,
+        "n_parameters": surrogate.source.n_parameters,
+        "initialisation": manifest["initialisation"] | {"levels": levels, "values": values},
+    }
+    return {**manifest, **{name: _json(value) for name, value in changed.items()}}
 
 
 def _begun(start: Start | None, *, several: bool) -> dict[str, Any]:

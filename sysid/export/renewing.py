@@ -6,6 +6,7 @@ import copy
 import csv
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,13 @@ from numpy.typing import NDArray
 
 from sysid.errors import BundleError, ConfigError
 from sysid.export.bundle import Bundle
-from sysid.export.manifest import SCHEMA_VERSION, amplification, software
+from sysid.export.manifest import SCHEMA_VERSION, amplification, of_another, software
 from sysid.export.parity import ParityCase, case_from_rest, parity_cases, random_cases
 from sysid.export.reading import read_attachment, read_bundle
 from sysid.export.stability import WORST
 from sysid.export.surrogate import Surrogate
 from sysid.export.writing import Content, allowed_of, publish_bundle
-from sysid.models import Start, StartKind
+from sysid.models import Cascade, Start, StartKind
 from sysid.traces import TraceSet
 
 RECORD = "verify/record1.csv"
@@ -30,7 +31,13 @@ FIRST_WHOLE = 3
 
 
 def renew_bundle(
-    bundle: Path, folder: Path, *, formats: Sequence[str] | None = None, traces: TraceSet | None = None
+    bundle: Path,
+    folder: Path,
+    *,
+    formats: Sequence[str] | None = None,
+    traces: TraceSet | None = None,
+    whole: Cascade | None = None,
+    doubt: str | None = None,
 ) -> Bundle:
     """Write a stored bundle's files again, or in other formats, once each has reproduced the stored model.
 
@@ -43,6 +50,8 @@ def renew_bundle(
         folder: Where the new one goes; what lies there is replaced if it is a bundle, or empty. It may be the same.
         formats: Names of exporters; by default those that the bundle has.
         traces: The cases that the bundle was written on, as its ``model.json`` names them by digest.
+        whole: What takes the place of the bundle's whole and answers as it does: one that says where it does not know.
+        doubt: A sentence of how far that can be trusted, for the model card.
 
     Returns:
         The new bundle. The same one, formats and software give the same bytes.
@@ -50,7 +59,7 @@ def renew_bundle(
     Raises:
         BundleError: If a file is missing, changed or newer than this version can read, or the bundle is of the first
             versions.
-        ConfigError: If a format is unknown, or the traces are others.
+        ConfigError: If a format is unknown, the traces are others, or the other whole answers otherwise.
         MissingExtraError: If a package that a format needs is not installed.
         ParityError: If a file differs from the model by more than is allowed; nothing is published then.
     """
@@ -63,10 +72,17 @@ def renew_bundle(
             got=old.metadata["schema_version"],
             remedy="export it from its run: sysid export PIPELINE --fit NAME",
         )
+    if whole is not None:
+        _check_alike(old, whole)
+        old = replace(old, model=whole)
     surrogate = _surrogate(old)
     cases = _cases(old, surrogate, traces)
     sequences = random_cases(surrogate)
     manifest = _manifest(old, surrogate, cases, sequences, whole=traces is not None)
+    if whole is not None:
+        manifest = of_another(manifest, surrogate)
+    if doubt is not None:
+        manifest["provenance"]["doubt"] = doubt
     extra = {WORST: data} if (data := read_attachment(old, WORST)) is not None else {}
     sizes = cases if traces is not None else (*cases, *(one for one in sequences if np.isfinite(one.output).all()))
     content = Content(
@@ -78,6 +94,25 @@ def renew_bundle(
         extra=extra,
     )
     return publish_bundle(Path(folder), old.model, manifest, content)
+
+
+def _check_alike(old: Bundle, whole: Cascade) -> None:
+    """Refuse a whole whose answers are not those that the figures of the bundle are of."""
+    names = [str(entry["name"]) for entry in old.outputs]
+    alike = isinstance(old.model, Cascade) and set(whole.inputs) == set(old.model.inputs)
+    if alike and set(names) <= set(whole.outputs):
+        surrogate = _surrogate(old)
+        u = _recorded(old, surrogate)
+        before, after = surrogate.simulate(u), _surrogate(replace(old, model=whole)).simulate(u)
+        alike = np.array_equal(before, after, equal_nan=True)
+    if not alike:
+        raise ConfigError(
+            "that whole does not answer as the bundle does",
+            where=str(old.folder),
+            expected=f"the whole of the bundle, which computes {', '.join(names)}, with something beside it",
+            got=f"{', '.join(whole.inputs)} in, {', '.join(whole.outputs)} computed",
+            remedy="export another whole with its own cases: export_bundle",
+        )
 
 
 def _surrogate(old: Bundle) -> Surrogate:

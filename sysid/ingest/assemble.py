@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError, UserError
+from sysid.errors import ConfigError, TraceError, UserError, did_you_mean
 from sysid.ingest import repairs as repair
 from sysid.ingest.grid import Gridded, fill, grid_places, place, resample
 from sysid.ingest.in_units import check_units_said, clock_by_its_steps, in_unit, stamps_in_seconds
@@ -162,7 +162,9 @@ def _check_names(channels: Sequence[Channel], files: FileOptions, source: Path) 
                 where=f"the description of {source}, field source.files.{field_name}",
                 expected=f"one of {', '.join(sorted(names))}",
                 got=strangers[0],
-                remedy="write channel names on the left, column names or values on the right",
+                remedy=did_you_mean(
+                    strangers[0], names, "write channel names on the left, column names or values on the right"
+                ),
             )
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.content import content_folders, nearest_name, unique_folders
-from sysid.errors import ConfigError, SysidError
+from sysid.errors import ConfigError, SysidError, near_words
 from sysid.ingest.assemble import Wanted, assemble, round_channels
 from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
 from sysid.ingest.description import DatasetDescription, read_description
@@ -153,7 +152,7 @@ def _choose(description: DatasetDescription, cases: Sequence[str] | None, path: 
         return known
     strangers = [case for case in cases if case not in known]
     if strangers or not cases:
-        near = [match for case in strangers for match in difflib.get_close_matches(case, known, n=1)]
+        near = [one for case in strangers for one in near_words(case, known)]
         raise ConfigError(
             f"no case {', '.join(strangers)} in the data set" if strangers else "no case is asked for",
             where=path,

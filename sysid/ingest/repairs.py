@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError
+from sysid.errors import ConfigError, TraceError, did_you_mean
 from sysid.ingest.options import RepairOptions
 from sysid.ingest.table import RawTable
 
@@ -253,7 +253,7 @@ def _check_names(record: Record, repairs: RepairOptions) -> None:
                 where=f"the description of {record.table.source}",
                 expected=f"one of {', '.join(record.names)}",
                 got=strangers[0],
-                remedy="write the names of channels on the left",
+                remedy=did_you_mean(strangers[0], record.names, "write the names of channels on the left"),
             )
 
 

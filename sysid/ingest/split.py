@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.traces import Role, Trace, TraceSet
 
 Split = float | Sequence[float] | Sequence[str] | Mapping[str, tuple[float, float]] | str | None
@@ -204,7 +204,9 @@ def _role(word: str) -> Role:
             where="split",
             expected=f"one of {', '.join(ROLES)}",
             got=word,
-            remedy="estimation is fitted, selection chooses between fits, validation and test are only scored",
+            remedy=did_you_mean(
+                word, ROLES, "estimation is fitted, selection chooses between fits, validation and test are only scored"
+            ),
         )
     return ROLES[word.strip().lower()]
 

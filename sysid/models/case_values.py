@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, shortened
+from sysid.errors import ConfigError, did_you_mean, shortened
 
 Array = NDArray[np.float64]
 
@@ -124,10 +123,9 @@ def cases_among(records: Sequence[str], grouped: Grouped) -> tuple[str, ...]:
     """
     for case, named in grouped:
         if not set(named) & set(records):
-            near = [one for name in named for one in difflib.get_close_matches(name, records, n=1)]
             raise ConfigError(
                 f"no record of the case {case} is fitted", where="cases", expected=f"one of {', '.join(records)}",
-                got=", ".join(named), remedy=f"did you mean {near[0]}?" if near else f"remove {case} from cases",
+                got=", ".join(named), remedy=did_you_mean(named[0], records, f"remove {case} from cases"),
             )  # fmt: skip
     return tuple(dict.fromkeys(case_of(record, grouped) for record in records))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
@@ -12,7 +11,7 @@ from itertools import pairwise
 from typing import Any
 
 from sysid.equations import RUNGE_KUTTA, SOLVERS, Lowered, System, Terms, lower
-from sysid.errors import ConfigError, shortened
+from sysid.errors import ConfigError, did_you_mean, shortened
 from sysid.models.case_values import case_of, cases_among, cases_of, unknown_case
 from sysid.models.history import Start, StartKind
 from sysid.models.lags import whole
@@ -210,17 +209,15 @@ class GreyBox(AbstractStructure):
                 got=shortened(self.substeps), remedy="leave substeps out: as many as are needed are chosen",
             )  # fmt: skip
         if self.solver is not None and self.solver not in SOLVERS:
-            near = difflib.get_close_matches(str(self.solver), SOLVERS, n=1)
             raise ConfigError(
                 "there is no such solver", where="solver", expected=f"one of {', '.join(SOLVERS)}",
                 got=shortened(self.solver),
-                remedy=f"did you mean {near[0]}?" if near else "leave solver out: the one that is needed is chosen",
+                remedy=did_you_mean(self.solver, SOLVERS, "leave solver out: the one that is needed is chosen"),
             )  # fmt: skip
         if self.intervals not in INTERVALS:
-            near = difflib.get_close_matches(str(self.intervals), INTERVALS, n=1)
             raise ConfigError(
                 "there are no such intervals", where="intervals", expected=f"one of {', '.join(INTERVALS)}",
-                got=shortened(self.intervals), remedy=f"did you mean {near[0]}?" if near else "leave intervals out",
+                got=shortened(self.intervals), remedy=did_you_mean(self.intervals, INTERVALS, "leave intervals out"),
             )  # fmt: skip
         self._check_system()
 
@@ -230,10 +227,9 @@ class GreyBox(AbstractStructure):
         lowered(self, system.others, (*system.states, *system.definitions), None, self.solver or RUNGE_KUTTA)
         for one in self._states_given:
             if one.name not in system.states:
-                near = difflib.get_close_matches(one.name, system.states, n=1)
                 raise ConfigError(
                     f"{one.name} is no state", where="initial", expected=f"one of {', '.join(system.states) or 'none'}",
-                    got=one.name, remedy=f"did you mean {near[0]}?" if near else "remove it",
+                    got=one.name, remedy=did_you_mean(one.name, system.states, "remove it"),
                 )  # fmt: skip
 
     @property
@@ -409,10 +405,9 @@ def _entries(given: Any, kind: Any, where: str) -> tuple[Any, ...]:
         written = entry if isinstance(entry, Dict) else {"start": entry}
         for key in written:
             if key not in known:
-                near = difflib.get_close_matches(str(key), known, n=1)
                 raise ConfigError(
                     f"unknown field {key!r}", where=f"{where}, {name}", expected=f"one of {', '.join(known)}",
-                    got=shortened(key), remedy=f"did you mean {near[0]}?" if near else "remove it",
+                    got=shortened(key), remedy=did_you_mean(key, known, "remove it"),
                 )  # fmt: skip
         if "start" not in written:
             raise ConfigError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.equations import RUNGE_KUTTA, Lowered
 from sysid.equations.written import renamed
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.models.base import AbstractModel, SeveralOutputs
 from sysid.models.case_values import CaseValues
 from sysid.models.equation_form import EquationForm, StateTerms
@@ -123,12 +122,10 @@ class EquationModel(AbstractModel):
         found = self.case_values
         row = None if found is None else found.row(name)
         if found is None or row is None:
-            near = difflib.get_close_matches(name, self.cases, n=1)
             raise ConfigError(
                 f"there is no case {name}" if found else "no parameter differs by case", where="for_case",
                 expected=f"one of {', '.join(self.cases)}" if found else "a parameter with per: case", got=name,
-                remedy=f"did you mean {near[0]}?" if near else "name one of these" if found else "use the model as it "
-                "is",
+                remedy=did_you_mean(name, self.cases, "name one of these" if found else "use the model as it is"),
             )  # fmt: skip
         theta = self.theta[: self.n_of_form].copy()
         theta[found.places] = found.values[row]

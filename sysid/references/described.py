@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.references.fmu import read_fmu
 from sysid.references.fmu_variables import INTEGERS, declared_unit
 
@@ -56,7 +56,7 @@ def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
     if missing:
         raise ConfigError(
             f"the FMU has no variable {missing[0]}", where=path, expected=f"one of {', '.join(list(variables)[:40])}",
-            got=missing[0], remedy="correct the name",
+            got=missing[0], remedy=did_you_mean(missing[0], variables, "correct the name"),
         )  # fmt: skip
     notes: list[str] = []
     inputs = {one.name: _input(one, wish, notes) for one in variables.values() if one.causality == "input"}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import inspect
 import typing
 from collections.abc import Mapping as Dict
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from pydantic import BaseModel, Field, PlainSerializer, PlainValidator, WithJsonSchema, create_model
 
-from sysid.errors import ConfigError, shortened
+from sysid.errors import ConfigError, did_you_mean, shortened
 from sysid.estimation import (
     JointTraining,
     PolynomialTraining,
@@ -21,7 +20,7 @@ from sysid.estimation import (
 )
 from sysid.estimation.estimator import Estimator
 from sysid.estimation.estimators import ESTIMATORS, estimator_of
-from sysid.export.exporters import EXPORTERS
+from sysid.export.exporters import ELSEWHERE, EXPORTERS
 from sysid.field_checks import FieldError
 from sysid.models import AbstractStructure, Mapping, Start, structure_from_dict
 from sysid.models.lags import LagSpec, parse_lags
@@ -35,16 +34,16 @@ _ALSO = {"TF": "TransferFunction"}
 """Words of reports and of ``sysid orders`` that are no names of classes."""
 
 _ELSEWHERE = {
-    **dict.fromkeys(("tfest", "idtf", "procest", "idproc", "transfer function"), "TransferFunction"),
-    **dict.fromkeys(("ssest", "n4sid", "idss", "statespace", "state space"), "LinearStateSpace"),
-    **dict.fromkeys(("nlarx", "idnlarx", "narxnet", "nnarx"), "NARX"),
-    **dict.fromkeys(("nlhw", "idnlhw", "hammerstein", "wiener", "hw"), "HammersteinWiener"),
-    **dict.fromkeys(("greyest", "nlgreyest", "idgrey", "idnlgrey", "graybox", "grey box", "equations"), "GreyBox"),
-    **dict.fromkeys(("idneuralstatespace", "nlssest"), "NeuralStateSpace"),
-    **dict.fromkeys(("frols", "polynomial"), "PolynomialNARX"),
-    **dict.fromkeys(("ar", "fir", "idpoly", "impulseest"), "ARX"),
+    **dict.fromkeys(("tfest", "idtf", "procest", "idproc"), ("TransferFunction",)),
+    **dict.fromkeys(("ssest", "n4sid", "idss", "statespace"), ("LinearStateSpace",)),
+    **dict.fromkeys(("nlarx", "idnlarx", "narxnet", "nnarx"), ("NARX",)),
+    **dict.fromkeys(("nlhw", "idnlhw", "hammerstein", "wiener", "hw"), ("HammersteinWiener",)),
+    **dict.fromkeys(("greyest", "nlgreyest", "idgrey", "idnlgrey", "graybox", "equations"), ("GreyBox",)),
+    **dict.fromkeys(("idneuralstatespace", "nlssest"), ("NeuralStateSpace",)),
+    **dict.fromkeys(("frols", "polynomial"), ("PolynomialNARX",)),
+    **dict.fromkeys(("ar", "fir", "idpoly", "impulseest"), ("ARX",)),
 }
-"""What the same is called in other tools, in small letters."""
+"""What the same is called in other tools."""
 
 _EXAMPLES = {
     **dict.fromkeys(("poles", "nb", "nf"), "[2]"), **dict.fromkeys(("zeros", "nk"), "[1]"), "na": "2", "nc": "1",
@@ -52,13 +51,6 @@ _EXAMPLES = {
     "equations": '"y[k+1] = a*y + b*u"',
 }  # fmt: skip
 """What a field may look like, for one input."""
-
-
-def _meant(kind: str) -> str | None:
-    """The kind that somebody meant by a word, by its letters or from another tool."""
-    small = {name.casefold(): name for name in (*_KINDS, *STRUCTURES, *_ALSO)} | _ELSEWHERE
-    near = [kind.casefold()] if kind.casefold() in small else difflib.get_close_matches(kind.casefold(), small, n=1)
-    return small[near[0]] if near else None
 
 
 def with_short_kind(value: object) -> object:
@@ -110,18 +102,16 @@ def _structure(value: object) -> AbstractStructure:
         )
     kind = value["kind"]
     if not isinstance(kind, str) or kind not in STRUCTURES:
-        meant = _meant(shortened(kind).strip("'"))
-        remedy = f"did you mean {meant}?" if meant else "choose one of these kinds"
+        remedy = did_you_mean(kind, (*_KINDS, *_ALSO), "choose one of these kinds", also=_ELSEWHERE)
         raise FieldError("unknown kind of structure", expected=f"one of {kinds}", got=shortened(kind), remedy=remedy)
     parameters = inspect.signature(STRUCTURES[kind]).parameters
     for name in value:
         if name != "kind" and name not in parameters:
-            near = difflib.get_close_matches(str(name), parameters, n=1)
             raise FieldError(
                 f"unknown field {name!r} of the structure {kind}",
                 expected=f"one of {', '.join(parameters)}",
                 got=str(name),
-                remedy=f"did you mean {near[0]}?" if near else "remove it",
+                remedy=did_you_mean(name, parameters, "remove it"),
             )
     missing = [p.name for p in parameters.values() if p.default is p.empty and p.name not in value]
     if missing:
@@ -263,12 +253,11 @@ def _format(value: object) -> str:
     """The name of an exporter."""
     if isinstance(value, str) and value in EXPORTERS:
         return value
-    near = difflib.get_close_matches(shortened(value).strip("'"), EXPORTERS, n=1)
     raise FieldError(
         "unknown export format",
         expected=f"one of {', '.join(EXPORTERS)}",
         got=shortened(value),
-        remedy=f"did you mean {near[0]}?" if near else "choose one of these formats",
+        remedy=did_you_mean(value, EXPORTERS, "choose one of these formats", also=ELSEWHERE),
     )
 
 
@@ -361,12 +350,11 @@ def options_config(structure: AbstractStructure, value: object) -> Any:
     named: Dict[str, Any] = with_new_words(value, getattr(config, "OLD", {}))
     for name in named:
         if name not in config.model_fields:
-            near = difflib.get_close_matches(str(name), config.model_fields, n=1)
             raise FieldError(
                 f"unknown field {name!r}",
                 expected=f"one of {', '.join(config.model_fields)}",
                 got=str(name),
-                remedy=f"did you mean {near[0]}?" if near else f"remove it: {row.name} has no such option",
+                remedy=did_you_mean(name, config.model_fields, f"remove it: {row.name} has no such option"),
             )
     checked = config.model_validate(named)
     try:

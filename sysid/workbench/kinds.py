@@ -6,7 +6,6 @@ is imported before it is used.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from sysid.content import what_to_do_with_data
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.field_checks import Origins
 from sysid.plugins import entry_points
 from sysid.yaml_files import read_yaml
@@ -159,13 +158,12 @@ def kind_of(path: Path) -> str:
     name = data.get("kind", DEFAULT)
     known = kinds()
     if not isinstance(name, str) or name not in known:
-        near = difflib.get_close_matches(str(name), known, n=1)
         raise ConfigError(
             "unknown kind of pipeline",
             where=f"{path}, kind",
             expected=f"one of {', '.join(known)}",
             got=repr(name),
-            remedy=f"did you mean {near[0]}?" if near else f"leave kind out for a pipeline of {DEFAULT}",
+            remedy=did_you_mean(name, known, f"leave kind out for a pipeline of {DEFAULT}"),
         )
     return name
 

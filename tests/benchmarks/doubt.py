@@ -4,6 +4,7 @@
     python -m tests.benchmarks doubt --count=8 --first=100 --error=1
     python -m tests.benchmarks doubt --wholes=service-cascade-any,combined-brake-grown,combined-brake-held
     python -m tests.benchmarks doubt --wholes=service-cascade-any --perturb=0.3
+    python -m tests.benchmarks doubt --wholes=service-cascade-held,service-cascade-any --count=1 --cost=1
 
 * Each published whole of the service brake (``WHOLES``, or those of ``--wholes=``) alone on ``abdx-kinds-unseen``: per
   kind the share of the sequences within 1 psi rms, and how many diverge. ``--count=`` takes so many of each kind from
@@ -14,6 +15,7 @@
   are doubted there; then per unseen kind the share of samples with an error over ``--error=`` psi, how many of these
   are in doubt, and how many of the others.
 * With ``--perturb=`` psi each of them with itself, what its relay reads of the pipe moved up and down by so much.
+* With ``--cost=1`` what a doubt costs: size and run time of the files of each whole, alone and as a committee's first.
 
 Making the traces takes some 2 s of processor time each, once.
 """
@@ -29,7 +31,8 @@ from pathlib import Path
 import numpy as np
 
 from sysid.composite import DoubtFigures, committee, doubt_figures, doubt_threshold, perturbed, run_monte_carlo
-from sysid.export import read_bundle
+from sysid.export import EXPORTERS, Surrogate, read_bundle
+from sysid.export.run_times import SAMPLES, measure_run_times
 from sysid.ingest import load_dataset
 from sysid.ingest.dataset import find_dataset
 from sysid.models import Cascade
@@ -92,11 +95,30 @@ def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: f
         both = committee(members, {OUTPUT: threshold}, each=each)
         print(f"{name} first, in doubt from {threshold:.2f} psi: wrong, of these in doubt, of the others in doubt, %")
         known_kinds = {f"({kind})": traces for kind, traces in known.items()}
+        if option("cost", 0.0):
+            cost(wholes[name], both)
         of = {
             kind: doubt_figures(both, traces, OUTPUT, error=error) for kind, traces in {**known_kinds, **unseen}.items()
         }
         for kind, figures in {**of, "all unseen": together([of[kind] for kind in unseen])}.items():
             print(f"  {kind:<12} {100 * figures.wrong:5.1f} {100 * figures.flagged:5.1f} {100 * figures.false:5.1f}")
+
+
+def cost(alone: Cascade, both: Cascade) -> None:
+    """Print size and run time of the files of a whole, and how many times that is what it is with its doubts."""
+    found = []
+    for one in (alone, both):
+        surrogate = Surrogate.of(one, {"STP": (64.0, 90.0)}, outputs=[OUTPUT])
+        with tempfile.TemporaryDirectory() as folder:
+            files = [file for name in ("c", "onnx") for file in EXPORTERS[name].write(surrogate, Path(folder))]
+            sizes = {file.name: (Path(folder) / file.name).stat().st_size for file in files}
+            times = {run.name: run.seconds for run in measure_run_times(surrogate, files, Path(folder), cars=1)}
+        found.append((sizes, times))
+    (size, seconds), (larger, longer) = found
+    for name in seconds:
+        run = f"{1e6 * longer[name] / SAMPLES:.2f} µs a sample ({longer[name] / seconds[name]:.2f} x)"
+        told = f", {larger[name] / 1e3:.0f} kB ({larger[name] / size[name]:.2f} x)" if name in size else ""
+        print(f"  {name}: {run}{told}")
 
 
 def together(parts: list[DoubtFigures]) -> DoubtFigures:

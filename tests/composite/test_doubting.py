@@ -30,7 +30,7 @@ def test_what_is_moved_up_and_down_doubts_each_for_itself() -> None:
     by_hand = committee(members, {"y": threshold}, each=True)
     assert found.whole.to_dict() == by_hand.to_dict()
     assert found.figures == doubt_figures(by_hand, TRUTH, "y", error=1.0)
-    assert f"from a difference of {threshold:.3g} on" in found.sentence
+    assert f"y in doubt from a difference of {threshold:.3g} " in found.sentence
     u = TRUTH[2]["u"][:, None]
     np.testing.assert_array_equal(found.whole.simulate(u)["y"], valve(0.98).simulate(u)["y"])
 

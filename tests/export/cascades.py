@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -172,8 +173,8 @@ def build_equations() -> Cascade:
     )  # fmt: skip
 
 
-def build_committee() -> Cascade:
-    """Three pairs of models of the same outputs: a channel limits an output in each, and one judges the first."""
+def build_committee(count: int = 3, threshold: float = 1.0) -> Cascade:
+    """Pairs of models of the same outputs: a channel limits an output in each, and one judges the first."""
     structure = NARX(input_delays="0:1", output_delays=1, neurons=4)
     wholes = [
         Cascade(
@@ -184,9 +185,9 @@ def build_committee() -> Cascade:
             rest={"BP": "STP"},
             limits={"BC": Limit(low=37.6, high="BP")},
         )
-        for seed in (1, 2, 3)
+        for seed in range(1, count + 1)
     ]
-    return committee(wholes, {"BC": 1.0})
+    return committee(wholes, {"BC": threshold})
 
 
 CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
@@ -197,5 +198,6 @@ CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
     "one output of a circle": (build_circle, ("ER",)),
     "equations in a circle": (build_equations, None),
     "a committee": (build_committee, ("BC",)),
+    "a committee of four": (partial(build_committee, 4, 0.5), ("BC",)),
 }
 """Models wired, and which outputs leave them."""

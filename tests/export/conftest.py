@@ -171,7 +171,11 @@ INTERPRETED = ("matlab", "st")
 MET = dict.fromkeys(WRAPPED, FEW_MODELS) | dict.fromkeys(INTERPRETED, FEW_MODELS[-1:])
 PAIRS = [(m, r) for m in MODELS for r, row in ROWS.items() if m in MET.get(row.format, MODELS)]
 FEW_CASCADES = ("every kind, limits and levels", "one output of a circle")
-WIRED_MET = dict.fromkeys(WRAPPED, FEW_CASCADES) | dict.fromkeys(INTERPRETED, FEW_CASCADES[:1])
+WIRED_MET = (
+    dict.fromkeys(WRAPPED, FEW_CASCADES)
+    | {"fmi2": (*FEW_CASCADES, "a committee of four")}
+    | dict.fromkeys(INTERPRETED, FEW_CASCADES[:1])
+)
 WIRED = [(c, r) for c in CASCADES for r, row in ROWS.items() if c in WIRED_MET.get(row.format, CASCADES)]
 
 

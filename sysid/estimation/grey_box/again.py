@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.grey_box.finishing import noise_of
 from sysid.estimation.grey_box.layout import EquationLayout
@@ -60,10 +59,9 @@ def profile_again(fit: FitResult, traces: Sequence[Trace], start: Start, name: s
         raise ConfigError("not a probability", where="level", expected="between 0 and 1", got=level)
     named = {one.name: one for one in named_of(model.grey, model.cases, model.lowered.n_weights)}
     if name not in named:
-        near = difflib.get_close_matches(name, named, n=1)
         raise ConfigError(
             f"no parameter {name} was estimated", where="profile", expected=f"one of {', '.join(named)}", got=name,
-            remedy=f"did you mean {near[0]}?" if near else "name one of these",
+            remedy=did_you_mean(name, named, "name one of these"),
         )  # fmt: skip
     provider, solution = _again(model, fit, traces, start)
     return Profiler(provider=provider, solution=solution, level=level).of(named[name])

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import ReaderError
+from sysid.errors import ReaderError, did_you_mean
 from sysid.extras import need
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_zip, too_large
@@ -42,7 +42,7 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
             where=path,
             expected=f"one of {', '.join(names)}",
             got=options.sheet,
-            remedy="correct sheet",
+            remedy=did_you_mean(options.sheet, names, "correct sheet"),
         )
     tables: dict[str, RawTable] = {}
     problem: ReaderError | None = None

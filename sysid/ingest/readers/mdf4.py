@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import ReaderError
+from sysid.errors import ReaderError, did_you_mean
 from sysid.extras import need
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.joining import Signal, as_leaf, joined_signals, not_over_time
@@ -110,7 +110,7 @@ def _choose(groups: dict[str, list[Signal]], wanted: str | None, path: Path) -> 
             where=path,
             expected=f"one of {', '.join(groups)}",
             got=wanted,
-            remedy="correct group, or leave it out",
+            remedy=did_you_mean(wanted, groups, "correct group, or leave it out"),
         )
     signals = [signal for group in groups.values() for signal in group]
     if not signals:

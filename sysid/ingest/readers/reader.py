@@ -11,7 +11,7 @@ from pathlib import Path
 from threading import Lock
 
 from sysid.content import nearest_file
-from sysid.errors import ConfigError, ReaderError
+from sysid.errors import ConfigError, ReaderError, did_you_mean
 from sysid.ingest.meaning import with_meaning
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.table import RawTable
@@ -70,7 +70,7 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
             where=path,
             expected=f"one of {', '.join(reader.name for reader in readers)}",
             got=name,
-            remedy="correct reader",
+            remedy=did_you_mean(name, [reader.name for reader in readers], "correct reader"),
         )
     by_suffix = next((reader for reader in readers if path.suffix.lower() in reader.suffixes), None)
     head = _head(path)

@@ -14,7 +14,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from sysid.errors import ReaderError
+from sysid.errors import ReaderError, did_you_mean
 from sysid.ingest.headers import parse_header
 from sysid.ingest.options import FileOptions
 from sysid.ingest.rates import said_step
@@ -112,7 +112,7 @@ def _group(tree: Any, name: str, walk: _Walk, step: float | None) -> tuple[Any, 
                 where=walk.where,
                 expected=f"one of {', '.join(names) or 'none: all stands at the top'}",
                 got=name,
-                remedy="correct group, or leave it out",
+                remedy=did_you_mean(name, names, "correct group, or leave it out"),
             )
         rest, here = rest[len(match[0]) :].removeprefix(walk.separator), match[1]
         beside = walk.step_beside(here, beside)

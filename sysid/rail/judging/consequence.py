@@ -20,7 +20,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.variant import USUAL_VARIANT, VARIANTS
 from sysid.code_digest import code_digest
 from sysid.content import content_folders
-from sysid.errors import ConfigError, SysidError
+from sysid.errors import ConfigError, SysidError, did_you_mean
 from sysid.models import AbstractModel, Cascade, Interpolation
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.brake import ReferenceBrake
@@ -207,7 +207,7 @@ class _Scene:
                 where="options, scenarios",
                 expected=f"one of {', '.join(self._scenarios)}",
                 got=name,
-                remedy="correct the name, or leave scenarios out for all of them",
+                remedy=did_you_mean(name, self._scenarios, "correct the name, or leave scenarios out for all of them"),
             )
         return self._scenarios[name]
 

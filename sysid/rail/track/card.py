@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.atomic import replacing
-from sysid.errors import ConfigError, ReaderError
+from sysid.errors import ConfigError, ReaderError, did_you_mean
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.track import STRAIGHT, TrackProfile
 
@@ -102,6 +102,7 @@ class TrackCard:
                 where="track card",
                 expected=f"one of {', '.join(self.sections)}",
                 got=code,
+                remedy=did_you_mean(code, self.sections, "name one of these"),
             )
         return found
 

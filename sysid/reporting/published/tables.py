@@ -15,7 +15,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from sysid.content import content_folders
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.field_checks import check
 from sysid.yaml_files import read_yaml
 
@@ -219,7 +219,7 @@ def read_published(name: str, *, workspace: Path | None = None) -> PublishedTabl
         where="report: published",
         expected=f"one of {', '.join(names)}" if names else "a file reports/published/<name>.yaml",
         got=name,
-        remedy="correct the name in the pipeline, or leave the line out",
+        remedy=did_you_mean(name, names, "correct the name in the pipeline, or leave the line out"),
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.composite.active_learning import Assessment, sequence_errors
-from sysid.composite.doubting import doubting
+from sysid.composite.doubting import Doubting, doubting
 from sysid.composite.keeper import Decision
 from sysid.composite.limits_held import holding
 from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
@@ -102,7 +102,8 @@ class Evaluating:
         whole = self._chosen()
         stressed, worst, sequences = self._stressed(whole)
         line = self._line(whole, data)
-        exported = self._export(self._doubting(whole), cases, evaluate_cascade(whole, cases), data)
+        doubt = self._doubting(whole)
+        exported = self._export(whole, cases, evaluate_cascade(whole, cases), data, doubt)
         candidates = self.trained.candidates
         members = []
         if candidates is not None:
@@ -112,6 +113,7 @@ class Evaluating:
             worst=worst, interpolation=line, unseen=self._unseen(sequences), exported=exported,
             holding=holding(whole, config.outputs, tuple(cases), sequences), members=members,
             ablation=ablations_of(scores, members, cases, config.ablation),
+            doubt="" if doubt is None else doubt.sentence,
         )  # fmt: skip
 
     def _scored(self, cases: TraceSet) -> dict[str, Any]:
@@ -214,21 +216,22 @@ class Evaluating:
             outcome=lambda scores: f"all positions of the longest case in {max(scores.timing.values()):.3g} s",
         )
 
-    def _doubting(self, whole: Cascade) -> Cascade:
-        """What is exported: the whole, with its doubts if it is to have some."""
+    def _doubting(self, whole: Cascade) -> Doubting | None:
+        """The whole with its doubts, if it is to have some."""
         asked = self.context.config.doubt
         if asked is None:
-            return whole
+            return None
         sequences = tuple(self.context.load(asked.data))
         beside = [read_whole(self.context.beside / one)[0] for one in asked.beside]
-        found = self.context.compute(
+        return self.context.compute(
             DOUBT,
             lambda _: doubting(whole, asked.asked(), sequences, beside=beside),
             outcome=lambda one: one.sentence,
         )
-        return found.whole
 
-    def _export(self, whole: Cascade, cases: TraceSet, evaluation: Any, data: AssemblyData) -> Bundle | None:
+    def _export(
+        self, whole: Cascade, cases: TraceSet, evaluation: Any, data: AssemblyData, doubt: Doubting | None
+    ) -> Bundle | None:
         from sysid.export import export_bundle
 
         asked = self.context.config.export
@@ -243,11 +246,13 @@ class Evaluating:
                 "chosen": [self._data(name) for name in data.chosen],
                 "notes": list(self.notes),
             },
+            **({} if doubt is None else {"doubt": doubt.sentence}),
         }
+        exported = whole if doubt is None else doubt.whole
 
         def make(_: Work) -> Bundle:
             return export_bundle(
-                whole, cases, self.context.store.path / "bundle", outputs=self.context.config.outputs,
+                exported, cases, self.context.store.path / "bundle", outputs=self.context.config.outputs,
                 formats=formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
             )  # fmt: skip
 

@@ -9,12 +9,11 @@ that of ``warm_start``, are seen from the folder of the file that is run.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.field_checks import Loc, Origins
 from sysid.models import Mapping
 from sysid.workbench.assembly.fixed_words import fixed_schema, one_by_one
@@ -113,13 +112,13 @@ def _base(given: object, path: Path, own: Origins) -> Path:
     """The file that is extended."""
     if isinstance(given, str) and (file := path.parent / given).is_file():
         return file
-    near = difflib.get_close_matches(str(given), [one.name for one in path.parent.glob("*.yaml") if one != path], n=1)
+    there = [one.name for one in path.parent.glob("*.yaml") if one != path]
     raise ConfigError(
         "the pipeline to extend is not there",
         where=own.place(("extends",)),
         expected=f"a YAML file, seen from {path.parent}",
         got=given,
-        remedy=f"did you mean {near[0]}?" if near else "correct the path",
+        remedy=did_you_mean(given, there, "correct the path"),
     )
 
 

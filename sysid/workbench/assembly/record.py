@@ -53,6 +53,7 @@ class Outcome:
         unseen: By round of active learning, how it does on the random sequences.
         interpolation: How positions do between those that are modelled, if they were asked for.
         exported: The bundle, if one was asked for.
+        doubt: How far the doubts of what is exported can be trusted, in words.
         holding: Which limits hold the outputs in free run.
         members: The members' candidates by themselves, where there are several or they were fitted one step ahead too.
         ablation: What the stages say of each step of modelling by parts.
@@ -68,6 +69,7 @@ class Outcome:
     unseen: Mapping[str, Assessment] = field(default_factory=dict)
     interpolation: InterpolationScores | None = None
     exported: Bundle | None = None
+    doubt: str = ""
     holding: Sequence[Holding] = ()
     members: Sequence[MemberScores] = ()
     ablation: Sequence[Ablation] = ()
@@ -125,7 +127,7 @@ def assembly_results(
         "limit_check": asdict(trained.limits) if trained.limits.limits else None,
         "interpolation": None if found.interpolation is None else _line(found.interpolation),
         "exports": [] if found.exported is None else _exports(found.exported),
-        "notes": list(notes),
+        "notes": [*notes, *([f"What is exported raises the flag IN_DOUBT: {found.doubt}."] if found.doubt else [])],
     }
     return parse_record(AssemblyResults, strict(document), where=context.store.path / RESULTS_FILE)
 

@@ -136,6 +136,10 @@ def export(
     ] = None,
     run_folder: Annotated[Path | None, typer.Option(help="The run folder; runs/<pipeline> by default.")] = None,
     pack: Annotated[bool, typer.Option("--zip", help="Pack the bundle into one file beside it.")] = False,
+    doubt: Annotated[
+        Path | None,
+        typer.Option(help="YAML with what the whole of a bundle is to doubt: the section doubt of a pipeline."),
+    ] = None,
 ) -> None:
     """Export a fit, a member or a whole of a finished run as files that run elsewhere, checked against the model.
 
@@ -143,7 +147,7 @@ def export(
     """
     from sysid.workbench.commands.export import export_command
 
-    export_command(pipeline, fit=fit, out=out, run_folder=run_folder, formats=formats, pack=pack)
+    export_command(pipeline, fit=fit, out=out, run_folder=run_folder, formats=formats, pack=pack, doubt=doubt)
 
 
 @commands.command(epilog="Example: sysid promote bp-ar-to-bc")

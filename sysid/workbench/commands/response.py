@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from sysid.api.responses import Bode, StepResponse, bode, poles, step
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation import FitResult
 from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
@@ -62,13 +61,12 @@ def _fits(folder: Path, name: str | None) -> list[FitResult]:
     wanted = name or (best.system or best.name if best is not None else "")
     known = dict.fromkeys(one for fit in results.fits for one in (fit.system, fit.name) if one)
     if wanted not in known:
-        near = difflib.get_close_matches(wanted, list(known), n=1)
         raise ConfigError(
             f"there is no fit named {wanted}",
             where=folder,
             expected=f"one of {'; '.join(known)}",
             got=wanted,
-            remedy=f"did you mean {near[0]}?" if near else "name one of them with --fit",
+            remedy=did_you_mean(wanted, known, "name one of them with --fit"),
         )
     slugs = dict.fromkeys(one.model_slug or one.slug for one in results.fits if wanted in {one.system, one.name})
     return [read_fit(RunFolder(path=folder).fit(place)) for place in slugs]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,7 +17,7 @@ from pydantic import (
 )
 
 from sysid.content import content_folders, nearest_file, nearest_name, what_to_do_with_data
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation.estimator import Options
 from sysid.estimation.estimators import check as check_request
 from sysid.estimation.estimators import estimator_of
@@ -178,12 +177,11 @@ class PipelineConfig(BaseModel):
                     remedy="rename one of them",
                 )
             if fit.initial is not None and fit.initial not in earlier:
-                near = difflib.get_close_matches(fit.initial, earlier, n=1)
                 raise FieldError(
                     f"the fit {fit.name!r} starts from {fit.initial!r}, which is not an earlier fit",
                     expected=f"one of {', '.join(earlier)}" if earlier else "no initial fit for the first one",
                     got=fit.initial,
-                    remedy=f"did you mean {near[0]}?" if near else "name a fit that stands above it",
+                    remedy=did_you_mean(fit.initial, earlier, "name a fit that stands above it"),
                 )
             earlier[fit.name] = fit
             slugs.add(fit.slug)
@@ -193,12 +191,11 @@ class PipelineConfig(BaseModel):
     def _check_names(self) -> PipelineConfig:
         names = [fit.name for fit in self.fits]
         if self.export is not None and self.export.fit not in ["best", *names]:
-            near = difflib.get_close_matches(self.export.fit, names, n=1)
             raise FieldError(
                 f"export names the fit {self.export.fit!r}, which there is not",
                 expected=f"best, or one of {', '.join(names)}",
                 got=self.export.fit,
-                remedy=f"did you mean {near[0]}?" if near else "correct the name",
+                remedy=did_you_mean(self.export.fit, names, "correct the name"),
             )
         outputs = self.mapping.outputs
         strangers = sorted(set(self.rest) - set(outputs))

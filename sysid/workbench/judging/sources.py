@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import sysid
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.export.bundle import ranges_of
 from sysid.export.reading import read_bundle
 from sysid.models import AbstractModel, Cascade, Interpolation
@@ -112,13 +111,12 @@ def _of_run(part: PartConfig, workspace: Path) -> Found:
     if wanted == "best" and results.best is not None:
         wanted = results.best.name
     if wanted not in names:
-        near = difflib.get_close_matches(wanted, names, n=1)
         raise ConfigError(
             f"the run {given} has no fit {wanted!r}",
             where=folder,
             expected=f"best, or one of {', '.join(names)}",
             got=part.fit,
-            remedy=f"did you mean {near[0]}?" if near else "correct the name, or let the run finish",
+            remedy=did_you_mean(wanted, names, "correct the name, or let the run finish"),
         )
     fit = names[wanted]
     store = RunFolder(path=folder.resolve())

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation import Training
 from sysid.field_checks import FieldError
 from sysid.models import Start, StartKind
@@ -96,7 +96,7 @@ def _figure(name: str) -> str:
             "unknown figure of merit",
             expected=f"one of {', '.join(FIGURES)}",
             got=repr(name),
-            remedy="choose one of these",
+            remedy=did_you_mean(name, FIGURES, "choose one of these"),
         )
     return name
 
