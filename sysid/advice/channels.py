@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, stacked
 from sysid.estimation.held_output import held_for, straight_for
+from sysid.estimation.record_drift import trend_of
 from sysid.estimation.wrapped import jumping, period_of
+from sysid.traces import coarse_step, converter_step
 
 COARSE = 0.1
 """Of a channel's standard deviation: a step of its converter that is larger is coarse."""
@@ -20,8 +22,6 @@ SPIKE_FACTOR, MOST_SPIKES = 4.0, 0.005
 AT_END, LONG_STAY, VERY_LONG_STAY, STANDING = 0.002, 3, 10, 0.1
 """Part of a channel's span that counts as its end, samples in a row there that are a stay (and where the channel stands
 still elsewhere too), and part of its usual roughness that it has at a limit."""
-TRENDS_FROM, TREND_SHARE = 60, 0.25
-"""Samples from which a trend is looked for, and part of the output's standard deviation from which it is told."""
 
 
 def check_channels(record: Record) -> Iterator[Finding]:
@@ -94,25 +94,22 @@ def _channel(record: Record, name: str) -> Iterator[Finding]:
         return
     # An input whose levels are held is a command: where it stands, and in which steps, was somebody's choice.
     if name == record.mapping.output or _roughness(parts) > 0.0:
-        yield from _resolution(name, x, levels)
-    if name == record.mapping.output:
+        yield from _resolution(name, parts, levels)
+    # Of coarse steps the outermost is an end that is stayed at, and none that anything runs into.
+    if name == record.mapping.output and not any(map(coarse_step, parts)):
         yield from _ends(name, parts, x)
     yield from _spikes(name, parts, x, levels)
 
 
-def _resolution(name: str, x: NDArray[np.float64], levels: NDArray[np.float64]) -> Iterator[Finding]:
+def _resolution(name: str, parts: Sequence[NDArray[np.float64]], levels: NDArray[np.float64]) -> Iterator[Finding]:
     """The step of a converter, where all values are multiples of one."""
-    if len(x) < 20 or len(levels) < 2 or len(levels) > 0.7 * len(x):
-        return
-    step = float(np.diff(levels).min())
-    count = np.diff(levels) / step
-    even = float(np.mean(np.abs(count - np.round(count)) < 0.05))
-    size = float(x.std())
-    if even > 0.95 and size > 0.0 and step > 0.002 * size:
+    x = stacked(parts)
+    step, size = converter_step(x), float(x.std())
+    if step is not None and size > 0.0 and step > 0.002 * size:
         yield Finding(
             topic=Topic.CHANNELS,
             code="channel.resolution",
-            verdict=Verdict.LOOK if step > COARSE * size else Verdict.NOTE,
+            verdict=Verdict.LOOK if step > COARSE * size or any(map(coarse_step, parts)) else Verdict.NOTE,
             subject=(name,),
             figures={"step": step, "share": step / size, "levels": len(levels)},
         )
@@ -200,46 +197,13 @@ def _trends(record: Record) -> Iterator[Finding]:
 
 
 def _trend(record: Record, part: NDArray[np.float64], place: tuple[str, int, int], size: float) -> Iterator[Finding]:
-    trace, first, factor = place
-    n = len(part)
-    if n < TRENDS_FROM:
+    (trace, first, factor), found = place, trend_of(part, size)
+    if found is None:
         return
-    t = np.linspace(-0.5, 0.5, n)
-    centred = part - part.mean()
-    slope = float(t @ centred / (t @ t))
-    line = float(np.sum((centred - slope * t) ** 2))
-    at, jump, rest = _jump(centred)
-    step = np.where(np.arange(n) < at, 0.0, jump)
-    spread = np.sqrt(line / n / _effective(centred - slope * t))
-    # Of the difference of two means, over parts that may be of unequal length.
-    parts = n / np.sqrt(at * (n - at))
-    jump_spread = parts * np.sqrt(rest / n / _effective(centred - step + step.mean()))
-    if abs(jump) > max(TREND_SHARE * size, 6.0 * jump_spread) and rest < 0.7 * line:
-        seconds = (first + at * factor) * record.sample_time
-        figures = {"size": jump, "share": abs(jump) / size, "seconds": seconds}
-        code = "output.jump"
-    elif abs(slope) > max(TREND_SHARE * size, 8.0 * spread * np.sqrt(12.0)):
-        figures, code = {"size": slope, "share": abs(slope) / size}, "output.drift"
-    else:
-        return
+    figures = {"size": found.size, "share": abs(found.size) / size}
+    if found.at is not None:
+        figures["seconds"] = (first + found.at * factor) * record.sample_time
     yield Finding(
-        topic=Topic.CHANNELS, code=code, verdict=Verdict.LOOK, subject=(record.mapping.output, trace), figures=figures
-    )
-
-
-def _effective(x: NDArray[np.float64]) -> float:
-    """How many independent samples a coloured one is worth, by its first correlation."""
-    r = float(x[1:] @ x[:-1] / max(float(x @ x), 1e-300))
-    r = min(max(r, 0.0), 0.999)
-    return max(len(x) * (1.0 - r) / (1.0 + r), 2.0)
-
-
-def _jump(x: NDArray[np.float64]) -> tuple[int, float, float]:
-    """Where a change of level explains most, how large it is, and what it leaves."""
-    n, margin = len(x), max(len(x) // 20, 5)
-    k = np.arange(margin, n - margin)
-    before = np.cumsum(x)[k - 1]
-    gain = before**2 * n / (k * (n - k))
-    best = int(k[np.argmax(gain)])
-    low, high = float(x[:best].mean()), float(x[best:].mean())
-    return best, high - low, float(x @ x - gain.max())
+        topic=Topic.CHANNELS, code="output.drift" if found.at is None else "output.jump", verdict=Verdict.LOOK,
+        subject=(record.mapping.output, trace), figures=figures,
+    )  # fmt: skip

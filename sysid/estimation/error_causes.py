@@ -50,13 +50,14 @@ OWN_PAST = 5
 TINY = float(np.finfo(np.float64).tiny)
 
 
-def causes(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> list[str]:
+def causes(model: AbstractModel, run: FreeRun, fed: Collection[int] = (), but: Collection[int] = ()) -> list[str]:
     """The causes of an error that is more than it need be.
 
     Args:
         model: The fitted model.
         run: Its free run over a record that was fitted.
         fed: Places of outputs whose error the inputs say nothing of: they are fed back, or its levels are its own.
+        but: Places of outputs whose cause is told already.
 
     Returns:
         Sentences; none where the error is small, or what is left of it looks like noise.
@@ -64,7 +65,7 @@ def causes(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> lis
     told = []
     for i, name in enumerate(model.mapping.outputs):
         y, s = run.output[:, i], run.simulated[:, i]
-        if run.usable.sum() < LEAST_SAMPLES or not np.isfinite(s).all() or not np.ptp(y[run.usable]) > 0.0:
+        if i in but or run.usable.sum() < LEAST_SAMPLES or not np.isfinite(s).all() or not np.ptp(y[run.usable]) > 0.0:
             continue
         spread = float(np.std(y[run.usable]))
         if not float(np.std((y - s)[run.usable])) > WORTH * spread:
@@ -263,8 +264,9 @@ def _drift(groups: dict[str, Array], y: Array, usable: Mask, name: str) -> str:
     way = "rises" if slope > 0 else "falls"
     return (
         f"{name} drifts: besides what its inputs do it {way} by {abs(slope):.2g} of its "
-        "standard deviations from beginning to end, which the model cannot say. Take the drift out of the records, or "
-        "give its cause as an input; where it integrates an input, take a structure that does."
+        "standard deviations from beginning to end, which the model cannot say. Take the drift out of the records "
+        f"(repairs: {{drift: {{{name}: line}}}}), or give its cause as an input; where it integrates an input, take a "
+        "structure that does."
     )
 
 

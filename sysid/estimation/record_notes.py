@@ -16,7 +16,9 @@ from sysid.estimation.held_output import held_for, straight_for
 from sysid.estimation.informative import informative, own_part, still
 from sysid.estimation.nonparametric.excitation_order import MOST, excitation_order
 from sysid.estimation.nonparametric.segments import segments_of
+from sysid.estimation.record_drift import drifts_told
 from sysid.estimation.record_levels import levels_told
+from sysid.estimation.record_resolution import resolution_told
 from sysid.estimation.wrapped import jumping, period_of
 from sysid.estimation.wrapped import told as wrapped
 from sysid.models import AbstractModel, Mapping, Start
@@ -239,11 +241,16 @@ def contradicted(
     longest = max(runs, key=lambda run: len(run.output))
     fed = feedback_told(model, traces, longest, training)
     levels = levels_told(model, traces[:MOST_TRACES], runs)
-    lags, ratios = left_out(model, longest, fed), _beside_constants(runs)
+    drifts = drifts_told(model, traces[:MOST_TRACES], runs)
+    steps = resolution_told(model, runs)
+    # Beside a drift, and steps of a converter, what moves together says little of lags.
+    known = {**steps, **drifts}
+    lags = () if known else left_out(model, longest, fed)
+    ratios = _beside_constants(runs)
     # A lag that is left out is a cause, and the nearer one; not of a run that has next to nothing of the output.
     worth = not lags or min(ratios.values(), default=0.0) > POOR
-    rest = (*lags, *(causes(model, longest, (*fed, *levels)) if worth else ()))
-    return (*_told_beside_constants(model, ratios), *fed.values(), *levels.values(), *rest)
+    rest = (*lags, *(causes(model, longest, (*fed, *levels), but=known) if worth else ()))
+    return (*_told_beside_constants(model, ratios), *fed.values(), *levels.values(), *known.values(), *rest)
 
 
 def _beside_constants(runs: Sequence[FreeRun]) -> dict[int, float]:

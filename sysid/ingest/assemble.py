@@ -91,7 +91,7 @@ def assemble(
             remedy="record longer, widen start and stop, or lower grid: {fewest_samples: ...}",
         )
     record = repair.missing_values(record, repairs)
-    record = repair.repeated_values(record, repairs)
+    record = repair.drifts(repair.repeated_values(record, repairs), repairs)
     record = repair.constants(record, repairs)
     gridded, record = _onto_grid(record, wanted, grid, repairs)
     values, usable, notes = _close_gaps(gridded, repairs, source=source, sample_time=wanted.sample_time)

@@ -30,6 +30,7 @@ class ColumnFinding:
         problem: Why it cannot be a channel, or the empty text.
         aside: Why it is not proposed as one, or the empty text.
         far: Values far from all others, which may mark missing ones, in words; or the empty text.
+        step: The step of its converter where that is coarse, in its unit; 0 where it is not.
     """
 
     name: str
@@ -45,6 +46,7 @@ class ColumnFinding:
     aside: str = ""
     said: str = ""
     far: str = ""
+    step: float = 0.0
 
     @property
     def constant(self) -> bool:

@@ -24,6 +24,7 @@ from sysid.ingest.restarts import finer_than_clock, records_by_clock
 from sysid.ingest.second_clocks import counts_rows, is_counter, without_second_clocks
 from sysid.ingest.table import RawColumn, RawTable, is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
+from sysid.traces import coarse_step
 from sysid.units import Reference, atmosphere_in, is_pressure
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
@@ -320,6 +321,7 @@ def _column(column: RawColumn) -> ColumnFinding:
         aside=column.aside or _nearly_empty(column.values),
         said="" if in_file is not None or column.unit is None else column.unit,
         far=_far(finite),
+        step=coarse_step(finite) or 0.0,
     )
 
 

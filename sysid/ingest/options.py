@@ -274,6 +274,7 @@ class RepairOptions(Options):
             samples as not usable; one for all, or by channel.
         repeats: ``mask`` the samples of a channel that repeat the value before, by channel: it is measured more slowly
             than it is recorded.
+        drift: ``line`` takes the straight line through the samples of a channel off them, by channel; their mean stays.
         jitter: ``resample`` uneven time stamps by ``grid.method``.
         constant: ``accept`` channels that never change.
     """
@@ -285,5 +286,6 @@ class RepairOptions(Options):
     gaps: Literal["linear", "hold", "mask"] | None = None
     nan: NanRepair | dict[str, NanRepair] | None = None
     repeats: dict[str, Literal["mask"]] | None = None
+    drift: dict[str, Literal["line"]] | None = None
     jitter: Literal["resample"] | None = None
     constant: Literal["accept"] | None = None

@@ -243,8 +243,34 @@ def repeated_values(record: Record, repairs: RepairOptions) -> Record:
     return replace(record, marked=marked)
 
 
+def drifts(record: Record, repairs: RepairOptions) -> Record:
+    """Channels that drift, as the zero of a sensor does.
+
+    Args:
+        record: Samples with finite values.
+        repairs: ``drift: {level: line}`` takes the straight line through the samples that count off that channel; its
+            mean stays.
+
+    Returns:
+        The samples.
+
+    Raises:
+        ConfigError: If a repair is asked for a channel that is not there.
+    """
+    _check_names(record, repairs)
+    values = record.values.copy()
+    for name in repairs.drift or {}:
+        column, seen = values[:, record.names.index(name)], ~record.marked
+        if np.ptp(record.stamps[seen]) if seen.any() else False:
+            away = record.stamps - record.stamps[seen].mean()
+            slope = float(away[seen] @ (column[seen] - column[seen].mean()) / (away[seen] @ away[seen]))
+            column -= slope * away
+            record = record.noted(f"{name}: a straight line of {slope:.6g} a second taken off, its mean left")
+    return replace(record, values=values) if repairs.drift else record
+
+
 def _check_names(record: Record, repairs: RepairOptions) -> None:
-    for kind in ("nan", "repeats"):
+    for kind in ("nan", "repeats", "drift"):
         asked = getattr(repairs, kind)
         strangers = sorted(set(asked) - set(record.names)) if isinstance(asked, dict) else []
         if strangers:

@@ -54,7 +54,8 @@ SAID: Final[dict[str, Words]] = {
     ),
     "channel.resolution": Words(
         "{who} moves in steps of {step:.3g} {unit}, {share:.2%} of its standard deviation.",
-        "Where the steps are coarse: use a finer range of the converter; noise below a step cannot be modelled.",
+        "Where the steps are coarse: use a finer range of the converter, or sample more slowly; fit the free run (OE, a"
+        " transfer function, loop: closed): one step ahead a model sees the steps.",
     ),
     "channel.clipped_above": Words(
         "{who} runs into {value:.4g} {unit} and stays there, for {share:.1%} of the samples: a limit above.",
@@ -86,7 +87,7 @@ SAID: Final[dict[str, Words]] = {
     ),
     "output.drift": Words(
         "{who}: the output drifts by {size:.3g} {unit} over the stretch, and no input does it.",
-        "Remove the trend, add its cause as an input, or model the noise with an integrator.",
+        "Take it off (repairs: {{drift: {{{channel}: line}}}}), or add its cause as an input; or the plant integrates.",
     ),
     "excitation.low": Words(
         "{who} is exciting of order {order:.0f} only: too few frequencies, or too slow.",
@@ -300,6 +301,7 @@ def said(finding: Told, units: Mapping[str, str]) -> tuple[str, str]:
     unit = next((units[name] for name in channels if units.get(name, "1") != "1"), "")
     others: dict[str, object] = {
         "who": ", ".join(visible(name) for name in finding.subject),
+        "channel": next(map(visible, finding.subject), ""),
         "unit": unit,
         "why": finding.reason,
         "code": finding.code,

@@ -18,6 +18,7 @@ GAP = EVEN[:5] + EVEN[8:]
 DUPLICATE = [*EVEN[:5], EVEN[4], *EVEN[5:]]
 BACKWARD = [*EVEN[:5], EVEN[6], EVEN[5], *EVEN[7:]]
 JITTER = [t + (0.02 if i % 3 == 1 else 0.0) for i, t in enumerate(EVEN)]
+MIDDLE = (N - 1) / 2
 HOLE = [*map(float, range(5)), NAN, NAN, *map(float, range(7, N))]
 
 REFUSED: dict[str, Refused] = {
@@ -166,6 +167,12 @@ REPAIRED: dict[str, Done] = {
         [x - x % 3 for x in range(N)],
         [x for x in range(N) if x % 3],
         f"u: {sum(x % 3 > 0 for x in range(N))} values that repeat the one before masked",
+    ),
+    "drift: line": (
+        {"values": [0.5 * x + (x - MIDDLE) ** 2 for x in range(N)], "repairs": {"drift": {"u": "line"}}},
+        [0.5 * MIDDLE + (x - MIDDLE) ** 2 for x in range(N)],
+        [],
+        "u: a straight line of 5 a second taken off, its mean left",
     ),
     "constant: accept": (
         {"values": [3.5] * N, "repairs": {"constant": "accept"}},

@@ -12,6 +12,7 @@ from rich.table import Table
 from sysid.content import nearest_file
 from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
+from sysid.ingest.findings import ColumnFinding
 from sysid.ingest.in_units import stamps_in_seconds
 from sysid.reporting.figures.record_picture import record_picture
 from sysid.reporting.figures.svg import as_file
@@ -121,7 +122,8 @@ def _show_file(found: FileFinding, propose: Path | None, split: Sequence[float] 
         reference = "" if column.reference is Reference.NONE else f" {column.reference.value}"
         guess = "?" if column.unit_guessed or column.reference_guessed else ""
         said = f"the file says {column.said}, which is no unit that is known" if column.said else ""
-        remark = column.problem or column.aside or said or column.far or ("never changes" if column.constant else "")
+        still = "never changes" if column.constant else ""
+        remark = column.problem or column.aside or said or column.far or still or _steps(column)
         unit = f"{column.unit}{reference}{guess}"
         span = (f"{column.minimum:.6g}", f"{column.maximum:.6g}")
         table.add_row(column.name, unit, *span, str(column.missing), remark)
@@ -139,6 +141,10 @@ def _show_file(found: FileFinding, propose: Path | None, split: Sequence[float] 
         target.print(f"Next: {again}", markup=False, soft_wrap=True)
         return
     target.print(f"Proposed data set: {propose}; check it, then load it with: sysid ingest {propose}", soft_wrap=True)
+
+
+def _steps(column: ColumnFinding) -> str:
+    return f"comes in steps of {column.step:.3g}: coarse, see sysid advise" if column.step else ""
 
 
 def _picture(found: FileFinding) -> str:
