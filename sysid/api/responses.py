@@ -11,6 +11,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.export.own_figures import side_by_side
 from sysid.models import AbstractModel, Cascade
+from sysid.models.typed_fields import plain_values
 from sysid.reporting import responses as room
 from sysid.reporting.responses import Known, bode_of, check_linear, poles_of, step_of
 
@@ -83,6 +84,7 @@ def step(fit: Any, *, seconds: float | None = None) -> StepResponse:
     if seconds is None:
         return StepResponse(**_fields(step_of(known)))
     T = known[0][0].sample_time
+    seconds = plain_values(seconds)
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not T <= seconds <= LONGEST * T:
         raise ConfigError(
             "not a length of a step response",

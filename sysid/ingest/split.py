@@ -55,7 +55,7 @@ def split_traces(
         parts = [part for trace, mark in zip(traces, marks, strict=True) for part in _by_column(trace, mark)]
     elif isinstance(split, Mapping):
         parts = [part for trace in traces for part in _by_time(trace, split)]
-    elif isinstance(split, float | int):
+    elif isinstance(split, float | int | np.number):
         parts = _by_share(traces, [float(split)])
     elif all(isinstance(entry, str) for entry in split):
         parts = _by_experiment(traces, [str(entry) for entry in split])

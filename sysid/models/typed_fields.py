@@ -20,11 +20,31 @@ MOST = {"starts": 10_000}
 """Options of which a slip of the pen would take all memory."""
 
 
+def plain_values(value: Any) -> Any:
+    """Numbers and arrays of NumPy as plain ones, at whatever depth of lists, tuples and dicts.
+
+    Args:
+        value: Anything.
+
+    Returns:
+        The same, or plain values in its place.
+
+    Example:
+        >>> plain_values({"k": (np.int8(2), np.array([[0, 1]], dtype=np.uint8))})
+        {'k': (2, [[0, 1]])}
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if type(value) in {list, tuple}:
+        return type(value)(plain_values(one) for one in value)
+    return {key: plain_values(one) for key, one in value.items()} if type(value) is dict else value
+
+
 class _Looked(ABCMeta):
     """Looks at what is given before anything is made of it; numbers and arrays of NumPy are plain ones then."""
 
     def __call__(cls, *args: Any, **given: Any) -> Any:
-        plain = {name: v.tolist() if isinstance(v, np.ndarray | np.generic) else v for name, v in given.items()}
+        plain = {name: plain_values(value) for name, value in given.items()}
         fields = getattr(cls, "__dataclass_fields__", {})
         for name, value in plain.items():
             if name in fields and fields[name].type in cls.held:  # type: ignore[attr-defined]  # of both classes below
