@@ -137,8 +137,24 @@ def _experiments(values: Any, channels: Names) -> dict[str, Any]:
                 got="a list of two columns, which is two experiments without one",
                 remedy='write sysid.data((u, y), ...); two records without input: outputs="y" beside the list',
             )
+        _check_no_rows(values)
         return {f"record-{number}": one for number, one in enumerate(values, start=1)}
     return {"record": values}
+
+
+def _check_no_rows(values: list[Any]) -> None:
+    """Refuse a list of rows, which would be as many experiments of a few samples each."""
+    few = len(values[0]) if isinstance(values[0], list | tuple) else 0
+    rows = 0 < few < len(values) and all(
+        isinstance(one, list | tuple) and len(one) == few and all(map(np.isscalar, one)) for one in values
+    )
+    if rows:
+        raise ConfigError(
+            "a list is of several experiments",
+            expected="records: pairs (u, y), frames, dicts of columns",
+            got=f"{len(values)} rows of {few} numbers",
+            remedy="one record of rows is an array: np.array(rows)",
+        )
 
 
 def _is_column(value: Any) -> bool:

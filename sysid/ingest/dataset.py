@@ -15,12 +15,27 @@ from sysid.ingest.description import DatasetDescription, read_description
 from sysid.ingest.generators import Generator, find_generator
 from sysid.ingest.options import FileOptions
 from sysid.ingest.places import checked_file, files_folder
+from sysid.ingest.readers import READERS, choose_reader
 from sysid.ingest.reading import read_table
 from sysid.traces import Trace, TraceSet
 
 DESCRIPTION_FILE = "dataset.yaml"
 Progress = Callable[[str, int, int], None]
 """Called as ``progress(case, index, count)`` before case ``index`` (from 0) of ``count`` is made."""
+
+
+def _check_text(path: Path) -> None:
+    """Refuse a file that is no description but something else, such as a record of a kind that no reader knows."""
+    with path.open("rb") as file:
+        if b"\0" in file.read(4096):
+            choose_reader(path, READERS)  # says which kinds there are, or
+            raise ConfigError(
+                "the file is no description of a data set",
+                where=path,
+                expected="a YAML file, or a name or a file of traces",
+                got="a file that is no text",
+                remedy="sysid ingest FILE looks into a file of traces",
+            )
 
 
 def find_dataset(name_or_path: str | Path, *, search: Sequence[Path] | None = None) -> Path:
@@ -40,6 +55,7 @@ def find_dataset(name_or_path: str | Path, *, search: Sequence[Path] | None = No
     path = Path(name_or_path)
     for candidate in (path / DESCRIPTION_FILE, path):
         if candidate.is_file():
+            _check_text(candidate)
             return candidate
     folders = content_folders("datasets") if search is None else unique_folders(search)
     for folder in folders:

@@ -130,7 +130,12 @@ def _all_channels(table: RawTable, files: FileOptions) -> tuple[Channel, ...]:
     skip = {time, "usable"} if "sysid" in table.metadata else {time}
     channels = []
     for column in table.columns:
-        if column.name in skip or column.problem is not None:
+        if column.name in skip:
+            continue
+        if column.problem is not None:
+            # A remark beside the measurements does no harm; what has a unit, or numbers, was measured, and is not lost.
+            if column.words is None or column.unit is not None:
+                raise column.problem
             continue
         unit = files.units if isinstance(files.units, str) else files.units.get(column.name, column.unit)
         if unit is None:

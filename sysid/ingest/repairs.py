@@ -12,6 +12,8 @@ from sysid.errors import ConfigError, TraceError, did_you_mean
 from sysid.ingest.options import RepairOptions
 from sysid.ingest.table import RawTable
 
+HOUR = 3600.0
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Record:
@@ -116,6 +118,7 @@ def backward(record: Record, repairs: RepairOptions) -> Record:
             expected=f"a time after {record.stamps[first - 1]:g} s",
             got=f"{record.stamps[first]:g} s",
             remedy=_zone(record)
+            or _set_back(record)
             or "split the file where a new recording starts, or ask for repairs: {backward: sort} or {backward: drop}",
         )
     told = f"{len(bad)} backward time stamps, first at {record.at(first)}"
@@ -124,6 +127,19 @@ def backward(record: Record, repairs: RepairOptions) -> Record:
     keep = np.ones(len(record.stamps), dtype=np.bool_)
     keep[bad] = False
     return record.keep(keep, f"dropped: {told}")
+
+
+def _set_back(record: Record) -> str | None:
+    """What to do where the clock goes back once, by an hour: it was set back, and an hour comes twice."""
+    steps = np.diff(record.stamps)
+    back = steps[steps < 0.0]
+    usual = float(np.median(steps))
+    if len(back) != 1 or abs(float(back[0]) - usual + HOUR) > 0.5 * abs(usual):
+        return None
+    return (
+        "a clock that was set back by an hour, as in autumn: say its zone (time: {zone: Europe/Berlin}; of a frame, "
+        'frame.tz_localize("Europe/Berlin", ambiguous="infer")). Sorted by time, two hours would be one'
+    )
 
 
 def _zone(record: Record) -> str | None:
@@ -157,7 +173,9 @@ def duplicates(record: Record, repairs: RepairOptions) -> Record:
             where=record.where(first),
             expected=f"a time after {record.stamps[first]:g} s",
             got=f"{record.stamps[first]:g} s again",
-            remedy=_zone(record) or "ask for repairs: {duplicates: drop}, {duplicates: last} or {duplicates: average}",
+            remedy=_zone(record)
+            or _in_single(record)
+            or "ask for repairs: {duplicates: drop}, {duplicates: last} or {duplicates: average}",
         )
     keep = np.ones(len(record.stamps), dtype=np.bool_)
     keep[bad] = False
@@ -171,6 +189,21 @@ def duplicates(record: Record, repairs: RepairOptions) -> Record:
         sums = np.column_stack([np.bincount(group, weights=column) for column in record.values.T])
     means = sums / np.bincount(group)[:, None]
     return replace(record.keep(keep, f"averaged: {told}"), values=means)
+
+
+def _in_single(record: Record) -> str | None:
+    """What to do where stamps are numbers of 32 bit, which count too coarsely that far from 0."""
+    stamps = record.stamps
+    if not np.array_equal(stamps.astype(np.float32), stamps):
+        return None
+    coarse = float(np.spacing(np.float32(np.abs(stamps).max())))
+    steps = np.diff(stamps)
+    if not float(steps[steps > 0.0].min(initial=np.inf)) < 2.0 * coarse:
+        return None
+    return (
+        f"the stamps are numbers of 32 bit, which count in steps of {coarse:.3g} s here: save them in 64 bit, or leave "
+        "them out and say the sample time. Dropped, samples of different times would be lost"
+    )
 
 
 def missing_values(record: Record, repairs: RepairOptions) -> Record:

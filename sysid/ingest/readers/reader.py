@@ -90,6 +90,8 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
         got=path.suffix or "a name without an ending",
         remedy="unpack it first: it is compressed"
         if head.startswith(_PACKED)
+        else "export the traces to one of these (sound: scipy.io.wavfile.read and sysid.data)"
+        if head.startswith(b"RIFF")
         else "export the traces to one of these"
         + ("" if b"\0" in head else ", or, as it is text, name the reader (reader: csv)"),
     )
