@@ -179,6 +179,9 @@ class ChannelError(UserError):
         self.available = tuple(available)
         guesses = [near[0] for name in missing if (near := near_words(name, available))]
         remedy = f"did you mean {', '.join(guesses)}?" if guesses else "name one of the channels that are there"
+        listed = [part.strip() for name in missing for part in name.split(",")]
+        if len(listed) > len(missing) and set(listed) <= set(available):
+            remedy = f"write {'+'.join(listed)}: channels of a mapping stand with + between them"
         super().__init__(
             f"missing channel {', '.join(missing)}",
             where=where,

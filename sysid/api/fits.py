@@ -250,7 +250,9 @@ class Fit(FitResult):
         return inputs_of(u, model.mapping.inputs, sample_time=model.sample_time, units=model.ends.units)
 
     def _outputs(self, y: Any) -> NDArray[np.float64]:
-        output = np.asarray(as_array(y), dtype=np.float64)
+        named = isinstance(y, Dict) or hasattr(y, "columns")
+        output = inputs_of(y, self.model.mapping.outputs, units=self.model.ends.units) if named else as_array(y)
+        output = np.asarray(output, dtype=np.float64)
         return output.reshape(len(output), -1) if self.model.structure.several_outputs else output.reshape(-1)
 
     def _history(self, inputs: NDArray[np.float64], initial: Initial) -> History | None:
@@ -258,7 +260,7 @@ class Fit(FitResult):
         if initial is None or isinstance(initial, History):
             return initial
         if isinstance(initial, tuple):
-            before, output = before_a_run(initial, model.mapping.inputs, model.mapping.outputs)
+            before, output = before_a_run(initial, model.mapping.inputs, model.mapping.outputs, model.ends.units)
             return History(inputs=before, output=output if model.structure.several_outputs else output[:, 0])
         if not model.structure.several_outputs and not isinstance(initial, Dict):
             return History.at_rest(inputs=inputs[0], output=level_of(initial))
@@ -323,7 +325,9 @@ class SystemFit:
         """
         given: dict[str, Any] = {}
         if isinstance(initial, tuple):
-            before, output = before_a_run(initial, self[self.outputs[0]].model.mapping.inputs, self.outputs)
+            models = [self[name].model for name in self.outputs]
+            units = {name: unit for model in models for name, unit in model.ends.units.items()}
+            before, output = before_a_run(initial, models[0].mapping.inputs, self.outputs, units)
             given = {name: (before, column) for name, column in zip(self.outputs, output.T, strict=True)}
         elif initial is not None:
             given = dict(initial)

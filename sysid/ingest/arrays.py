@@ -22,10 +22,10 @@ from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.meaning import with_clock
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.split import Split, split_traces
-from sysid.ingest.table import RawTable, array_column, by_length, is_time_unit, recognise_time
+from sysid.ingest.table import RawColumn, RawTable, array_column, by_length, is_time_unit, recognise_time
 from sysid.ingest.timing import survey
 from sysid.traces import Channel, Trace, TraceSet, check_units
-from sysid.units import Reference, check_unit
+from sysid.units import Reference, check_unit, convert, is_same_unit
 
 Names = str | Sequence[str] | None
 
@@ -216,7 +216,8 @@ def inputs_of(
         values: An array, a frame, a dict of columns, or a trace; for a model without input the number of samples.
         names: The inputs.
         sample_time: Of the model, in seconds: a trace, and a frame whose index or column is time, must have it.
-        units: Of the model's channels: a trace, whose channels have units, must be in them.
+        units: Of the model's channels: a trace, whose channels have units, must be in them; columns whose names say
+            others (``"u [mV]"``) are converted.
 
     Returns:
         Shape ``(n_samples, n_inputs)``, float64.
@@ -264,7 +265,8 @@ def inputs_of(
         if table.time is not None and table.time not in names and sample_time is not None and len(table) > 1:
             stamps = stamps_in_seconds(table, FileOptions())
             _check_step(float(np.median(np.diff(stamps))), sample_time, where=where)
-        found = np.column_stack([table.find(name).values for name in names]) if names else np.zeros((len(table), 0))
+        columns = [_in_unit(table.find(name), (units or {}).get(name, "1")) for name in names]
+        found = np.column_stack(columns) if names else np.zeros((len(table), 0))
     if not len(found):
         raise _no_samples(where)
     bad = ~np.isfinite(found)
@@ -278,6 +280,13 @@ def inputs_of(
             remedy="fill them before, for example frame.interpolate() or frame.ffill()",
         )
     return found
+
+
+def _in_unit(column: RawColumn, unit: str) -> NDArray[np.float64]:
+    """A column in a model's unit, where its name says another one; as it stands where one of them is none."""
+    if column.unit is None or is_same_unit(column.unit, unit):
+        return column.values
+    return convert(column.values, column.unit, unit, reference=column.reference or Reference.NONE)
 
 
 def level_of(initial: Any) -> float:

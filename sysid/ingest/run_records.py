@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from sysid.traces import Channel, Trace
 
 
 def before_a_run(
-    pair: tuple[Any, Any], inputs: tuple[str, ...], outputs: tuple[str, ...]
+    pair: tuple[Any, Any], inputs: tuple[str, ...], outputs: tuple[str, ...], units: Mapping[str, str]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The samples before a run, from which it goes on.
 
@@ -24,6 +24,7 @@ def before_a_run(
         pair: Inputs, as for :func:`sysid.ingest.arrays.inputs_of`, and the outputs that were measured with them.
         inputs: Names of the inputs.
         outputs: Names of the outputs.
+        units: Of both, as for :func:`sysid.ingest.arrays.inputs_of`.
 
     Returns:
         Shapes ``(n_past, n_inputs)`` and ``(n_past, n_outputs)``, oldest first.
@@ -36,11 +37,11 @@ def before_a_run(
         raise _not_before(f"{len(pair)} values", outputs)
     named = columns_by_name(pair[1], where="initial") if not isinstance(pair[1], Trace) else {}
     if named is not None and not hasattr(pair[1], "to_frame"):
-        output = inputs_of(pair[1], outputs)
+        output = inputs_of(pair[1], outputs, units=units)
     else:
         output = np.asarray(as_array(pair[1]), dtype=np.float64)
         output = output.reshape(len(output), -1) if output.ndim else output
-    before = inputs_of(pair[0], inputs)
+    before = inputs_of(pair[0], inputs, units=units)
     if output.ndim != 2 or output.shape != (len(before), len(outputs)) or not len(output):
         raise _not_before(f"{len(before)} samples of inputs and an output of shape {np.shape(pair[1])}", outputs)
     if not np.isfinite(output).all():
@@ -84,7 +85,7 @@ def record_of(values: Any, inputs: Sequence[Channel], outputs: Sequence[Channel]
     if isinstance(values, Trace):
         return values
     names = tuple(channel.name for channel in inputs)
-    found = inputs_of(values, names, sample_time=sample_time)
+    found = inputs_of(values, names, sample_time=sample_time, units={one.name: one.unit for one in inputs})
     named = columns_by_name(values, where="the record")
     there = [one for one in outputs if named is not None and one.name in {parse_header(key).name for key in named}]
     if not there:

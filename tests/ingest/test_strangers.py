@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import sysid
-from sysid.errors import ConfigError, ReaderError, TraceError
+from sysid.errors import ChannelError, ConfigError, ReaderError, TraceError, UnitError
 
 N = 120
 U, Y = np.arange(N) % 7.0, np.arange(N) % 5.0
@@ -60,3 +60,29 @@ def test_a_file_of_another_kind_is_no_broken_yaml(tmp_path: Path, name: str, sai
     with pytest.raises(ReaderError, match="no reader knows") as refused:
         sysid.load(tmp_path / name)
     assert said in str(refused.value.remedy)
+
+
+def test_columns_in_another_unit_are_converted_at_every_door_that_runs_a_model(tmp_path: Path) -> None:
+    traces = sysid.data({"u [V]": U, "y [m]": Y}, sample_time=1.0)
+    fit = sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=1, nk=1), stability=sysid.StabilityOptions(count=0))
+    bundle = sysid.save(fit, traces, tmp_path / "bundle", formats=["c"])
+    frame, pair = pd.DataFrame({"u [mV]": 1e3 * U}), ({"u [mV]": 1e3 * U[:9]}, {"y [cm]": 1e2 * Y[:9]})
+    for model, options in ((fit, {}), (bundle, {"warn": False})):
+        plain = np.ravel(model.simulate(U, **options))
+        np.testing.assert_allclose(np.ravel(model.simulate(frame, **options)), plain, rtol=1e-12)
+        np.testing.assert_allclose(np.ravel(model.simulate({"u": U}, **options)), plain, rtol=1e-12)
+        after = np.ravel(model.simulate(frame[9:], initial=pair, **options))
+        np.testing.assert_allclose(after, np.ravel(model.simulate(U[9:], initial=(U[:9], Y[:9]), **options)), rtol=1e-9)
+    measured = pd.DataFrame({"u [mV]": 1e3 * U, "y [m]": Y})
+    ahead = fit.predict(pd.DataFrame({"y [cm]": 1e2 * Y}), measured)
+    np.testing.assert_allclose(ahead, fit.predict(Y, U), rtol=1e-12)
+    begun = bundle.simulate(measured, start="first-sample", warn=False)
+    there = bundle.simulate(pd.DataFrame({"u": U, "y": Y}), start="first-sample", warn=False)
+    np.testing.assert_allclose(begun, there, rtol=1e-12)
+    with pytest.raises(UnitError):
+        fit.simulate({"u [kg]": U})
+
+
+def test_commas_in_a_mapping_are_told() -> None:
+    with pytest.raises(ChannelError, match=r"write u\+y"):
+        sysid.fit(sysid.data({"u": U, "y": Y}, sample_time=1.0), "u, y -> y", sysid.ARX(na=1, nb=1, nk=1))
