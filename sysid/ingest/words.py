@@ -79,7 +79,9 @@ class Words:
                 remedy="leave the column out",
             )
         shown = ", ".join(f"{text[:30]!r}" for text in self.texts[:6])
-        table = ", ".join(f"{quoted(text)}: {index}" for index, text in enumerate(self.texts[:6]))
+        # The one that stands for nothing is 0, whichever came first.
+        ordered = sorted(self.texts[:6], key=lambda text: text.casefold() not in NOTHING)
+        table = ", ".join(f"{quoted(text)}: {index}" for index, text in enumerate(ordered))
         return ReaderError(
             "the column holds words",
             where=where,
@@ -89,6 +91,25 @@ class Words:
             + (", and so on for each word" if len(self.texts) > 6 else "")
             + f"; if one stands for a missing value, write missing: [{quoted(self.texts[0])}]",
         )
+
+
+NOTHING = {
+    "off",
+    "false",
+    "no",
+    "n",
+    "low",
+    "shut",
+    "closed",
+    "stop",
+    "stopped",
+    "idle",
+    "inactive",
+    "aus",
+    "zu",
+    "nein",
+}
+"""Words that stand for 0 beside their opposites."""
 
 
 def quoted(text: str) -> str:

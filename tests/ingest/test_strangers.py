@@ -86,3 +86,16 @@ def test_columns_in_another_unit_are_converted_at_every_door_that_runs_a_model(t
 def test_commas_in_a_mapping_are_told() -> None:
     with pytest.raises(ChannelError, match=r"write u\+y"):
         sysid.fit(sysid.data({"u": U, "y": Y}, sample_time=1.0), "u, y -> y", sysid.ARX(na=1, nb=1, nk=1))
+
+
+@pytest.mark.parametrize("words", [("ON", "OFF"), ("open", "Closed"), ("true", "False"), ("one", "two")])
+def test_the_numbers_that_are_proposed_for_words_are_no_way_round(tmp_path: Path, words: tuple[str, str]) -> None:
+    rows = [f"{0.1 * k:.1f},{words[k % 7 > 2]},{Y[k]}" for k in range(N)]
+    (tmp_path / "rig.csv").write_text("\n".join(["t [s],u [V],y [V]", *rows]))
+    if words == ("true", "False"):  # numbers already
+        assert set(sysid.load(tmp_path / "rig.csv").traces[0]["u"]) == {0.0, 1.0}
+        return
+    with pytest.raises(ReaderError, match="holds words") as refused:
+        sysid.load(tmp_path / "rig.csv")
+    zero = "one" if "one" in words else words[1]
+    assert f"'{zero}': 0" in str(refused.value.remedy) or f"{zero}: 0" in str(refused.value.remedy)
