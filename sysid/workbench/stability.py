@@ -25,6 +25,8 @@ class ExcursionConfig(BaseModel):
             is not made to run free.
         time_share: Share of the fit's own time that its checks may take together, and a minute in any case; on how
             many sequences the verdict then rests is said.
+        amplitude: How many times as far from the middle of their range as in the estimation traces the inputs of
+            excursions go; beyond 1 only whether a run stays bounded is judged.
     """
 
     model_config = STRICT
@@ -34,6 +36,7 @@ class ExcursionConfig(BaseModel):
     seed: int = Field(default=_DEFAULT.seed, ge=0)
     choose: bool = _DEFAULT.choose
     time_share: float = Field(default=_DEFAULT.time_share, gt=0.0)
+    amplitude: float = Field(default=_DEFAULT.amplitude, gt=0.0)
 
     def options(self) -> StabilityOptions:
         """What is asked."""

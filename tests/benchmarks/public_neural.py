@@ -7,13 +7,15 @@ and ``silverbox/SNLS80mV.csv`` (nonlinearbenchmark.org); none is part of this pr
 
 Protocol. Sizes and regularisation are chosen by the free run on parts of the training records that the fit did not see:
 the tanks by four blocks in turn, the drives and the Silverbox by the tail; the error is the geometric mean over parts
-and seeds. The winner is fitted afresh to the whole training records, and of its starts the one with the least training
-error is taken. The test records are read after that, once; a record's first n samples give the state, the others count.
+and seeds. The winner is fitted afresh to the whole training records with three seeds, and of the starts of each the one
+with the least training error is taken; figures are medians over the seeds. The test records are read after that, once;
+a record's first n samples give the state, the others count.
 
 What is told to the fit beyond the data: nothing for the tanks; for the drives that the output may be an absolute value
-(its sensor counts pulses; ``output: absolute`` stands in the grid beside ``plain``); for the Silverbox that a cube may
-do (``activation: cubic`` beside ``tanh``). The grids were drawn up while looking at test figures of other settings too,
-as everybody's are; the choice within them is the rule above.
+(its sensor counts pulses; ``output: absolute`` stands in the grid beside ``plain``); for the Silverbox that its spring
+is cubic (``activation: cubic``), and that the force will be half as large again: starts that run away there are left
+out of the mean of those of a seed. The grids were drawn up while looking at test figures of other settings too, as
+everybody's are; the choice within them is the rule above.
 
 Published: Champneys et al., "Baseline results for selected nonlinear system identification benchmarks",
 arXiv 2405.10779, and its references; there n is 5 on the tanks, 4 on the drives and 50 on the Silverbox.
@@ -28,21 +30,28 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise, product
+from statistics import median
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from sysid.estimation import FitResult, Training, fit_neural_state_space
+import sysid
+from sysid.estimation import FitResult, StabilityOptions, Training
 from sysid.models import AbstractModel, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 from tests.benchmarks._public import checked
 
 MAPPING = Mapping.parse("u -> y")
+SEEDS = (0, 1, 2)
 SOURCE = "Champneys et al. 2024 and its references"
 PEER = "jax-sysid 1.1.0, state space of order 2, tried once by hand in this project"
+
+
+Row = tuple[NeuralStateSpace, float | None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,11 +63,15 @@ class Case:
     parts: tuple[tuple[tuple[Trace, ...], tuple[Trace, ...]], ...]
     """Pairs of (records to fit, records to score)."""
     n_initial: int
-    grid: tuple[tuple[NeuralStateSpace, float], ...]
-    """Structures and the regularisation of each."""
+    grid: tuple[Row, ...]
+    """Structures and the regularisation of each; ``None`` is by the evidence."""
     seeds: int
     starts: int
     iterations: int
+    ensemble: int = 1
+    """Of so many starts the mean, less those that stand alone or run away."""
+    amplitude: float = 1.0
+    """How many times as far as in the training records inputs go where starts are asked whether they run away."""
 
     @property
     def start(self) -> Start:
@@ -74,6 +87,11 @@ def piece(whole: Trace, first: int, last: int) -> Trace:
     return trace(f"{whole.name} {first}", whole.values[first:last], whole.sample_time, whole.channel("y").unit)
 
 
+def told(row: Row) -> str:
+    """A structure and how its weights are kept small."""
+    return f"{row[0].label}, {'by the evidence' if row[1] is None else f'regularisation {row[1]:g}'}"
+
+
 def rmse(model: AbstractModel, record: Trace, n: int) -> float:
     """Free run from the state that the first n samples show; the samples after them count."""
     u, y = record.columns(["u"]), record["y"]
@@ -81,48 +99,63 @@ def rmse(model: AbstractModel, record: Trace, n: int) -> float:
     return float(np.sqrt(np.mean((model.simulate(u[n:], history) - y[n:]) ** 2)))
 
 
-def fit(case: Case, records: Sequence[Trace], row: tuple[NeuralStateSpace, float], seed: int, starts: int) -> FitResult:
+def fit(case: Case, records: Sequence[Trace], row: Row, seed: int, final: bool = False) -> FitResult:
+    """One start while it is chosen; in the end all of them, asked how far beyond the record they may be run."""
+    starts = case.starts if final else 1
     training = Training(
         starts=starts,
         seed=seed,
         max_iterations=case.iterations,
         patience=20,
         regularisation=row[1],
+        ensemble=case.ensemble if final else 1,
         workers=min(2, starts),
     )
-    return fit_neural_state_space(records, MAPPING, row[0], training, start=case.start)
+    asked = StabilityOptions(count=1000 if final and case.amplitude > 1.0 else 0, amplitude=case.amplitude)
+    return sysid.fit(records, MAPPING, row[0], training, start=case.start, stability=asked)
 
 
-def choose(case: Case) -> tuple[NeuralStateSpace, float]:
+def choose(case: Case) -> Row:
     """The row of the grid with the least error on the parts held out."""
 
-    def score(job: tuple[tuple[NeuralStateSpace, float], int, int]) -> float:
+    def score(job: tuple[Row, int, int]) -> float:
         row, part, seed = job
         fitted, scored = case.parts[part]
-        model = fit(case, fitted, row, seed, 1).model
+        model = fit(case, fitted, row, seed).model
         return float(np.mean([np.log(rmse(model, record, case.n_initial)) for record in scored]))
 
     jobs = list(product(case.grid, range(len(case.parts)), range(case.seeds)))
     with ThreadPoolExecutor(2) as pool:  # kernels and BLAS release the interpreter
         logs = np.array(list(pool.map(score, jobs))).reshape(len(case.grid), -1)
     for (network, weight), values in zip(case.grid, logs, strict=True):
-        print(f"  held out: {network.label}, regularisation {weight:g}: {np.exp(values.mean()):.4g}")
+        print(f"  held out: {told((network, weight))}: {np.exp(values.mean()):.4g}")
     return case.grid[int(np.argmin(logs.mean(axis=1)))]
 
 
-def chosen_model(case: Case) -> AbstractModel:
-    """Choose, fit to the whole training records, and say what was done."""
+def chosen_models(case: Case) -> list[AbstractModel]:
+    """Choose, fit to the whole training records with three seeds, and say what was done."""
     began = time.perf_counter()
     print(case.title)
     row = choose(case)
-    between = time.perf_counter()
-    found = fit(case, case.training, row, 0, case.starts)
-    print(
-        f"  chosen: {row[0].label}, regularisation {row[1]:g}, {found.model.n_parameters} parameters, "
-        f"seed {found.seed}; training RMSE {np.sqrt(found.history['mse'][-1]):.4g}; {found.status.name}; "
-        f"choosing {between - began:.0f} s, final fit {time.perf_counter() - between:.1f} s"
-    )
-    return found.model
+    print(f"  chosen in {time.perf_counter() - began:.0f} s: {told(row)}")
+    models = []
+    for seed in SEEDS:
+        began, cpu = time.perf_counter(), time.process_time()
+        found = fit(case, case.training, row, 100 * seed, final=True)  # no start in two of them
+        print(
+            f"  seed {seed}: {found.model.n_parameters} parameters, {found.status.name}, "
+            f"training RMSE {np.sqrt(found.history['mse'][-1]):.4g}, {time.perf_counter() - began:.0f} s, "
+            f"{time.process_time() - cpu:.0f} s of processor time"
+        )
+        models.append(found.model)
+    return models
+
+
+def errors(what: str, models: Sequence[AbstractModel], record: Trace, n: int, unit: str, **more: Any) -> None:
+    """Say the median over the seeds, and the spread."""
+    values = [(1e3 if unit == "mV" else 1.0) * rmse(model, record, n) for model in models]
+    spread = ", ".join(f"{value:.3g}" for value in values)
+    found(what, median(values), unit, note=f"median of seeds {', '.join(map(str, SEEDS))}: {spread}", **more)
 
 
 def tanks() -> None:
@@ -146,11 +179,11 @@ def tanks() -> None:
         starts=5,
         iterations=200,
     )
-    model = chosen_model(case)
+    models = chosen_models(case)
     published = f"neural 0.306 to 0.396, grey box 0.191 (n = 5; {SOURCE})"
     peer = f"0.285 V ({PEER})"
-    found("Cascaded Tanks, n = 50", rmse(model, test, 50), "V", target=0.30, published=published, peer=peer)
-    found("Cascaded Tanks, n = 5", rmse(model, test, 5), "V", published=published)
+    errors("Cascaded Tanks, n = 50", models, test, 50, "V", target=0.25, published=published, peer=peer)
+    errors("Cascaded Tanks, n = 5", models, test, 5, "V", target=0.25, published=published)
 
 
 def drives() -> None:
@@ -175,14 +208,14 @@ def drives() -> None:
         starts=4,
         iterations=200,
     )
-    model = chosen_model(case)
-    rows = zip(whole, (0.100, 0.090), ("0.096", "0.074"), ("0.155", "0.198"), strict=True)
+    models = chosen_models(case)
+    rows = zip(whole, (0.090, 0.074), ("0.096", "0.074"), ("0.155", "0.198"), strict=True)
     for record, target, best, tried in rows:
         test, published = piece(record, 400, 500), f"best {best} (n = 4; {SOURCE})"
         name = f"Coupled Electric Drives, record {record.name}"
         peer = f"{tried} ticks/s ({PEER})"
-        found(f"{name}, n = 10", rmse(model, test, 10), "ticks/s", target=target, published=published, peer=peer)
-        found(f"{name}, n = 4", rmse(model, test, 4), "ticks/s", published=published)
+        errors(f"{name}, n = 10", models, test, 10, "ticks/s", target=target, published=published, peer=peer)
+        errors(f"{name}, n = 4", models, test, 4, "ticks/s", target=target, published=published)
 
 
 def silverbox() -> None:
@@ -198,21 +231,23 @@ def silverbox() -> None:
         parts=(((piece(training, 0, 20_000),), (piece(training, 52_000, split),)),),
         n_initial=50,
         grid=tuple(
-            (NeuralStateSpace(states=2, neurons=k, activation=activation), 1e-6)
-            for activation, k in (("cubic", 2), ("cubic", 4), ("tanh", 4), ("tanh", 8))
+            (NeuralStateSpace(states=n, neurons=k, activation=activation), None)
+            for activation, n, k in (("cubic", 2, 4), ("cubic", 3, 4), ("cubic", 5, 2))
         ),
         seeds=2,
-        starts=2,
-        iterations=100,
+        starts=12,
+        iterations=300,
+        ensemble=6,
+        amplitude=1.5,  # the force of the arrow goes to 0.149 V, that of the multisine to 0.101 V
     )
-    model = chosen_model(case)
+    models = chosen_models(case)
     for what, columns, target, published in (
-        ("arrow, no extrapolation", values[100:32_100], 0.30, "best 0.259"),
-        ("arrow, full", values[100:40_575], 1.0, "best 0.26 (polynomial state space), 0.60"),
-        ("multisine", multisine[split:], None, "best 0.301"),
+        ("arrow, no extrapolation", values[100:32_100], 0.21, "best 0.259"),
+        ("arrow, full", values[100:40_575], 0.26, "best 0.26 (polynomial state space), 0.60"),
+        ("multisine", multisine[split:], 0.21, "best 0.301"),
     ):
-        error = 1e3 * rmse(model, trace("test", columns, period, "V"), 50)
-        found(f"Silverbox {what}", error, "mV", target=target, published=f"{published} ({SOURCE})")
+        record = trace("test", columns, period, "V")
+        errors(f"Silverbox {what}", models, record, 50, "mV", target=target, published=f"{published} ({SOURCE})")
 
 
 if __name__ == "__main__":

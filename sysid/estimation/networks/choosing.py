@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -33,6 +34,8 @@ def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, float]:
 
 VETTED = 10
 """Best candidates that are looked at for one whose free run is stable."""
+LOOKS = 2
+"""Of them how many may be looks at the same start: what runs away at one look mostly does at the next."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,9 +67,20 @@ def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Netwo
     order = sorted(range(len(candidates)), key=lambda i: rank(candidates[i], choose_by))
     found: dict[int, bool] = {}
     if vet is not None:
-        for i in order[:VETTED]:
+        for i in _few_of_each(candidates, order)[:VETTED]:
             found[i] = vet(candidates[i].model)
             if found[i]:
                 break
     chosen = next((i for i, stable in found.items() if stable), order[0])
     return Choice(chosen=candidates[chosen], stable=tuple(found.get(i) for i in range(len(candidates))), by=choose_by)
+
+
+def _few_of_each(candidates: Sequence[Candidate], order: Sequence[int]) -> list[int]:
+    """The candidates in order, of each start the best looks."""
+    seen: Counter[int] = Counter()
+    found = []
+    for i in order:
+        seen[candidates[i].number] += 1
+        if seen[candidates[i].number] <= LOOKS:
+            found.append(i)
+    return found

@@ -86,12 +86,14 @@ class United:
         candidate: It.
         members: Whom it unites, the first pick first.
         left_out: Starts that stand alone, or far behind.
+        unstable: Starts whose own free run is not stable.
         elected: Whether selection traces found it, and tell what it is worth; it is asked for, and taken, elsewhere.
     """
 
     candidate: starts.Candidate
     members: tuple[Member, ...]
     left_out: tuple[int, ...]
+    unstable: tuple[int, ...]
     elected: bool
 
     def choice(
@@ -130,9 +132,9 @@ class United:
             why = "its free run is not stable" if choice.stable[-1] is False else "a single start does as well"
             return (f"The ensemble of {n} starts was not taken: {why}.",)
         price = f"it has {n} times the states and parameters of one"
-        left = ", ".join(str(number + 1) for number in self.left_out)
-        apart = f" Left out, as they stand alone or far behind: start {left}." if left else ""
-        return (f"An ensemble: the mean of {n} free runs as one model; {price}.{apart}",)
+        left = _left_out("they stand alone or far behind", self.left_out)
+        left += _left_out("their own free run is not stable", self.unstable)
+        return (f"An ensemble: the mean of {n} free runs as one model; {price}.{left}",)
 
     def posterior(self, runs: Sequence[Experiment], unread: slice | None) -> Posterior | None:
         """The posterior of the mixture, not calibrated.
@@ -164,7 +166,10 @@ class United:
 
 
 def united(
-    multistart: starts.Multistart, provider: NeuralProvider, candidates: Sequence[starts.Candidate]
+    multistart: starts.Multistart,
+    provider: NeuralProvider,
+    candidates: Sequence[starts.Candidate],
+    vet: Callable[[starts.Network], bool] | None = None,
 ) -> United | None:
     """The ensemble of the starts of a multistart.
 
@@ -172,6 +177,7 @@ def united(
         multistart: The multistart; its training says how many members there are at most.
         provider: The residuals.
         candidates: Every start at every look.
+        vet: Whether a model's free run is stable: where one member runs away, so does the mean.
 
     Returns:
         It; ``None`` where fewer than two remain, or no second pick helps.
@@ -181,7 +187,8 @@ def united(
     elected = by == "selection" and bool(multistart.selection)
     if not elected:
         ends = {c.number: c for c in sorted(usable, key=lambda c: c.solution.state.iteration)}
-        usable = [c for c in usable if ends[c.number] is c][:most]
+        usable = [c for c in usable if ends[c.number] is c]
+    usable, unstable = _stable(usable, None if elected else vet, len(usable) if elected else most)
     members = [one for one in _turned(provider, usable) if all(np.isfinite(run).all() for run in one.runs)]
     if elected:
         picked, left = _elected(multistart, provider, members), list[Member]()
@@ -192,7 +199,28 @@ def united(
         return None
     found = _candidate(multistart, provider, picked)
     left_out = tuple(one.candidate.number for one in left)
-    return United(candidate=found, members=tuple(one for one, _ in picked), left_out=left_out, elected=elected)
+    members = [one for one, _ in picked]
+    return United(candidate=found, members=tuple(members), left_out=left_out, unstable=unstable, elected=elected)
+
+
+def _stable(
+    candidates: Sequence[starts.Candidate], vet: Callable[[starts.Network], bool] | None, most: int
+) -> tuple[list[starts.Candidate], tuple[int, ...]]:
+    """The first candidates whose free runs are stable, and the numbers of those that were passed over."""
+    kept, left = list[starts.Candidate](), list[int]()
+    for one in candidates:
+        if len(kept) == most:
+            break
+        if vet is None or vet(one.model):
+            kept.append(one)
+        else:
+            left.append(one.number)
+    return kept, tuple(left)
+
+
+def _left_out(why: str, numbers: Sequence[int]) -> str:
+    """Who was left out, as a sentence; nothing where nobody was."""
+    return f" Left out, as {why}: start {', '.join(str(number + 1) for number in numbers)}." if numbers else ""
 
 
 def _turned(provider: NeuralProvider, candidates: Sequence[starts.Candidate]) -> list[Member]:

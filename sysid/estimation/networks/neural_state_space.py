@@ -262,7 +262,7 @@ def _fit(
         candidates += reweighted(multistart, provider, best)
     whole = None
     if training.ensemble > 1 and not multistart.stop.is_set():
-        whole = united(multistart, provider, candidates)
+        whole = united(multistart, provider, candidates, vet)
     choice = (
         choose(candidates, training.choose_by, vet)
         if whole is None

@@ -44,6 +44,9 @@ Vet = Callable[[AbstractModel], bool]
 class StabilityOptions(TypedFields):
     """Over which sequences a network's free run has to stay bounded and to settle; a linear model has its poles.
 
+    A surrogate that will be asked for more than was recorded is asked for it before it is chosen: with ``amplitude:
+    1.5`` inputs go half as far again from their middle, and a start that runs away there gives way to one that stays.
+
     Args:
         count: How many sequences at most; 0 checks nothing.
         tolerance: How far from its plateau a run may settle, as a share of the output's range.
@@ -54,6 +57,8 @@ class StabilityOptions(TypedFields):
         source: Where those traces come from, as a sentence.
         time_share: Share of the fit's own time that its checks may take together, and a minute in any case; on how
             many sequences the verdict then rests is said. Infinity for no bound.
+        amplitude: How many times as far from the middle of their range as in the estimation traces the inputs of
+            excursions go; beyond 1 only whether a run stays bounded is judged.
 
     Raises:
         ConfigError: If a number cannot be used.
@@ -66,6 +71,7 @@ class StabilityOptions(TypedFields):
     sequences: tuple[Trace, ...] = ()
     source: str = "Given traces."
     time_share: float = TIME_SHARE
+    amplitude: float = 1.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.sequences, Iterable):
@@ -80,7 +86,7 @@ class StabilityOptions(TypedFields):
                     f"{name} is not a number that can be used", where=name, expected="a whole number, 0 or more",
                     got=shortened(getattr(self, name)), remedy=f"write for example {name}: 100",
                 )  # fmt: skip
-        for name, usual in (("tolerance", TOLERANCE), ("time_share", TIME_SHARE)):
+        for name, usual in (("tolerance", TOLERANCE), ("time_share", TIME_SHARE), ("amplitude", 1.0)):
             value = getattr(self, name)
             if not (isinstance(value, int | float) and value > 0.0):
                 raise ConfigError(
@@ -94,7 +100,8 @@ class StabilityOptions(TypedFields):
         numbers = {name: getattr(self, name) for name in ("count", "tolerance", "seed", "choose", "source")}
         # Absent where it is the usual one, so that older files keep their digest.
         share = {} if self.time_share == TIME_SHARE else {"time_share": self.time_share}
-        return {**numbers, **share, "sequences": [trace.digest for trace in self.sequences]}
+        beyond = {} if self.amplitude == 1.0 else {"amplitude": self.amplitude}
+        return {**numbers, **share, **beyond, "sequences": [trace.digest for trace in self.sequences]}
 
 
 class AbstractStabilityCheck(ABC):
@@ -227,7 +234,7 @@ class FreeRunCheck(AbstractStabilityCheck):
             return cls(options=options, source=None)
         if not given:
             try:
-                source = Excursions.of(estimation, inputs, outputs)
+                source = Excursions.of(estimation, inputs, outputs, options.amplitude)
                 return cls(options=options, source=source, mapping=mapping, estimation=tuple(estimation))
             except TraceError:  # too short to make sequences from, which is no reason not to fit
                 return cls(options=options, source=None)

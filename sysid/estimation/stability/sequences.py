@@ -150,6 +150,8 @@ class Excursions(AbstractSequences):
         passage: Shortest and longest passage, in samples.
         hold: Samples for which a record has to stand still on a plateau, and for which it is held at the end.
         warp: How many times faster or slower than recorded a passage may run.
+        amplitude: How many times as far from the middle of their range as in the records inputs go. Beyond 1 nobody
+            knows where the outputs stand, so that no plateau is judged.
     """
 
     inputs: tuple[str, ...]
@@ -160,6 +162,7 @@ class Excursions(AbstractSequences):
     passage: tuple[int, int]
     hold: int
     warp: float = 1.25
+    amplitude: float = 1.0
     _features: NDArray[np.float64] = field(init=False, repr=False)
     _rows: NDArray[np.float64] = field(init=False, repr=False)
     _left: NDArray[np.int64] = field(init=False, repr=False)
@@ -206,7 +209,7 @@ class Excursions(AbstractSequences):
     @cached_property
     def _content(self) -> bytes:
         """What the sequences depend on, beside their seed and number and which columns are inputs."""
-        content = hashlib.blake2b(repr((self.samples, self.passage, self.hold, self.warp)).encode())
+        content = hashlib.blake2b(repr((self.samples, self.passage, self.hold, self.warp, self.amplitude)).encode())
         for record in self.records:
             content.update(repr(record.shape).encode())
             content.update(np.ascontiguousarray(record, dtype="<f8").data)
@@ -228,6 +231,11 @@ class Excursions(AbstractSequences):
         """Inputs that never move within a record: parameters of what was recorded, as a mass is."""
         return [j for j in range(len(self.inputs)) if all(np.ptp(record[:, j]) == 0.0 for record in self.records)]
 
+    @cached_property
+    def _moving(self) -> list[int]:
+        """The other inputs."""
+        return [j for j in range(len(self.inputs)) if j not in self._fixed]
+
     def _stays(self, still: list[NDArray[np.bool_]], begins: NDArray[np.float64], scale: NDArray[np.float64]) -> bool:
         """Whether an output has stood elsewhere than where a record began, the inputs being as they were there.
 
@@ -248,13 +256,16 @@ class Excursions(AbstractSequences):
         return np.unique(self._rows[:, self._fixed], axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
     @classmethod
-    def of(cls, traces: Sequence[Trace], inputs: Sequence[str], outputs: Sequence[str]) -> Excursions:
+    def of(
+        cls, traces: Sequence[Trace], inputs: Sequence[str], outputs: Sequence[str], amplitude: float = 1.0
+    ) -> Excursions:
         """The excursions of some traces, with lengths that go with theirs.
 
         Args:
             traces: At least one.
             inputs: Names of the input channels.
             outputs: Names of the output channels.
+            amplitude: How many times as far from their middle as in the records inputs go.
 
         Returns:
             The source: sequences of a quarter of the longest trace and at most 5,000 samples, in passages of a
@@ -277,6 +288,7 @@ class Excursions(AbstractSequences):
             samples=min(max(longest // 4, 20), 5000),
             passage=(max(longest // 100, 2), max(longest // 8, 4)),
             hold=max(longest // 20, 20),
+            amplitude=amplitude,
         )
 
     @property
@@ -285,7 +297,8 @@ class Excursions(AbstractSequences):
         plateaus = "held on a recorded plateau in the end" if self.has_plateaus else "without a plateau to end on"
         return (
             f"Passages of {self.passage[0] * self.sample_time:g} to {self.passage[1] * self.sample_time:g} s of the "
-            f"estimation traces, joined where they match, up to {self.warp:g} times faster or slower, {plateaus}."
+            f"estimation traces, joined where they match, up to {self.warp:g} times faster or slower, {plateaus}"
+            f"{f', inputs {self.amplitude:g} times as far from their middle' if self.amplitude != 1.0 else ''}."
         )
 
     @property
@@ -303,6 +316,7 @@ class Excursions(AbstractSequences):
         """The sequences; each depends on the seed and its own number alone."""
         low, high = self._rows.min(axis=0), self._rows.max(axis=0)
         m = len(self.inputs)
+        middle = (low[self._moving] + high[self._moving]) / 2.0
         kept = _kept(self._content, m, seed)
         for number in range(count):
             if number in kept:
@@ -311,8 +325,10 @@ class Excursions(AbstractSequences):
             rows, held = self._sequence(np.random.default_rng([seed, number]))
             rows = np.clip(rows, low, high)
             rows[:, self._fixed] = rows[0, self._fixed]  # to the last bit, whatever interpolation has rounded
+            if self.amplitude != 1.0:
+                rows[:, self._moving] = middle + self.amplitude * (rows[:, self._moving] - middle)
             judged = np.zeros(len(rows), dtype=bool)
-            if held:
+            if held and self.amplitude == 1.0:
                 judged[len(rows) - max(1, held // 10) :] = True
             for array in (rows, judged):
                 array.setflags(write=False)

@@ -104,6 +104,16 @@ def test_an_ensemble_that_is_not_stable_gives_way_to_the_best_single_start():
     assert "was not taken: its free run is not stable" in fit.notes[-1]
 
 
+def test_a_start_that_runs_away_by_itself_is_no_member(fit):
+    lost = members_of(fit.model)[0].theta
+    again = fit_neural_state_space(
+        [noisy(1)], TANK, SMALL, BY_EVIDENCE,
+        vet=lambda model: len(model.shares) > 1 or not np.array_equal(model.theta, lost),
+    )  # fmt: skip
+    assert all(not np.array_equal(one.theta, lost) for one in members_of(again.model))
+    assert "Left out, as their own free run is not stable: start" in again.notes[-1]
+
+
 def test_a_fit_may_begin_with_an_ensemble(fit):
     again = fit_neural_state_space(
         [noisy(1)], TANK, SMALL, Training(max_iterations=1, starts=1), initial=model_only(fit)

@@ -184,3 +184,26 @@ def test_options_that_cannot_be_used_are_refused_in_words(options: dict[str, Any
         StabilityOptions(**options)
     assert refused.value.where == field
     assert refused.value.remedy
+
+
+def runaway(sequence: InputSequence) -> np.ndarray:
+    """A level that runs away where its input goes beyond what was recorded."""
+    u, y = sequence.inputs[:, 0], np.zeros(len(sequence.inputs))
+    for t in range(1, len(y)):
+        y[t] = 0.9 * y[t - 1] + 0.1 * u[t - 1] + 5.0 * max(u[t - 1] - 1.05, 0.0)
+    return y
+
+
+def test_a_run_can_be_asked_for_more_than_was_recorded():
+    further = check(amplitude=1.5)
+    assert check().finding(runaway).unbounded == 0
+    assert not further.passes(runaway)
+    assert further.passes(model())
+    assert "inputs 1.5 times as far from their middle" in further.finding(model()).source
+    with pytest.raises(ConfigError, match="amplitude"):
+        StabilityOptions(amplitude=0.0)
+
+
+def test_the_terms_of_a_usual_check_are_those_of_older_files():
+    assert "amplitude" not in StabilityOptions().terms
+    assert StabilityOptions(amplitude=1.25).terms["amplitude"] == 1.25

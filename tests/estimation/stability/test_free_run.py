@@ -239,3 +239,14 @@ def test_an_input_that_never_moves_within_a_record_does_not_move_within_a_sequen
 def test_records_of_one_parameter_that_are_shorter_than_a_passage_are_used_as_they_are():
     source = excursions(with_parameter(0.1, 0, n=40_000), with_parameter(0.4, 1, n=200))
     assert {one.inputs[0, 1] for one in source.draw(20, seed=0)} == {0.1, 0.4}
+
+
+def test_inputs_go_beyond_what_was_recorded_and_no_plateau_is_judged_there():
+    usual, further = (Excursions.of([record()], ["a", "b"], ["y"], amplitude) for amplitude in (1.0, 1.5))
+    for near, far in zip(usual.draw(5, 1), further.draw(5, 1), strict=True):
+        assert_allclose(far.inputs - 0.5, 1.5 * (near.inputs - 0.5), atol=1e-3)  # b comes near 1 and 0
+        assert near.judged.any()
+        assert not far.judged.any()
+    parameter = replace(record(), values=record().values * [1.0, 0.0, 1.0] + [0.0, 2.0, 0.0])
+    sequence = next(Excursions.of([parameter], ["a", "b"], ["y"], 1.5).draw(1, 1))
+    assert set(sequence.inputs[:, 1]) == {2.0}  # what does not move in a record is a parameter
