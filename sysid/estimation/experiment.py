@@ -21,6 +21,7 @@ from sysid.models import (
     VectorScaling,
     beginning,
 )
+from sysid.models.beginning import window
 from sysid.traces import Trace
 
 
@@ -37,6 +38,8 @@ class Experiment:
         usable: Which samples are not masked, shape ``(n_samples,)``; ``None`` for all.
         past: Which samples of the history are measured and not masked, shape ``(n_past,)``; nothing is known of what
             came before them. ``None`` where the history is declared: the system had stood there for ever.
+        n_first: Samples, those of a measured history included, on which the state before the record is estimated when
+            a free run over it is scored; 0 where none is.
     """
 
     inputs: NDArray[np.float64]
@@ -45,6 +48,7 @@ class Experiment:
     weights: NDArray[np.float64] | None = None
     usable: NDArray[np.bool_] | None = None
     past: NDArray[np.bool_] | None = None
+    n_first: int = 0
 
     @classmethod
     def from_trace(
@@ -71,11 +75,12 @@ class Experiment:
             mapping.check_single()
             output = output[:, 0]
         history = replace(start.history(inputs, output, rest_output, trace.usable_samples), case=trace.name)
-        if start.kind is StartKind.ESTIMATED:
-            return cls._of(trace, inputs, output, Beginning(history=history, first=0), np.zeros(1, dtype=np.bool_))
         n = start.n_measured
+        if start.kind is StartKind.ESTIMATED:
+            whole = cls._of(trace, inputs, output, Beginning(history=history, first=0), np.zeros(1, dtype=np.bool_))
+            return replace(whole, n_first=window(1, trace.usable_samples, asked=n))
         past = trace.usable_samples[:n] if n else None
-        return cls._of(trace, inputs, output, Beginning(history=history, first=n), past)
+        return replace(cls._of(trace, inputs, output, Beginning(history=history, first=n), past), n_first=n)
 
     @classmethod
     def for_model(cls, trace: Trace, model: AbstractModel, start: Start) -> Experiment:

@@ -109,6 +109,10 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, unti
     """
     provider, solution, stepping = ready.provider, chosen.solution, ready.stepping
     softened = float("nan")
+    scored = None if stopped else provider.as_scored(solution.theta)
+    if scored is not None:
+        provider = scored
+        solution = _gone_on(provider, solution, training, until, iterations=training.max_iterations)
     if provider.form.n_outputs > 1 and not stopped:
         provider, solution = _weighed(provider, solution, training, until)
     if any(one.parameter.prior is not None for one in ready.named) and training.regularisation is None and not stopped:
@@ -208,10 +212,12 @@ def _sharpened(
     return best[1], best[2], best[0] / soft if soft > 1e-200 else 1.0
 
 
-def _gone_on(provider: EquationProvider, solution: Solution, training: Training, until: float) -> Solution:
+def _gone_on(
+    provider: EquationProvider, solution: Solution, training: Training, until: float, *, iterations: int = 0
+) -> Solution:
     """The same fit under records that are run otherwise."""
     seconds = max(until - now(), 0.0)
-    iterations = max(20, training.max_iterations // 5)
+    iterations = iterations or max(20, training.max_iterations // 5)
     engine = LevenbergMarquardt(
         termination=Termination(
             max_iterations=iterations, max_time_s=seconds, tolerance=training.tolerance, patience=10

@@ -16,6 +16,7 @@ from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.findings import Findings
+from sysid.estimation.first_samples import shown_note
 from sysid.estimation.grey_box.by_case import case_notes, with_cases
 from sysid.estimation.grey_box.finishing import Done, Ready, finished, settled
 from sysid.estimation.grey_box.layout import EquationLayout
@@ -404,6 +405,7 @@ def _told(
     n = max(done.provider.n_samples - model.n_parameters, 1)
     variance = 2.0 * solution.at.loss / n * model.scaling.error_unit
     notes += [step_note(model, done.stepping)] if model.lowered.n_continuous else []
+    notes += shown_note([one.name for one in done.provider.records if one.shows is not None])
     notes += case_notes(model, data[0])
     unread = [one for i, one in enumerate(model.mapping.inputs) if i not in {i for i, _ in model.lowered.lagged}]
     notes += [f"The equations do not read {', '.join(unread)}."] if unread else []

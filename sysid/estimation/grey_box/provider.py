@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.first_samples import is_another, moves_of_shown
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.kernels.arrays import forget_what_has_died_away
@@ -31,6 +32,9 @@ class Record:
         rest: What the programs read and the outputs of a system that has stood before the record.
         free: Whether its initial state is estimated; otherwise it is at rest.
         name: Of the record.
+        n_first: Samples on which its initial state is estimated when a run is scored; 0 where none is.
+        shows: Which of these are not masked, where it begins at the state that they show, and they do not count;
+            ``None`` where it begins at one of its own.
     """
 
     u: Array
@@ -39,6 +43,8 @@ class Record:
     rest: tuple[Array, Array]
     free: bool
     name: str = ""
+    n_first: int = 0
+    shows: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, experiment: Experiment, form: EquationForm) -> Record:
@@ -70,7 +76,14 @@ class Record:
             ),
             free=first.free and not stood,
             name=history.case,
+            n_first=first.n_first if first.free and not stood else 0,
         )
+
+    def from_shown(self) -> Record:
+        """The same record, begun at the state that its first samples show."""
+        roots = np.ones(len(self.output)) if self.roots is None else self.roots.copy()
+        roots[: self.n_first] = 0.0
+        return replace(self, roots=roots, shows=self.known[: self.n_first])
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -230,10 +243,40 @@ class EquationProvider(AbstractProvider):
         record, terms = self.records[number], form.terms
         if not record.free:
             return form.resting(*record.rest)
+        if record.shows is not None:
+            return self._shown(form, record, record.shows)
         x = terms.level.copy()
         free = self.open_states
         x[free] += terms.scale[free] * theta[self.places(number)]
         return x
+
+    @staticmethod
+    def _shown(form: EquationForm, record: Record, known: NDArray[np.bool_]) -> Array:
+        """The state that the first samples of a record show, as where a run is scored."""
+        n = record.n_first
+        return form.estimated(record.u[:n], record.output[:n], form.resting(*record.rest), known)
+
+    def as_scored(self, theta: Array) -> EquationProvider | None:
+        """The same residuals, begun as where runs are scored, where these would be others.
+
+        Args:
+            theta: What is trained.
+
+        Returns:
+            The residuals, which heed the initial states of such records no more; ``None`` where there are none.
+        """
+        shared, records = self.at(theta), list(self.records)
+        for i, record in enumerate(records):
+            if not record.n_first or record.shows is not None or not len(self.open_states):
+                continue
+            form, known = self.of_record(shared, theta, i), record.known
+            states = (self._shown(form, record, known[: record.n_first]), self.begin(form, theta, i))
+            with np.errstate(over="ignore", invalid="ignore"):
+                shown, trained = (record.errors(form.run(record.u, x), self.unit)[record.n_first :] for x in states)
+            if is_another(shown, trained):
+                records[i] = record.from_shown()
+        same = all(one is other for one, other in zip(records, self.records, strict=True))
+        return None if same else replace(self, records=tuple(records))
 
     def loss(self, theta: Array) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
@@ -271,7 +314,10 @@ class EquationProvider(AbstractProvider):
     def _blocks(self, theta: Array, number: int) -> Iterator[tuple[Array, Array, NDArray[np.int64]]]:
         """Weighted errors and their derivatives by some of what is trained, and which."""
         form, record, p = self.of_record(self.at(theta), theta, number), self.records[number], self.n_of_form
-        if record.free:
+        if record.shows is not None:
+            x, S = self._shown_moves(form, record, record.shows)
+            places = self.columns(number)
+        elif record.free:
             free = self.open_states
             x, S = self.begin(form, theta, number), np.zeros((form.lowered.n_states, p + len(free)))
             S[free, p + np.arange(len(free))] = form.terms.scale[free]
@@ -289,6 +335,18 @@ class EquationProvider(AbstractProvider):
             if record.roots is not None:
                 J = np.where(record.roots[rows, None, None] > 0.0, J * record.roots[rows, None, None], 0.0)
             yield record.errors(y, self.unit, rows), J, places
+
+    def _shown_moves(self, form: EquationForm, record: Record, known: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """The state that the first samples of a record show, and how it moves with parameters and weights."""
+        p, free, scale = self.n_of_form, self.open_states, form.terms.scale
+        x = self._shown(form, record, known)
+        S = np.zeros((len(x), p + len(free)))
+        S[free, p + np.arange(len(free))] = scale[free]
+        _, J = form.moved(record.u[: record.n_first], x.copy(), S, p)
+        rows = (J / self.unit[:, None])[known].reshape(-1, p + len(free))
+        S = np.zeros((len(x), p))
+        S[free] = scale[free, None] * moves_of_shown(rows[:, p:], rows[:, :p])
+        return x, S
 
     def paths(self, theta: Array) -> list[tuple[Array, Array]]:
         """What the programs read, and every state that the records visit.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.experiment import Experiment
+from sysid.estimation.first_samples import is_another, moves_of_shown
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.linear.segments import Segment
@@ -16,6 +17,7 @@ from sysid.estimation.networks.provider import BLOCK
 from sysid.kernels import neural_state_space as kernel
 from sysid.kernels.arrays import forget_what_has_died_away
 from sysid.models import NeuralForm
+from sysid.models.neural_form import Seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +26,8 @@ class _Record:
 
     ``target`` has shape ``(n_samples, n_outputs)``, ``root_weights`` one that goes with it. ``oldest`` is what the map
     to the initial state reads: scaled inputs, scaled outputs, 1. ``free`` says where the record's own initial state
-    stands among the parameters; ``None`` where the map gives it.
+    stands among the parameters; ``None`` where the map gives it. ``seen`` are the first samples where the record begins
+    at the state that they show, and they do not count: its own state among the parameters is then one near that.
     """
 
     u: NDArray[np.float64]
@@ -32,6 +35,7 @@ class _Record:
     root_weights: NDArray[np.float64] | None
     oldest: NDArray[np.float64]
     free: slice | None
+    seen: Seen | None = None
 
     def weighted(self, values: NDArray[np.float64], rows: slice = slice(None)) -> NDArray[np.float64]:
         """Residuals, or rows of the Jacobian, ``(n_samples, n_outputs, ...)``, with an axis for both and weights."""
@@ -55,11 +59,13 @@ class NeuralProvider(AbstractProvider):
         template: Sizes, flags, scaling and bounds; its parameters are ignored.
         experiments: The records.
         output_weights: Weight of each output's squared residuals, where they do not all count alike.
+        from_shown: Records that begin at the state that their first samples show, and not at one of their own.
     """
 
     template: NeuralForm
     experiments: tuple[Experiment, ...]
     output_weights: tuple[float, ...] | None = None
+    from_shown: frozenset[int] = frozenset()
     n_samples: int = field(init=False)
     n_parameters: int = field(init=False)
     """Those of the model and of the records' initial states."""
@@ -68,8 +74,8 @@ class NeuralProvider(AbstractProvider):
     def __post_init__(self) -> None:
         object.__setattr__(self, "experiments", tuple(self.experiments))
         records, at = [], self.template.sizes.count
-        for experiment in self.experiments:
-            record = self._record(experiment, at)
+        for number, experiment in enumerate(self.experiments):
+            record = self._record(experiment, at, number)
             records.append(record)
             at = at if record.free is None else record.free.stop
         object.__setattr__(self, "_records", tuple(records))
@@ -83,7 +89,7 @@ class NeuralProvider(AbstractProvider):
         per_sample = self.template.sizes.outputs // int(record.root_weights.shape[1])
         return per_sample * int(np.count_nonzero(record.root_weights))
 
-    def _record(self, experiment: Experiment, at: int) -> _Record:
+    def _record(self, experiment: Experiment, at: int, number: int) -> _Record:
         history, scaling = experiment.history, self.template.scaling
         # One measured sample is a system that has stood there, here as in every free run of the model.
         stood = len(history.output) == 1 and (experiment.past is None or bool(experiment.past.any()))
@@ -97,15 +103,23 @@ class NeuralProvider(AbstractProvider):
             roots = np.sqrt(np.concatenate([before, weights]))[:, None]
         if self.output_weights is not None:
             roots = np.sqrt(self.output_weights) * (np.ones((len(target), 1)) if roots is None else roots)
+        scaled, outputs, n = self.template.scaled(u), self.template.scaled_outputs(target), 0
+        if number in self.from_shown:
+            n = experiment.n_first
+            roots = np.ones((len(target), 1)) if roots is None else roots.copy()
+        seen = None if n == 0 or roots is None else Seen(scaled[:n], outputs[:n], roots[:n].max(axis=1) > 0.0)
+        if roots is not None:
+            roots[:n] = 0.0
         oldest = np.concatenate(
             [scaling.scale_inputs(history.inputs[:1])[0], self.template.scaled_outputs(history.output[:1])[0], [1.0]]
         )
         return _Record(
-            u=self.template.scaled(u),
-            target=self.template.scaled_outputs(target),
+            u=scaled,
+            target=outputs,
             root_weights=roots,
             oldest=oldest,
             free=slice(at, at + self.template.sizes.states) if experiment.free and not stood else None,
+            seen=seen,
         )
 
     @property
@@ -198,7 +212,7 @@ class NeuralProvider(AbstractProvider):
                 raw_gradient += weighted.T @ residual
                 raw_matrix += weighted.T @ weighted  # one array twice: NumPy calls syrk, half the flops
                 residuals[rows] = residual.reshape(-1, residuals.shape[1])
-            self._add(record, raw_gradient, raw_matrix, gradient, matrix)
+            self._add(self._of_begun(record, theta), raw_gradient, raw_matrix, gradient, matrix)
             for whole in residuals.T:
                 correlated += len(whole) * correlation_time(whole)
         return Linearisation(
@@ -307,25 +321,81 @@ class NeuralProvider(AbstractProvider):
     def _begin(self, record: _Record, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """State before the record's first sample. Not bounded: a bound here would hide the way back."""
         if record.free is not None:
-            return theta[record.free].copy()
+            own = theta[record.free].copy()
+            return own if record.seen is None else self._shown(record.seen, record, theta, own)
         E = theta[self.template.sizes.start].reshape(self.template.sizes.states, -1)
         return np.asarray(E @ record.oldest)
+
+    def _shown(
+        self, seen: Seen, record: _Record, theta: NDArray[np.float64], near: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The state that the first samples of a record show, sought from a state near it."""
+        form = self.at(theta)
+        return form.sought(
+            seen, form.resting(record.oldest[: form.sizes.inputs], record.oldest[form.sizes.inputs : -1]), [near]
+        )
+
+    def as_scored(self, theta: NDArray[np.float64]) -> NeuralProvider | None:
+        """The same residuals, begun as where runs are scored, where these would be others.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            The residuals, which heed the initial states of such records no more; ``None`` where there are none.
+        """
+        others = set[int]()
+        for number, (record, experiment) in enumerate(zip(self._records, self.experiments, strict=True)):
+            n = experiment.n_first
+            if n == 0 or record.free is None or record.seen is not None:
+                continue
+            own = theta[record.free]
+            seen = Seen(record.u[:n], record.target[:n], self.counted[number][:n])
+            shown, trained = (
+                record.weighted(self.at(theta).run(record.u, x) - record.target)[n * record.target.shape[1] :]
+                for x in (self._shown(seen, record, theta, own), own.copy())
+            )
+            if is_another(shown, trained):
+                others.add(number)
+        return replace(self, from_shown=self.from_shown | others) if others else None
+
+    @property
+    def shown(self) -> list[str]:
+        """Names of the records that begin at the state that their first samples show."""
+        return [self.experiments[number].history.case for number in sorted(self.from_shown)]
 
     @property
     def _n_raw(self) -> int:
         """Columns of a row as the kernel writes it: dynamics, the state that the record begins at, output."""
         return int(self.template.sizes.output.stop) + self.template.sizes.states
 
-    def _of_begun(self, record: _Record) -> tuple[slice, NDArray[np.float64]]:
+    def _of_begun(self, record: _Record, theta: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Which parameters the state that a record begins at comes from, and its derivative by them."""
-        identity = np.eye(self.template.sizes.states, dtype=np.float64)
+        identity, places = np.eye(self.template.sizes.states, dtype=np.float64), np.arange(self.n_parameters)
+        if record.seen is not None:
+            return self._shown_moves(record.seen, record, theta)
         if record.free is not None:
-            return record.free, identity
-        return self.template.sizes.start, np.kron(identity, record.oldest).astype(np.float64, copy=False)
+            return places[record.free], identity
+        return places[self.template.sizes.start], np.kron(identity, record.oldest).astype(np.float64, copy=False)
+
+    def _shown_moves(
+        self, seen: Seen, record: _Record, theta: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The parameters of both equations, and how the state that some samples show moves with them."""
+        sizes, known = self.template.sizes, seen.known
+        n, dynamic = sizes.states, sizes.dynamic.stop
+        S = np.zeros((n, dynamic + n))
+        S[:, dynamic:] = np.eye(n)
+        y, raw = np.empty(seen.output.shape), np.empty((*seen.output.shape, self._n_raw))
+        kernel.sensitivities(seen.inputs, self._begin(record, theta), S, *self.template.arguments(theta), y, raw)
+        rows = raw[known].reshape(-1, self._n_raw)
+        begun = slice(dynamic, dynamic + n)
+        D = moves_of_shown(rows[:, begun], np.delete(rows, begun, axis=1))
+        return np.r_[sizes.dynamic, sizes.output], D
 
     def _add(
         self,
-        record: _Record,
+        of_begun: tuple[NDArray[np.int64], NDArray[np.float64]],
         raw_gradient: NDArray[np.float64],
         raw_matrix: NDArray[np.float64],
         gradient: NDArray[np.float64],
@@ -336,14 +406,14 @@ class NeuralProvider(AbstractProvider):
         begun = slice(dynamic.stop, dynamic.stop + n)
         kept = np.r_[dynamic, begun.stop : self._n_raw]
         places = np.r_[dynamic, output]
-        to, D = self._of_begun(record)
+        to, D = of_begun
         gradient[places] += raw_gradient[kept]
         gradient[to] += D.T @ raw_gradient[begun]
         matrix[np.ix_(places, places)] += raw_matrix[np.ix_(kept, kept)]
         across = raw_matrix[kept, begun] @ D
-        matrix[places, to] += across
-        matrix[to, places] += across.T
-        matrix[to, to] += D.T @ raw_matrix[begun, begun] @ D
+        matrix[np.ix_(places, to)] += across
+        matrix[np.ix_(to, places)] += across.T
+        matrix[np.ix_(to, to)] += D.T @ raw_matrix[begun, begun] @ D
 
     def _raw(
         self, record: _Record, theta: NDArray[np.float64]
@@ -368,9 +438,9 @@ class NeuralProvider(AbstractProvider):
     ) -> Iterator[tuple[slice, NDArray[np.float64], NDArray[np.float64]]]:
         dynamic, output = self.template.sizes.dynamic, self.template.sizes.output
         begun = slice(dynamic.stop, dynamic.stop + self.template.sizes.states)
-        to, D = self._of_begun(record)
+        to, D = self._of_begun(record, theta)
         for rows, y, raw in self._raw(record, theta):
             J = np.zeros((*raw.shape[:2], len(theta)))
             J[..., dynamic], J[..., output] = raw[..., dynamic], raw[..., begun.stop :]
-            J[..., to] = raw[..., begun] @ D
+            J[..., to] += raw[..., begun] @ D
             yield rows, y, J

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
+from sysid.estimation.first_samples import shown_note
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
@@ -282,6 +283,11 @@ def _fit(
         )
         choice = windows.finished(own, choice, provider, theta, centre)
         candidates = in_place(candidates, race, choice.chosen)
+        multistart = own
+    if training.ensemble == 1 and not multistart.stop.is_set():
+        before = choice.chosen
+        provider, chosen = _as_scored(multistart, provider, before)
+        choice, candidates = replace(choice, chosen=chosen), in_place(candidates, before, chosen)
     others = experiments_of(records.selection, template.mapping, records.start, template.resting)
     status = multistart_status(
         choice.chosen,
@@ -292,8 +298,20 @@ def _fit(
     posterior = _posterior(choice.chosen, provider, records, whole)
     seconds = multistart.checkpoints.earlier_s + now() - began
     found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
-    notes = () if whole is None else whole.notes(choice)
+    notes = (*shown_note(provider.shown), *(() if whole is None else whole.notes(choice)))
     return replace(found, posterior=posterior, notes=(*found.notes, *notes))
+
+
+def _as_scored(
+    multistart: starts.Multistart, provider: NeuralProvider, before: starts.Candidate
+) -> tuple[NeuralProvider, starts.Candidate]:
+    """A candidate, trained on from the state that a run is scored from, where that run is another one."""
+    scored = provider.as_scored(before.solution.theta)
+    if scored is None:
+        return provider, before
+    own = replace(multistart, learnt=partial(learnt_map, scored))
+    iterations = multistart.training.max_iterations
+    return scored, starts.advanced(own, scored, before, name="as scored", iterations=iterations)
 
 
 def _ends(candidates: Sequence[starts.Candidate], training: Training) -> list[starts.Candidate]:
