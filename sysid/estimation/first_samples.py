@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 WORSE = 2.0
-"""Times the mean squared error of the trained run from which on the run from the shown state is another one. Both over
-the second half of a record: what has forgotten its first state by then is trained as it is."""
+"""Times the mean squared error of the trained run from which on the run from the shown state is another one."""
 
 MOST_NAMED = 3
 """Records that are told by name."""
@@ -33,17 +32,16 @@ DEPENDENT = 1e-9
 
 
 def is_another(shown: NDArray[np.float64], trained: NDArray[np.float64]) -> bool:
-    """Whether the run that is scored is another one than the run that was trained, and remains so.
+    """Whether the run that is scored is another one than the run that was trained.
 
     Args:
         shown: Errors from the state that the first samples show, at the samples after them.
         trained: The same from the state that was trained.
 
     Returns:
-        Whether its mean square is so much larger in the second half, by which a state is forgotten that ever is.
+        Whether its mean square is so much larger.
     """
-    later = slice(len(shown) // 2, None)
-    scored, own = float(np.sum(shown[later] ** 2)), float(np.sum(trained[later] ** 2))
+    scored, own = float(np.sum(shown**2)), float(np.sum(trained**2))
     return bool(np.isfinite(scored)) and scored > WORSE * own
 
 
@@ -69,10 +67,29 @@ def shown_note(names: Sequence[str]) -> list[str]:
     Returns:
         A sentence; nothing where there are none.
     """
-    if not names:
-        return []
-    which = ", ".join(names[:MOST_NAMED]) + f" and {len(names) - MOST_NAMED} more" * (len(names) > MOST_NAMED)
     return [
         f"The fit of {which} begins at the state that its first samples show, as the scored run does: the state that "
         "was trained with the parameters contradicted them, as where a model integrates and is not quite the plant."
+        for which in _which(names)
     ]
+
+
+def other_note(names: Sequence[str]) -> list[str]:
+    """What is told of records whose scored run is another one than the trained one, which no training has mended.
+
+    Args:
+        names: The records.
+
+    Returns:
+        A sentence; nothing where there are none.
+    """
+    return [
+        f"The run over {which} from the state that its first samples show, which is scored, is another one than was "
+        "trained, from a state of its own: its error is larger than that of the training."
+        for which in _which(names)
+    ]
+
+
+def _which(names: Sequence[str]) -> list[str]:
+    more = f" and {len(names) - MOST_NAMED} more" * (len(names) > MOST_NAMED)
+    return [", ".join(names[:MOST_NAMED]) + more] if names else []

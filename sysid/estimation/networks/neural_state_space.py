@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
-from sysid.estimation.first_samples import shown_note
+from sysid.estimation.first_samples import other_note, shown_note
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
@@ -284,9 +284,13 @@ def _fit(
         choice = windows.finished(own, choice, provider, theta, centre)
         candidates = in_place(candidates, race, choice.chosen)
         multistart = own
+    told = list[str]()
     if training.ensemble == 1 and not multistart.stop.is_set():
         before = choice.chosen
         provider, chosen = _as_scored(multistart, provider, before)
+        scored = provider.as_scored(multistart.learnt(chosen.solution.theta))
+        others = [] if scored is None else [name for name in scored.shown if name not in provider.shown]
+        told = [*shown_note(provider.shown), *other_note(others)]
         choice, candidates = replace(choice, chosen=chosen), in_place(candidates, before, chosen)
     others = experiments_of(records.selection, template.mapping, records.start, template.resting)
     status = multistart_status(
@@ -298,7 +302,7 @@ def _fit(
     posterior = _posterior(choice.chosen, provider, records, whole)
     seconds = multistart.checkpoints.earlier_s + now() - began
     found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
-    notes = (*shown_note(provider.shown), *(() if whole is None else whole.notes(choice)))
+    notes = (*told, *(() if whole is None else whole.notes(choice)))
     return replace(found, posterior=posterior, notes=(*found.notes, *notes))
 
 
@@ -306,12 +310,17 @@ def _as_scored(
     multistart: starts.Multistart, provider: NeuralProvider, before: starts.Candidate
 ) -> tuple[NeuralProvider, starts.Candidate]:
     """A candidate, trained on from the state that a run is scored from, where that run is another one."""
-    scored = provider.as_scored(before.solution.theta)
+    state = before.solution.state
+    theta, centre = map(multistart.learnt, (state.theta, state.prior.centre))
+    scored = provider.as_scored(theta)
     if scored is None:
         return provider, before
     own = replace(multistart, learnt=partial(learnt_map, scored))
     iterations = multistart.training.max_iterations
-    return scored, starts.advanced(own, scored, before, name="as scored", iterations=iterations)
+    after = starts.advanced(own, scored, before, name="as scored", iterations=iterations, begun=(theta, centre))
+    # The map to what is expected of a state is learnt anew: only what it comes to then counts.
+    better = scored.loss(own.learnt(after.solution.theta)) < scored.loss(theta)
+    return (scored, after) if better else (provider, before)
 
 
 def _ends(candidates: Sequence[starts.Candidate], training: Training) -> list[starts.Candidate]:
