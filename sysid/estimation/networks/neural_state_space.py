@@ -289,8 +289,8 @@ def _fit(
         before = choice.chosen
         provider, chosen = _as_scored(multistart, provider, before)
         scored = provider.as_scored(multistart.learnt(chosen.solution.theta))
-        others = [] if scored is None else [name for name in scored.shown if name not in provider.shown]
-        told = [*shown_note(provider.shown), *other_note(others)]
+        unmended = [] if scored is None else [name for name in scored.shown if name not in provider.shown]
+        told = [*shown_note(provider.shown), *other_note(unmended)]
         choice, candidates = replace(choice, chosen=chosen), in_place(candidates, before, chosen)
     others = experiments_of(records.selection, template.mapping, records.start, template.resting)
     status = multistart_status(
