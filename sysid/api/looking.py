@@ -21,6 +21,7 @@ from sysid.estimation.nonparametric.spectra import SpectralMethod
 from sysid.excitation import AbstractExcitation, excitation
 from sysid.ingest.writers import write_trace
 from sysid.models import Mapping
+from sysid.models.typed_fields import plain_values
 from sysid.reporting.advice_record import AdviceRecord
 from sysid.reporting.advice_words import lines
 from sysid.traces import Role, TraceSet
@@ -391,16 +392,7 @@ def excite(
         >>> found.values.shape, bool(0.0 <= found.values.min() and found.values.max() <= 10.0)
         ((1000, 1), True)
     """
-    found = excitation.excite(
-        kind,
-        sample_time=sample_time,
-        samples=samples,
-        duration=duration,
-        low=low,
-        high=high,
-        names=names,
-        units=units,
-        seed=seed,
-        **options,
-    )
+    numbers = {"sample_time": sample_time, "samples": samples, "duration": duration, "low": low, "high": high}
+    plain = plain_values({**numbers, "seed": seed, **options})
+    found = excitation.excite(kind, names=names, units=units, **plain)
     return Excitation(**{field.name: getattr(found, field.name) for field in dataclasses.fields(excitation.Excitation)})

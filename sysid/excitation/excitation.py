@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.excitation.kinds import kind_of
 from sysid.excitation.plan import AbstractExcitation, Plan, check
-from sysid.models.typed_fields import plain_values
 from sysid.traces import Channel, Trace
 from sysid.units import check_unit
 
@@ -124,9 +123,6 @@ def excite(
         >>> sorted(set(found.values[:, 0].tolist())), found.crest_factors
         ([2.0, 5.0], (1.0,))
     """
-    sample_time, samples, duration, low, high, seed, options = plain_values(
-        (sample_time, samples, duration, low, high, seed, options)
-    )
     labels = (names,) if isinstance(names, str) else tuple(names)
     if len(labels) != len(set(labels)) or not labels or not all(labels):
         raise ConfigError(
