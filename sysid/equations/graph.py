@@ -29,6 +29,8 @@ WITH_OWN = frozenset({machine.GREATER, machine.NOT_LESS, machine.SIGN, machine.S
 COMMUTES = frozenset({machine.ADD, machine.MUL, machine.MIN, machine.MAX})
 
 OPERATION = "operation"
+STEEP = 1e300
+"""Times what is not 0, it holds as a condition."""
 
 
 class Value(NamedTuple):
@@ -136,6 +138,8 @@ class Graph:
             The value.
         """
         found = self._simpler(operation, a, b)
+        if found is None and operation == machine.MUL and b is not None:
+            found = self._bent(a, b)
         if found is not None:
             return found
         if operation in COMMUTES and b is not None and b < a:
@@ -169,6 +173,29 @@ class Graph:
             return a
         if operation == machine.POW and second == 1.0:
             return a
+        return None
+
+    def _bent(self, a: int, b: int) -> int | None:
+        """A product in which ``abs(x)^n`` and ``x`` stand, as papers write ``sign(x)*abs(x)^(n + 1)``.
+
+        It is 0 at 0 for every ``n`` above -1, where ``abs(x)^n`` alone is infinite and the product not a number. The
+        power is therefore that of 1 there.
+        """
+        for product, x in ((a, b), (b, a)):
+            value = self.nodes[product]
+            if value.kind != OPERATION:
+                continue
+            if value.place == machine.POW:
+                base, power = value.reads
+                known, size = self.value_of(power), Value(kind=OPERATION, place=machine.ABS, reads=(x,))
+                if self.nodes[base] == size and (known is None or known < 0.0):
+                    away = self.apply(machine.MUL, base, self.constant(STEEP))
+                    base = self.apply(machine.SELECT, away, base, self.constant(1.0))
+                    return self._operation(machine.MUL, x, self.apply(machine.POW, base, power))
+            if value.place == machine.MUL:
+                for one, other in (value.reads, value.reads[::-1]):
+                    if (found := self._bent(one, x)) is not None:
+                        return self.apply(machine.MUL, found, other)
         return None
 
     def program(self, results: Sequence[int], counts: Mapping[str, int]) -> Program:

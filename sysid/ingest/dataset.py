@@ -17,6 +17,7 @@ from sysid.ingest.options import FileOptions
 from sysid.ingest.places import checked_file, files_folder
 from sysid.ingest.readers import READERS, choose_reader
 from sysid.ingest.reading import read_table
+from sysid.ingest.table import beside
 from sysid.traces import Trace, TraceSet
 
 DESCRIPTION_FILE = "dataset.yaml"
@@ -150,7 +151,7 @@ def load_described(
     for index, case in enumerate(chosen):
         if progress is not None:
             progress(case, index, len(chosen))
-        if generator is not None:
+        if generator is not None and description.cases[case].recipe is not None:
             traces.append(_generated(description, case, generator, store))
         else:
             traces.append(_read(description, case, path))
@@ -215,7 +216,8 @@ def unmade(name_or_path: str | Path, *, search: Sequence[Path] | None = None) ->
         find_generator(description.source.generator, where=path),
         TraceCache(folder=default_cache_folder()),
     )
-    cases = sum(not store.has(_key(description, case, generator)) for case in description.cases)
+    made = (case for case, said in description.cases.items() if said.recipe is not None)
+    cases = sum(not store.has(_key(description, case, generator)) for case in made)
     mean = store.mean_time(generator.name)
     seconds = None if mean is None else cases * mean
     return Unmade(cases=cases, generator=generator.name, seconds=seconds) if cases else None
@@ -278,8 +280,9 @@ def _read(description: DatasetDescription, case: str, path: Path) -> Trace:
         stop=wish.stop,
     )
     try:
+        paths = [checked_file(source, name, folder) for name in wish.files]
         return assemble(
-            read_table(checked_file(source, wish.file or "", folder), files=files, repairs=source.repairs),
+            beside([read_table(path, files=files, repairs=source.repairs) for path in paths]),
             wanted,
             files=files,
             grid=source.grid,

@@ -85,7 +85,7 @@ FOR_FILES = {"grid", "repairs", "folder_from", "sha256"}
 
 
 class SourceDescription(Options):
-    """Where the samples come from: a generator, or files on disk.
+    """Where the samples come from: a generator, files on disk, or some from the one and some from the others.
 
     Args:
         generator: Name of the generator.
@@ -108,14 +108,15 @@ class SourceDescription(Options):
 
     @model_validator(mode="after")
     def _one_kind(self) -> SourceDescription:
-        if (self.generator is None) == (self.files is None):
+        if self.generator is None and self.files is None:
             raise FieldError(
-                "source is neither a generator nor files" if self.files is None else "source is both",
-                expected="generator: <name>, or files: {...}",
+                "source is neither a generator nor files",
+                expected="generator: <name>, files: {...}, or both",
                 got=", ".join(sorted(self.model_fields_set)) or "nothing",
                 remedy="give one of them; files: {} reads files that say everything themselves",
             )
-        strangers = sorted(self.model_fields_set & (FOR_FILES if self.generator else {"options"}))
+        foreign = set() if self.files is not None else FOR_FILES
+        strangers = sorted(self.model_fields_set & (foreign if self.generator else {"options"}))
         if strangers:
             raise FieldError(
                 f"source.{strangers[0]} means nothing here",
@@ -132,7 +133,7 @@ class CaseDescription(Options):
     Args:
         role: What it may be used for: ``estimation``, ``selection``, ``validation`` or ``test``.
         recipe: What the generator makes it from.
-        file: The file that holds it, relative to the ``dataset.yaml``.
+        file: The file that holds it, relative to the ``dataset.yaml``; several where each holds some of its columns.
         start: Seconds, in the file's time: what is before is cut off.
         stop: Seconds, in the file's time: what is after is cut off.
         columns: Its columns, by channel, where they differ from those of ``source.files``.
@@ -144,7 +145,7 @@ class CaseDescription(Options):
 
     role: Role
     recipe: dict[str, Any] | None = None
-    file: str | None = None
+    file: str | Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     start: float | None = None
     stop: float | None = None
     columns: dict[str, ColumnOption] = Field(default_factory=dict)
@@ -168,6 +169,11 @@ class CaseDescription(Options):
         if self.columns:
             own["columns"] = {**files.columns, **self.columns}
         return files.model_copy(update=own)
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files that hold it."""
+        return (self.file,) if isinstance(self.file, str) else self.file or ()
 
     @model_validator(mode="after")
     def _interval(self) -> CaseDescription:
@@ -223,15 +229,16 @@ class DatasetDescription(Options):
     @model_validator(mode="after")
     def _cases_fit_source(self) -> DatasetDescription:
         for name, case in self.cases.items():
-            fields = case.model_fields_set
-            if self.source.generator is not None:
+            fields, source = case.model_fields_set, self.source
+            if source.generator is not None and (source.files is None or "file" not in fields):
                 needed, foreign = "recipe", fields - {"role", "recipe"}
             else:
                 needed, foreign = "file", fields & {"recipe"}
             if needed not in fields or foreign:
+                both = "a generator and files" if source.files is not None else "a generator"
                 raise FieldError(
                     f"case {name} does not fit the source",
-                    expected=f"{needed}, as the source is {'a generator' if self.source.generator else 'files'}",
+                    expected=f"{needed}, as the source is {both if source.generator else 'files'}",
                     got=", ".join(sorted(fields)),
                     remedy=f"write {needed}: ..." + (f" and remove {', '.join(sorted(foreign))}" if foreign else ""),
                 )

@@ -28,7 +28,7 @@ def files_folder(description: DatasetDescription, path: Path) -> Path:
         return path.parent
     folder = os.environ.get(name, "")
     if not folder or not Path(folder).is_dir():
-        files = sorted({case.file for case in description.cases.values() if case.file})
+        files = sorted({file for case in description.cases.values() for file in case.files})
         raise ConfigError(
             f"the records of {description.name} are not part of this package",
             where=f"environment variable {name}",

@@ -472,3 +472,33 @@ def _as_float64(array: NDArray[Any], *, where: str) -> NDArray[np.float64]:
             remedy="subtract the first value (a time origin, for example) before the export",
         )
     return converted
+
+
+def beside(tables: Sequence[RawTable]) -> RawTable:
+    """Files that each hold some columns of one record, as one table.
+
+    Args:
+        tables: One a file; the time of the first is that of all.
+
+    Returns:
+        The columns of all.
+
+    Raises:
+        ReaderError: If one has more rows than another, or a column of the same name.
+    """
+    first, *others = tables
+    for table in others:
+        if len(table) != len(first):
+            raise ReaderError(
+                "the files of one record have different lengths",
+                where=table.source,
+                expected=f"{len(first)} rows, as in {first.source.name}",
+                got=f"{len(table)} rows",
+                remedy="name the files that belong together, or give each case its rows",
+            )
+    return replace(
+        first,
+        columns=tuple(column for table in tables for column in table.columns),
+        others=tuple(column for table in tables for column in table.others),
+        notes=tuple(note for table in tables for note in table.notes),
+    )

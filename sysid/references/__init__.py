@@ -12,6 +12,7 @@ what a pipeline or a command names is run, never something that is found beside 
 ``events``     departures from the start as an excitation
 ``candidates`` new experiments, round by round, for active learning
 ``described``  what an FMU's model description proposes
+``hysteresis`` one of our own: the oscillator of Bouc and Wen
 =============  =====================================================================================
 
 Nothing is imported here: the process that a reference runs in needs little of it.

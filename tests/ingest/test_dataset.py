@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 from sysid.content import content_folders
 from sysid.errors import ConfigError, ReaderError, UserError
 from sysid.ingest import find_dataset, load_dataset
+from sysid.ingest.dataset import unmade
 from sysid.traces import Role
 
 
@@ -261,3 +263,43 @@ def test_rows_that_are_not_there_are_refused(tmp_path: Path, rows: str) -> None:
     (tmp_path / "dataset.yaml").write_text(text)
     with pytest.raises(UserError, match="rows"):
         load_dataset(tmp_path)
+
+
+MIXED = """
+name: both
+sample_time: 0.1
+channels:
+  - {name: u, unit: V}
+  - {name: y, unit: m}
+source:
+  generator: ramp
+  files: {time: {step: 0.1}, units: {u: V, y: m}}
+cases:
+  EST: {role: estimation, recipe: {slope: 1.0}}
+  TST: {role: test, file: [force.csv, seen.csv]}
+"""
+
+
+def test_some_cases_are_made_and_others_read_each_from_several_files(
+    ramp: Any, write: Callable[[str, str | bytes], Path], tmp_path: Path
+) -> None:
+    path = write("dataset.yaml", MIXED)
+    seen = np.arange(12.0)
+    for name, letter, factor in (("force.csv", "u", 1.0), ("seen.csv", "y", 2.0)):
+        write(name, "\n".join([letter, *map(str, factor * seen)]))
+    traces = load_dataset(path, cache=tmp_path / "cache")
+    assert ramp.calls == ["EST"]
+    assert dict(traces.roles) == {"EST": Role.ESTIMATION, "TST": Role.TEST}
+    np.testing.assert_array_equal(traces["TST"].values, np.column_stack([seen, 2.0 * seen]))
+    write("seen.csv", "y\n4\n5\n")
+    with pytest.raises(ReaderError, match=r"(?s)different lengths.*seen\.csv.*12 rows, as in force\.csv.*2 rows"):
+        load_dataset(path, cache=tmp_path / "cache")
+
+
+def test_only_what_a_generator_makes_is_still_to_be_made(
+    ramp: Any, write: Callable[[str, str | bytes], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
+    lacking = unmade(write("dataset.yaml", MIXED))
+    assert lacking is not None
+    assert lacking.cases == 1

@@ -114,10 +114,15 @@ REFUSED = {
         r"field channels.*at least 1 entry",
     ),
     "no cases": (GOOD[GOOD.index("cases:") : GOOD.index("inferred:")], "cases: {}\n", r"field cases.*at least 1 entry"),
-    "both kinds of source": (
+    "options without a generator": (
         "  files:\n",
-        "  generator: abdx\n  files:\n",
-        r"source is both.*field source.*generator: <name>, or files",
+        "  options: {a: 1}\n  files:\n",
+        r"source.options means nothing here.*field source.*options with a generator",
+    ),
+    "a file and a recipe for one case": (
+        "file: r1.csv",
+        "file: r1.csv, recipe: {a: 1}",
+        r"case R1 does not fit.*file, as the source is files.*remove recipe",
     ),
     "neither kind of source": (
         GOOD[GOOD.index("  files:") : GOOD.index("  grid:")],

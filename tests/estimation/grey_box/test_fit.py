@@ -218,3 +218,13 @@ def test_several_outputs_share_states_and_parameters_and_count_over_their_noise(
     assert again.model.simulate(u[:, None]).shape == (250, 2)
     interval = predict_interval(fit, record, start=ESTIMATED)
     assert interval.low.shape[1] == 2
+
+
+@pytest.mark.parametrize("written", ["g*abs(u)^(n - 1)*u", "u*(g*abs(u)^(n - 1))"])
+def test_a_bent_power_has_a_value_at_0_whatever_its_exponent(written: str) -> None:
+    """As the law of Bouc and Wen writes it: abs(0)^(n - 1) is infinite where n < 1, and the product is 0."""
+    u = np.array([0.0, *np.random.default_rng(0).normal(size=30), 0.0])
+    record = a_trace(u, 2.0 * np.sign(u) * np.abs(u) ** 0.7)
+    fit = fitted([record], f"y = {written}", parameters={"g": 1, "n": {"start": 1.2, "low": 0.3}}, start=Start())
+    assert isinstance(fit.model, GreyBoxModel)
+    assert fit.model.parameters == pytest.approx({"g": 2.0, "n": 0.7}, abs=1e-6)
