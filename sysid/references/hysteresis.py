@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 from scipy.interpolate import CubicSpline
 
-from sysid.excitation import excite
+from sysid.excitation import Multisine, excite
 from sysid.field_checks import check
 from sysid.own_folders import keep_kernels_where_it_is_allowed
 from sysid.traces import Channel, Trace
@@ -148,9 +148,9 @@ def generate(
         The trace.
     """
     asked, wish = check(_Recipe, dict(recipe), where=case), check(_Options, dict(options), where="source.options")
-    sines = {"band": wish.band, "iterations": 0, "samples": asked.samples, "seed": asked.seed}
-    shape = excite("multisine", sample_time=sample_time, low=-1.0, high=1.0, **sines).values[:, 0]
-    force = wish.rms / np.std(shape) * shape
+    sines = Multisine(band=wish.band, iterations=0)
+    shape = excite(sines, sample_time=sample_time, samples=asked.samples, low=-1.0, high=1.0, seed=asked.seed)
+    force = wish.rms / np.std(shape.values[:, 0]) * shape.values[:, 0]
     rng = np.random.default_rng([asked.seed, 1])
     seen = settled(force, sample_time) + wish.noise * rng.standard_normal(asked.samples)
     return Trace(name=case, sample_time=sample_time, channels=channels, values=np.column_stack([force, seen]))
