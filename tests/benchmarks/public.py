@@ -48,7 +48,7 @@ ROWS: dict[str, dict[str, tuple[str, float, str]]] = {
     },
     "bouc-wen": {
         "multisine": ("um", 1e6, "polynomial state space 12.1 on one of the two (arXiv 1610.09138)"),
-        "sweep": ("um", 1e6, "the same"),
+        "sweep": ("um", 1e6, "polynomial state space 12.1 on one of the two (arXiv 1610.09138)"),
     },
     "hair-dryer": {"test": ("", 1.0, "")},
     "emps": {"test": ("mm", 1e3, "best 2.64 (dynoNet), continuous SUBNET 4.61, linear 5.53; n = 20")},
@@ -96,7 +96,7 @@ def benchmark(file: Path, seeds: list[int]) -> None:
     for case, (unit, scale, published) in rows.items():
         values = [scale * value for value in errors[case]]
         spread = f"seeds {', '.join(map(str, seeds))}: {', '.join(f'{value:.3g}' for value in values)}"
-        known = f"{published} ({SOURCE})" if published else ""
+        known = f"{published} ({SOURCE})" if published and "arXiv" not in published else published
         found(
             f"{data.name}, {case}", median(values), unit, published=known, note=f"median; {spread}; {declared} declared"
         )
