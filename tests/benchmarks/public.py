@@ -50,6 +50,11 @@ ROWS: dict[str, dict[str, tuple[str, float, str]]] = {
         "multisine": ("um", 1e6, "polynomial state space 12.1 on one of the two (arXiv 1610.09138)"),
         "sweep": ("um", 1e6, "polynomial state space 12.1 on one of the two (arXiv 1610.09138)"),
     },
+    "wiener-hammerstein": {
+        "test": ("mV", 1e3, "best 0.241 (SUBNET), 0.42 and 0.452 of others, maybe parted as in 2009"),
+        "test of 2009": ("mV", 1e3, ""),
+    },
+    "f16": dict.fromkeys(("level 2", "level 4", "level 6"), ("m/s^2", 1.0, "")),
     "hair-dryer": {"test": ("", 1.0, "")},
     "emps": {"test": ("mm", 1e3, "best 2.64 (dynoNet), continuous SUBNET 4.61, linear 5.53; n = 20")},
 }
