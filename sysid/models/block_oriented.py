@@ -81,8 +81,9 @@ class HammersteinWiener(BlockStructure):
 
     With a curve before it alone it is a Hammerstein model, with one behind it alone a Wiener model. Learnt curves are
     written ``saturation``, ``dead zone``, ``polynomial 3`` (degree), ``piecewise 8`` (straight pieces, breakpoints),
-    ``network 5`` (neurons); known ones ``absolute``, ``{saturation: [0, 5]}``, ``{dead zone: [-1, 1]}`` and
-    ``{table: [[x, y], ...]}`` in units: of the input before the block, of the output behind it.
+    ``rounded 4`` (the same with rounded corners), ``network 5`` (neurons); known ones ``absolute``,
+    ``{saturation: [0, 5]}``, ``{dead zone: [-1, 1]}`` and ``{table: [[x, y], ...]}`` in units: of the input before the
+    block, of the output behind it.
 
     Args:
         states: States of the linear block; those of several inputs share its poles.
@@ -153,8 +154,12 @@ class WienerHammerstein(BlockStructure):
     Args:
         first: States of the block before the curve; those of several inputs share its poles.
         second: States of the block behind it, which answers within the sample.
-        curve: The curve, learnt: ``saturation``, ``dead zone``, ``polynomial 3``, ``piecewise 8`` or ``network 5``.
+        curve: The curve, learnt: ``saturation``, ``dead zone``, ``polynomial 3``, ``piecewise 8``, ``rounded 4`` or
+            ``network 5``.
         delays: Dead time in samples, for all inputs or one each; 0 for an output that answers within the sample.
+        between: Places between two samples at which the curve acts too. What is bent in continuous time has harmonics
+            that samples alone fold back into the band: a circuit, or a process that is sampled slowly. Not for a
+            network.
 
     Raises:
         ConfigError: If a field cannot be used.
@@ -168,6 +173,7 @@ class WienerHammerstein(BlockStructure):
     second: Annotated[int, IntRange(low=1, high=6)]
     curve: Any = "piecewise 8"
     delays: Any = 1
+    between: Annotated[int, IntRange(low=0, high=4)] = 0
 
     kind = "WienerHammerstein"
 
@@ -180,13 +186,19 @@ class WienerHammerstein(BlockStructure):
                 "what lies between two blocks has no unit", where="curve", expected="a curve that is learnt",
                 got=str(curve), remedy="write for example curve: piecewise 8",
             )  # fmt: skip
+        if self.between and curve.kind == "network":
+            raise ConfigError(
+                "a network acts at the samples alone", where="curve", got=str(curve),
+                expected="with between, a curve whose parameters are the same at every place",
+                remedy="write for example curve: rounded 6",
+            )  # fmt: skip
         object.__setattr__(self, "curve", curve)
         object.__setattr__(self, "delays", _delays(self.delays))
 
     @property
     def label(self) -> str:
         """States of both blocks, and the curve."""
-        return f"WH {self.first}/{self.second}, {self.curve}"
+        return f"WH {self.first}/{self.second}, {self.curve}{f', {self.between} between' if self.between else ''}"
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
@@ -196,4 +208,5 @@ class WienerHammerstein(BlockStructure):
             "second": self.second,
             "curve": self.curve.to_value(),
             "delays": self.delays if isinstance(self.delays, int) else list(self.delays),
+            **({"between": self.between} if self.between else {}),
         }

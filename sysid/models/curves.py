@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field, replace
@@ -14,7 +15,7 @@ from sysid.errors import ConfigError, shortened
 from sysid.models.grey_box import Parameter, Table
 
 NONE = "none"
-SIZES = {"polynomial": (2, 9), "piecewise": (1, 50), "network": (1, 100)}
+SIZES = {"polynomial": (2, 9), "piecewise": (1, 50), "rounded": (1, 50), "network": (1, 100)}
 """Curves with a size: degree, breakpoints, neurons; the least and the most."""
 LIMITED = {"saturation": 0.8, "dead zone": 0.1}
 """Curves with two limits, and where these start: shares of the range of what they see."""
@@ -23,6 +24,8 @@ STEEP = 0.02
 """Part of its largest bend that the slope of a curve has to be, if it is to begin as that of some values."""
 SMALL = 1e-3
 """Part of others below which a start is 0."""
+WIDTH, SHARPEST = 0.1, 0.003
+"""How wide a rounded breakpoint starts and how sharp it may get, as shares of the range of what the curve sees."""
 REACH = 0.9
 """Breakpoints start evenly between plus and minus this share of the range of what the curve sees."""
 
@@ -32,8 +35,8 @@ class Curve:
     """A static curve.
 
     Args:
-        kind: ``none``, ``absolute``, ``saturation``, ``dead zone``, ``polynomial``, ``piecewise``, ``network`` or
-            ``table``.
+        kind: ``none``, ``absolute``, ``saturation``, ``dead zone``, ``polynomial``, ``piecewise``, ``rounded``,
+            ``network`` or ``table``.
         size: Degree, breakpoints or neurons.
         limits: Limits that are given, in the channel's unit; ``None`` where they are learnt.
         points: Of a table that is given.
@@ -100,7 +103,7 @@ class Curve:
         """Whether its numbers are known, in units."""
         return self.limits is not None or self.kind in {"table", "absolute"}
 
-    def like(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, tuple[float, ...]] | None:
+    def like(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, dict[str, float]] | None:
         """Where a learnt curve begins that comes close to some values: ``scale * (x + weights @ bends) + constant``.
 
         Args:
@@ -108,20 +111,24 @@ class Curve:
             y: Shape ``(n,)``.
 
         Returns:
-            The scale and the weights; ``None`` for a curve that is not linear in what it learns, or that has no slope
-            where it is straight.
+            The scale, and where parameters begin, by the ends of their names; ``None`` for a curve that is not linear
+            in what it learns, or that has no slope where it is straight.
         """
         if self.kind == "polynomial":
             bends = [x**n for n in range(2, self.size + 1)]
         elif self.kind == "piecewise":
             bends = [np.maximum(x - place, 0.0) for place in _places(self.size)]
+        elif self.kind == "rounded":
+            bends = [WIDTH * np.logaddexp(0.0, (x - place) / WIDTH) for place in _places(self.size)]
         else:
             return None
         scale, *weights = np.linalg.lstsq(np.column_stack([x, *bends, np.ones(len(x))]), y, rcond=None)[0][:-1]
         steepest = float(np.abs(weights).max(initial=abs(scale)))
         if not STEEP * steepest < abs(scale):
             return None
-        return float(scale), tuple(float(one / scale) for one in weights)
+        word, first = ("c", 2) if self.kind == "polynomial" else ("slope", 1)
+        found = {f"{word}{n}": sizeable(one / scale, 1.0) for n, one in enumerate(weights, start=first)}
+        return float(scale), found
 
     def to_value(self) -> Any:
         """As it is written."""
@@ -181,36 +188,32 @@ class Text:
         self.lines.append(f"{found} = {right}")
         return found
 
-    def estimated(self, wanted: str, start: float, *, curve: bool = False, prior: float | None = None) -> str:
+    def estimated(
+        self, wanted: str, start: float, *, curve: bool = False, prior: float | None = None, low: float = -math.inf
+    ) -> str:
         """A parameter; its name."""
         found = self.name(wanted)
-        self.parameters.append(Parameter(name=found, start=float(start), prior=prior))
+        self.parameters.append(Parameter(name=found, start=float(start), prior=prior, low=low))
         if curve:
             self.curved.add(found)
         return found
 
-    def curve(self, curve: Curve, x: str, tag: str, weights: Sequence[float] | None = None) -> str:
+    def curve(self, curve: Curve, x: str, tag: str, begun: Dict[str, float] | None = None) -> str:
         """What a curve makes of a value.
 
         Args:
             curve: The curve.
             x: The value: in units where the curve is given, else some -1 to 1.
             tag: Part of the names of its parameters.
-            weights: Where what bends a learnt curve begins (:meth:`Curve.like`); the identity by default.
+            begun: Where parameters of a learnt curve begin (:meth:`Curve.like`); the identity by default.
 
         Returns:
             The expression.
         """
         found = _CURVES[curve.kind](self, curve, x, tag)
-        if weights is not None:
-            bends = [at for at, one in enumerate(self.parameters) if one.name in self._bends(curve, tag)]
-            for at, value in zip(bends, weights, strict=True):
-                self.parameters[at] = replace(self.parameters[at], start=sizeable(value, 1.0))
+        starts = {self.name(f"{tag}_{end}"): value for end, value in (begun or {}).items()}
+        self.parameters = [replace(one, start=starts.get(one.name, one.start)) for one in self.parameters]
         return found
-
-    def _bends(self, curve: Curve, tag: str) -> set[str]:
-        word, first = ("c", 2) if curve.kind == "polynomial" else ("slope", 1)
-        return {self.name(f"{tag}_{word}{n}") for n in range(first, curve.size + 1)}
 
 
 def sizeable(value: float, among: float) -> float:
@@ -271,6 +274,17 @@ def _piecewise(text: Text, curve: Curve, x: str, tag: str) -> str:
     return " + ".join([x, *terms])
 
 
+def _rounded(text: Text, curve: Curve, x: str, tag: str) -> str:
+    """Straight pieces whose corners are rounded: ``s log(1 + exp((x - at)/s))``, written so that nothing overflows."""
+    terms = []
+    for i, place in enumerate(_places(curve.size), start=1):
+        slope = text.estimated(f"{tag}_slope{i}", 0.0, curve=True)
+        at = text.estimated(f"{tag}_at{i}", place, curve=True)
+        width = text.estimated(f"{tag}_width{i}", WIDTH, curve=True, low=SHARPEST)
+        terms.append(f"{slope}*(max({x} - {at}, 0) + {width}*log(1 + exp(-abs({x} - {at})/{width})))")
+    return " + ".join([x, *terms])
+
+
 def _table(text: Text, curve: Curve, x: str, tag: str) -> str:
     name = text.name(f"{tag}_table")
     text.tables.append((name, curve.points))
@@ -284,6 +298,7 @@ _CURVES: dict[str, Callable[[Text, Curve, str, str], str]] = {
     "dead zone": _limited("deadzone"),
     "polynomial": _polynomial,
     "piecewise": _piecewise,
+    "rounded": _rounded,
     "network": lambda text, curve, x, tag: f"{x} + net({x}, neurons={curve.size}, scale=1)",  # noqa: ARG005
     "table": _table,
 }

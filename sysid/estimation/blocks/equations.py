@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -58,13 +59,56 @@ def wiener_hammerstein(
     behind = replace(pair.behind, gains=scale * pair.behind.gains, direct=scale * pair.behind.direct)
     drift = 0.0 if begun.integrates else None
     between = text.define("between", write_block(text, pair.before, inputs, "g1", known=True, fed=drift))
-    bent = text.define("bent", text.curve(structure.curve, between, "f", bends))
+    acts = text.curve(structure.curve, between, "f", bends)
+    bent = text.define("bent", acts)
+    more = _between(text, structure.between, pair.before, inputs, names=(between, bent), acts=acts)
     level = text.estimated("level", begun.level)
-    linear = write_block(text, behind, [(bent, True)], "g2")
+    behind = replace(
+        behind,
+        gains=np.pad(behind.gains, ((0, 0), (0, len(more)))),
+        direct=np.pad(behind.direct, (0, len(more))),
+    )
+    linear = write_block(text, behind, [(bent, True), *((one, True) for one in more)], "g2")
     scaling = begun.scaling
     right = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}*({linear} + {level})"
     text.lines.append(f"{quoted(mapping.output)} = {right}")
     return _grey(text), frozenset(text.curved)
+
+
+def _between(
+    text: Text, places: int, before: Block, inputs: Sequence[Input], *, names: tuple[str, str], acts: str
+) -> list[str]:
+    """What the curve makes of what lies between two samples, at some places on the way to the next.
+
+    There the first block's output is a sum of its states and of what it reads, with weights of its own. It begins as
+    far on the way as the first state goes until the next sample.
+
+    Args:
+        text: The equations.
+        places: How many places there are.
+        before: The first block.
+        inputs: What it reads.
+        names: Of what lies between at the sample, and of what the curve makes of it.
+        acts: The curve of it.
+
+    Returns:
+        Names of what the curve makes of it at each place.
+    """
+    section = before.sections[0]
+    moves = [(section[0] if len(section) == 1 else -section[0]) - 1.0, *np.eye(1, before.states - 1)[0].tolist()]
+    terms = [text.name(f"g1_x{i + 1}") for i in range(before.states)] + [read for read, _ in inputs]
+    between, bent = names
+    found = []
+    for place in range(1, places + 1):
+        share = place / (places + 1)
+        weights = [
+            text.estimated(f"g1_w{place}_{i}", share * move)
+            for i, move in enumerate([*moves, *before.gains[0].tolist()], start=1)
+        ]
+        ahead = " + ".join(f"{weight}*{term}" for weight, term in zip(weights, terms, strict=True))
+        here = text.define(f"{between}_{place}", f"{between} + {ahead}")
+        found.append(text.define(f"{bent}_{place}", re.sub(rf"\b{between}\b", here, acts)))
+    return found
 
 
 Input = tuple[str, bool]

@@ -111,6 +111,45 @@ def sandwich(u: np.ndarray) -> np.ndarray:
     return np.asarray(lfilter([0.0, 0.5], [1.0, -0.5], block(u) + 2.0 * block(u) ** 3))
 
 
+def circuit(u: np.ndarray) -> np.ndarray:
+    """Two first-order filters around a diode, in eight steps a sample; the input is held."""
+    y, x1, x2 = np.empty(len(u)), 0.0, 0.0
+    for k, held in enumerate(u):
+        y[k] = x2
+        for _ in range(8):
+            x1, x2 = x1 + 0.125 * 0.8 * (held - x1), x2 + 0.125 * 0.3 * (min(x1, 0.2) - x2)
+    return y
+
+
+def test_a_curve_that_acts_between_the_samples_is_followed_there() -> None:
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(400)
+    trace = a_trace(steps(1), circuit(steps(1)) + noise)
+    fits = [
+        fit_wiener_hammerstein(
+            [trace], MAPPING, WienerHammerstein(first=1, second=1, curve="piecewise 1", between=between), ONE
+        )
+        for between in (0, 2)
+    ]
+    at_samples, between = (error(fit, circuit) for fit in fits)
+    assert at_samples > 0.01
+    assert between < at_samples / 3.0
+    assert fits[1].model.structure.label == "WH 1/1, piecewise 1, 2 between"
+
+
+def test_a_rounded_corner_is_as_wide_as_it_was() -> None:
+    def system(u: np.ndarray) -> np.ndarray:
+        return block(u - 0.12 * (np.logaddexp(0.0, (u - 0.3) / 0.15) - np.logaddexp(0.0, -2.0)))
+
+    fit = fit_hammerstein_wiener(
+        [a_trace(steps(1), system(steps(1)))], MAPPING, HammersteinWiener(states=2, input="rounded 1"), ONE
+    )
+    assert error(fit, system) < 1e-4
+    model = fit.model
+    assert isinstance(model, BuiltModel)
+    half = np.ptp(steps(1)) / 2.0  # widths are shares of what the curve ranges over
+    assert model.parameters["f_width1"] * half == pytest.approx(0.15, rel=0.02)
+
+
 def test_poles_are_parted_around_the_curve() -> None:
     u = steps(1)
     structure = WienerHammerstein(first=2, second=1, curve="polynomial 3")
@@ -237,6 +276,8 @@ def test_structures_refuse_what_does_not_fit_the_inputs() -> None:
         HammersteinWiener(states=1, input=["none", "none", "none"]).check_mapping(two)
     with pytest.raises(ConfigError, match="the dead times do not match the inputs"):
         WienerHammerstein(first=1, second=1, delays=[1]).check_mapping(two)
+    with pytest.raises(ConfigError, match="a network acts at the samples alone"):
+        WienerHammerstein(first=1, second=1, curve="network 3", between=1)
     with pytest.raises(ConfigError, match="what lies between two blocks has no unit"):
         WienerHammerstein(first=1, second=1, curve={"saturation": [0, 1]})
     with pytest.raises(ConfigError, match="too many candidate terms"):

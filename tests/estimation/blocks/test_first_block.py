@@ -67,13 +67,14 @@ def test_a_block_reads_its_input_within_the_sample_only_where_it_may() -> None:
         ("polynomial 3", lambda x: 2.0 * x + 3.0 * x**2 - x**3 + 5.0, (2.0, [1.5, -0.5])),
         ("polynomial 2", lambda x: 0.5 * x, (0.5, [0.0])),
         ("piecewise 1", lambda x: 2.0 * x - np.maximum(x - 0.01, 0.0), (2.0, [-0.5])),
+        ("rounded 1", lambda x: 2.0 * x - 0.1 * np.log(1.0 + np.exp((x - 0.01) / 0.1)), (2.0, [-0.5])),
     ],
 )
 def test_a_learnt_curve_begins_like_some_values(written: str, y, wanted) -> None:  # type: ignore[no-untyped-def]
     x = np.linspace(-1.0, 1.0, 50)
-    scale, weights = Curve.parse(written, "curve").like(x, y(x)) or (0.0, ())
+    scale, begun = Curve.parse(written, "curve").like(x, y(x)) or (0.0, {})
     assert scale == pytest.approx(wanted[0])
-    assert list(weights) == pytest.approx(wanted[1], abs=1e-12)
+    assert list(begun.values()) == pytest.approx(wanted[1], abs=1e-12)
 
 
 @pytest.mark.parametrize(("written", "y"), [("saturation", np.abs), ("network 3", np.abs), ("polynomial 2", np.square)])
