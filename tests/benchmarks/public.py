@@ -59,8 +59,8 @@ ROWS: dict[str, dict[str, tuple[str, float, str]]] = {
     "emps": {"test": ("mm", 1e3, "best 2.64 (dynoNet), continuous SUBNET 4.61, linear 5.53; n = 20")},
 }
 """By pipeline and case: the unit, what it is of ours, and published figures."""
-DECLARED = {"-equations": "its equations", "-blocks": "its blocks"}
-"""By what the name of a pipeline ends with, what it declares of its record."""
+EQUATIONS = "-equations"
+"""What the name of a pipeline ends with that declares the equations of its record."""
 
 
 def option(name: str, default: list[str]) -> list[str]:
@@ -85,8 +85,8 @@ def benchmark(file: Path, seeds: list[int]) -> None:
     data = read_description(find_dataset(str(read_yaml(file)["data"])))
     for name, digest in data.source.sha256.items():
         read(name, digest)
-    ending = next((one for one in DECLARED if file.stem.endswith(one)), "")
-    rows, declared = ROWS[file.stem.removesuffix(ending)], DECLARED.get(ending, "nothing")
+    rows = ROWS[file.stem.removesuffix(EQUATIONS)]
+    declared = "its equations" if file.stem.endswith(EQUATIONS) else "nothing"
     errors: dict[str, list[float]] = {case: [] for case in rows}
     print(f"{data.name}: {read_yaml(file)['description']}")
     with tempfile.TemporaryDirectory() as scratch:
