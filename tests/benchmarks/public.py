@@ -86,7 +86,9 @@ def benchmark(file: Path, seeds: list[int]) -> None:
     for name, digest in data.source.sha256.items():
         read(name, digest)
     rows = ROWS[file.stem.removesuffix(EQUATIONS)]
-    declared = "its equations" if file.stem.endswith(EQUATIONS) else "nothing"
+    by_equations = file.stem.endswith(EQUATIONS)
+    declared = "its equations" if by_equations else "nothing"
+    named = f"{data.name} by equations" if by_equations else data.name
     errors: dict[str, list[float]] = {case: [] for case in rows}
     print(f"{data.name}: {read_yaml(file)['description']}")
     with tempfile.TemporaryDirectory() as scratch:
@@ -103,7 +105,7 @@ def benchmark(file: Path, seeds: list[int]) -> None:
         spread = f"seeds {', '.join(map(str, seeds))}: {', '.join(f'{value:.3g}' for value in values)}"
         known = f"{published} ({SOURCE})" if published and "arXiv" not in published else published
         found(
-            f"{data.name}, {case}", median(values), unit, published=known, note=f"median; {spread}; {declared} declared"
+            f"{named}, {case}", median(values), unit, published=known, note=f"median; {spread}; {declared} declared"
         )
 
 
