@@ -104,9 +104,7 @@ def benchmark(file: Path, seeds: list[int]) -> None:
         values = [scale * value for value in errors[case]]
         spread = f"seeds {', '.join(map(str, seeds))}: {', '.join(f'{value:.3g}' for value in values)}"
         known = f"{published} ({SOURCE})" if published and "arXiv" not in published else published
-        found(
-            f"{named}, {case}", median(values), unit, published=known, note=f"median; {spread}; {declared} declared"
-        )
+        found(f"{named}, {case}", median(values), unit, published=known, note=f"median; {spread}; {declared} declared")
 
 
 def main() -> None:
