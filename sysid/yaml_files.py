@@ -24,12 +24,17 @@ MOST_VALUES = 1_000_000
 """In a file, an alias counting for all that it stands for."""
 
 
+_MERGE = "tag:yaml.org,2002:merge"
+
+
 class _Plain(yaml.constructor.SafeConstructor):
     """Plain data only, YAML 1.2 scalars, no key twice."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: set[object] = set()
         for key_node, _ in node.value:
+            if key_node.tag == _MERGE:
+                continue
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, str | int | float | bool | None):
                 raise yaml.constructor.ConstructorError(None, None, "a key must be plain text", key_node.start_mark)
@@ -74,6 +79,7 @@ for _kind, (_pattern, _first) in _RESOLVERS.items():
     # The empty first character stands for an empty scalar, which is null.
     _letters = [letter if letter != "\0" else "" for letter in _first]
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(_pattern), _letters)
+_Loader.add_implicit_resolver(_MERGE, re.compile(r"^<<$"), ["<"])
 _Loader.yaml_constructors = {
     **_Loader.yaml_constructors,
     "tag:yaml.org,2002:int": _Loader.construct_core_int,

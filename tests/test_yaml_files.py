@@ -115,3 +115,17 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
         file.truncate(2**30)
     with pytest.raises(ConfigError, match="larger than 4 MB"):
         read_yaml(path)
+
+
+def test_a_mapping_is_merged_into_another_which_goes_first() -> None:
+    text = "base: &b {gain: 1, k: {start: 2}}\nmore: {gain: 3, <<: *b}\nagain: {<<: [*b], c: 4}\nword: '<<'"
+    assert parse_yaml(text, where="x") == {
+        "base": {"gain": 1, "k": {"start": 2}},
+        "more": {"gain": 3, "k": {"start": 2}},
+        "again": {"gain": 1, "k": {"start": 2}, "c": 4},
+        "word": "<<",
+    }
+    with pytest.raises(ConfigError, match="twice"):
+        parse_yaml("base: &b {gain: 1}\nmore: {<<: *b, gain: 3, gain: 4}", where="x")
+    with pytest.raises(ConfigError, match="merg"):
+        parse_yaml("more: {<<: 3}", where="x")

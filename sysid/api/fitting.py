@@ -43,7 +43,7 @@ def load(source: str | Path) -> TraceSet:
         return load_dataset(source)
     with remedies_of_a_file(path):
         trace = read_trace(path)
-    return TraceSet(name=path.stem, traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
+    return TraceSet(name=trace.name, traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
 
 
 def fit(

@@ -15,7 +15,16 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.field_checks import check
 from sysid.ingest.assemble import Wanted, assemble
-from sysid.ingest.frames import INDEX, as_array, check_distinct, check_labels, check_rows, columns_by_name, not_numbers
+from sysid.ingest.frames import (
+    INDEX,
+    as_array,
+    check_distinct,
+    check_labels,
+    check_rows,
+    columns_by_name,
+    index_of,
+    not_numbers,
+)
 from sysid.ingest.headers import parse_header, unit_in_name
 from sysid.ingest.in_python import remedies_in_python
 from sysid.ingest.in_units import stamps_in_seconds
@@ -199,7 +208,7 @@ def _columns(
     if isinstance(one, tuple) and len(one) == 2:
         check_labels(one, ("u", "y"), where=where)
         u, y = (_two_dimensional(part, where=where) for part in one)
-        return dict(zip([*_given(inputs, u, "u"), *_given(outputs, y, "y")], [*u.T, *y.T], strict=True))
+        return index_of(one) | dict(zip([*_given(inputs, u, "u"), *_given(outputs, y, "y")], [*u.T, *y.T], strict=True))
     return _of_matrix(_two_dimensional(one, where=where), inputs, outputs, where=where)
 
 

@@ -76,7 +76,7 @@ def assemble(
         TraceError: If something is wrong with the samples and its repair was not asked for.
         ConfigError: If the options do not fit the file.
     """
-    record = _select(table, wanted, files)
+    record = _select(table, wanted, files, repairs)
     source = table.source
     del table  # its columns stand in the record now, and may be large
     for step in repair.STEPS:
@@ -108,7 +108,7 @@ def assemble(
     )
 
 
-def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
+def _select(table: RawTable, wanted: Wanted, files: FileOptions, repairs: RepairOptions) -> Record:
     """The channels that are wanted, in their units, and the stamps in seconds."""
     _check_names(wanted.channels, files, table.source)
     columns_of = {name: given.column for name, given in files.columns.items()}
@@ -123,10 +123,11 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions) -> Record:
     asked = {one.name: files.columns.get(one.name, ColumnOptions(column=one.name)) for one in wanted.channels}
     told = [(table.find(asked[one.name].column), one, asked[one.name]) for one in wanted.channels]
     check_units_said(told, files, table.source)
-    for column, channel, given in told:
+    for told_by, channel, given in told:
+        column, mark = repair.marks(table, told_by, repairs)
         values, note = in_unit(column, channel, given, files, table.source)
         columns.append(values)
-        notes += [note] if note else []
+        notes += [one for one in (mark, note) if one]
     return Record(
         table=replace(table, columns=(RawColumn(name="", values=stamps),), others=(), records=()),
         stamps=stamps,

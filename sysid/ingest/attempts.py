@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError, UserError
+from sysid.ingest.blanks import marks_in
 from sysid.ingest.numbers import spaced, usually_missing
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.reading import read_table
@@ -22,8 +23,6 @@ _OF_TEXT = frozenset({"csv", "excel"})
 _LONG_SHARE = 0.6
 _CHANGE_SHARE = 0.5
 _FEW_TEXTS = 3
-_FAR = 5.0  # times the range of all other values
-_MISSING_NUMBERS = (-9999.0, -999.0, -999.25, -99999.0, -32768.0, -1e30, 9999.0, 99999.0, 32767.0, 1e30, 9.9e37)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,22 +132,8 @@ def _missing(table: RawTable) -> dict[str, Any] | None:
         if column.strange and all(usually_missing(text) or (few and _is_remark(text)) for text in column.strange):
             found |= dict.fromkeys(column.strange)
         elif table.reader in _OF_TEXT and column.problem is None and column.name != table.time:
-            found |= dict.fromkeys(_marks(column.values))
+            found |= dict.fromkeys(f"{mark:.15g}" for mark in marks_in(column.values))
     return {"missing": tuple(found)} if found else None
-
-
-def _marks(values: NDArray[np.float64]) -> list[str]:
-    """Numbers that loggers write for want of one, where they lie far outside everything else in the column."""
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return []
-    ends = (float(finite.min()), float(finite.max()))
-    found = [mark for mark in _MISSING_NUMBERS if mark in ends]
-    others = finite[~np.isin(finite, found)] if found else finite
-    if not found or 2 * len(others) < len(finite) or np.ptp(others) == 0.0:
-        return []
-    low, high, reach = float(others.min()), float(others.max()), _FAR * float(np.ptp(others))
-    return [f"{mark:.15g}" for mark in found if mark < low - reach or mark > high + reach]
 
 
 def _is_remark(text: str) -> bool:

@@ -44,8 +44,7 @@ def columns_by_name(values: Any, *, where: str = "the table") -> Columns | None:
     pairs: list[tuple[str, Any]]
     if isinstance(values, Mapping):
         check_labels(list(values.values()), list(values), where=where)
-        labels = [one.index for one in values.values() if is_labelled(one)]
-        pairs = [*(_index(labels[0]).items() if labels else ()), *((str(key), one) for key, one in values.items())]
+        pairs = [*index_of(list(values.values())).items(), *((str(key), one) for key, one in values.items())]
         # scipy.io.loadmat puts what it says of the file beside the columns.
         pairs = [(key, one) for key, one in pairs if not (key.startswith("__") and key.endswith("__"))]
     elif hasattr(values, "get_columns"):  # polars
@@ -97,6 +96,18 @@ def is_labelled(part: object) -> bool:
         Whether it has.
     """
     return hasattr(getattr(part, "index", None), "equals")
+
+
+def index_of(parts: Sequence[Any]) -> Columns:
+    """The index of parts that go side by side, where it is time.
+
+    Args:
+        parts: Series, frames or arrays, whose labels are alike.
+
+    Returns:
+        The column, or none.
+    """
+    return next((_index(one.index) for one in parts if is_labelled(one)), {})
 
 
 def check_labels(parts: Sequence[Any], names: Sequence[object], *, where: str) -> None:

@@ -9,8 +9,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from sysid.errors import UserError
+from sysid.ingest.readers.text_source import bare_stem
 
-PAIR = re.compile(r"\{(\w+): ([\w.]+)\}")
+PAIRS = re.compile(r"\{\w+: [\w.]+(?:, \w+: [\w.]+)*\}")
+PAIR = re.compile(r"(\w+): ([\w.]+)")
 OPTION = re.compile(r"\b(repairs|grid): (?=\{)")
 
 
@@ -27,7 +29,7 @@ def in_python(text: str) -> str:
         >>> in_python("ask for repairs: {gaps: hold} or {gaps: mask}")
         'ask for repairs={"gaps": "hold"} or {"gaps": "mask"}'
     """
-    return PAIR.sub(r'{"\1": "\2"}', OPTION.sub(r"\1=", text))
+    return PAIRS.sub(lambda found: PAIR.sub(r'"\1": "\2"', found[0]), OPTION.sub(r"\1=", text))
 
 
 @contextmanager
@@ -47,9 +49,9 @@ def remedies_of_a_file(path: Path) -> Iterator[None]:
     try:
         yield
     except UserError as error:
-        place = Path("datasets", path.stem, "dataset.yaml")
+        place = Path("datasets", bare_stem(path), "dataset.yaml")
         command = shlex.join(("sysid", "ingest", str(path), "--propose", str(place)))
-        described = f"describe the file once ({command}), which proposes these options, and load({path.stem!r})"
+        described = f"describe the file once ({command}), which proposes these options, and load({bare_stem(path)!r})"
         raise _with(error, f"{error.remedy}. A file alone takes no options: {described}") from None
 
 

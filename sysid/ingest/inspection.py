@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.ingest.attempts import Attempt, read_somehow
-from sysid.ingest.blanks import blanks_mean
+from sysid.ingest.blanks import blanks_mean, marks_in
 from sysid.ingest.clocks import clock_of
 from sysid.ingest.events import are_events
 from sysid.ingest.findings import CaseFinding, ColumnFinding, FileFinding, counted
@@ -93,13 +93,26 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
                 time, told = TimeOptions(step=step), f"guessed: {finer[1]}"
     others = tuple(replace(_column(column), problem=_other(column, len(table))) for column in table.others)
     told_apart = without_second_clocks(table, clock).columns
+    said = step_beside(table.columns) if files.time.step is None and time.step is not None else None
+    notes = table.notes
+    if said is not None:
+        told_apart = tuple(replace(c, aside="says the sample time") if c.name == said[0] else c for c in told_apart)
+        notes = (
+            notes if time.step != said[1] or table.step else (*notes, f"sample time {step:g} s, from column {said[0]}")
+        )
     columns = tuple(_column(column) for column in told_apart if column.name != clock) + others
     channels = [column for column in columns if not column.problem and not column.aside]
+    blanks = {
+        column.name: np.isin(found.values, marks_in(found.values)) | ~np.isfinite(found.values)
+        for column in channels
+        for found in (table.find(column.name),)
+    }
     needed = {
         "ragged": repairs.ragged,
         "stamps": "drop" if unstamped else None,
         **needs,
-        "nan": _nan([table.find(column.name) for column in channels if column.missing]),
+        "marks": "missing" if any(blanks[c.name].sum() > c.missing for c in channels) else None,
+        "nan": _nan({n: np.where(b, np.nan, table.find(n).values) for n, b in blanks.items() if b.any()}),
         "constant": "accept" if any(column.constant for column in channels) else None,
     }
     return FileFinding(
@@ -117,7 +130,7 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         files=files,
         table=table,
         guessed=attempt.guessed,
-        notes=table.notes,
+        notes=notes,
     )
 
 
@@ -207,9 +220,9 @@ def _merged(columns: Sequence[ColumnFinding]) -> ColumnFinding:
     )
 
 
-def _nan(columns: Sequence[RawColumn]) -> str | dict[str, str] | None:
+def _nan(columns: Mapping[str, NDArray[np.float64]]) -> str | dict[str, str] | None:
     """What is done about missing values: one for all channels that have some, or one each."""
-    repairs: dict[str, str] = {column.name: blanks_mean(column.values) for column in columns}
+    repairs: dict[str, str] = {name: blanks_mean(values) for name, values in columns.items()}
     return repairs if len(set(repairs.values())) > 1 else next(iter(repairs.values()), None)
 
 
@@ -226,9 +239,11 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     column = None if name is None else table.find(name)
     counted = column is not None and name not in {asked.column, table.time} and counts_rows(column)
     if column is None or name is None or counted:
-        step = _step_in_a_column(table.columns)
+        beside = step_beside(table.columns)
+        if beside is not None:
+            return TimeOptions(step=beside[1]), ""
         why = f"{name} counts the rows and says no time" if counted else "no time stamps"
-        return TimeOptions(step=step or 1.0), f"guessed: {why}, {step or 1.0:g} s between them"
+        return TimeOptions(step=1.0), f"guessed: {why}, 1 s between them"
     by_rising = "" if name in {asked.column, table.time} else f"{name} is taken for time, as it rises"
     clock = clock_of(column.values, column.name, origin=column.counted_from) if asked.unit is None else None
     said = None if clock is not None and "clock" in table.settings else column.unit
@@ -248,14 +263,14 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     return TimeOptions(column=column.name, unit=guess), f"guessed: {first}{name} in {guess}; {why}"
 
 
-def _step_in_a_column(columns: Sequence[RawColumn]) -> float | None:
-    """The sample time, where it or a rate stands in a column of its own, as public benchmarks have it: ``Ts``."""
+def step_beside(columns: Sequence[RawColumn]) -> tuple[str, float] | None:
+    """The column that says the sample time or a rate, as public benchmarks have it, ``Ts``, and the seconds."""
     for column in columns:
         known = np.unique(_finite(column.values))
         if len(known) == 1:
             step = step_in(f"{column.name} [{column.unit}]" if column.unit else column.name, float(known[0]))
             if step is not None:
-                return step
+                return column.name, step
     return None
 
 

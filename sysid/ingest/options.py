@@ -272,6 +272,7 @@ class RepairOptions(Options):
         gaps: Fill by ``linear`` or ``hold``; ``mask`` fills and marks the samples as not usable.
         nan: ``interpolate`` missing values, ``hold`` the value before (a blank means: as before), or ``mask`` their
             samples as not usable; one for all, or by channel.
+        marks: Numbers such as -9999 far outside all else in a column are ``missing`` values, or values to ``accept``.
         repeats: ``mask`` the samples of a channel that repeat the value before, by channel: it is measured more slowly
             than it is recorded.
         drift: ``line`` takes the straight line through the samples of a channel off them, by channel; their mean stays.
@@ -285,6 +286,7 @@ class RepairOptions(Options):
     duplicates: Literal["drop", "last", "average"] | None = None
     gaps: Literal["linear", "hold", "mask"] | None = None
     nan: NanRepair | dict[str, NanRepair] | None = None
+    marks: Literal["missing", "accept"] | None = None
     repeats: dict[str, Literal["mask"]] | None = None
     drift: dict[str, Literal["line"]] | None = None
     jitter: Literal["resample"] | None = None

@@ -11,6 +11,7 @@ from pathlib import Path
 from sysid.errors import ReaderError
 from sysid.ingest.findings import ColumnFinding, FileFinding
 from sysid.ingest.options import GridOptions
+from sysid.ingest.readers.text_source import bare_stem
 from sysid.units import Reference
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_/.^-]*(?: [A-Za-z0-9_/.^-]+)*")
@@ -43,7 +44,7 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None, split: 
         )
     # A data set under datasets/ is called by its folder, whatever the file is called.
     place = finding.path if folder is None else folder.resolve()
-    name = place.name if place.parent.name == "datasets" and folder is not None else finding.path.stem
+    name = place.name if place.parent.name == "datasets" and folder is not None else bare_stem(finding.path)
     lines = [
         f"# Proposed from {_comment(finding.path.name)}. Check what is marked 'guessed' before you rely on it.",
         f"name: {_text(name)}",
@@ -88,7 +89,7 @@ def _seen_from(path: Path, folder: Path | None) -> str:
 
 def _cases(finding: FileFinding, file: str) -> list[str]:
     if not finding.cases:
-        return [f"  {_text(finding.path.stem)}: {_mapping({'role': 'estimation', 'file': file})}"]
+        return [f"  {_text(bare_stem(finding.path))}: {_mapping({'role': 'estimation', 'file': file})}"]
     lines = []
     for case in finding.cases:
         options = dict(case.options)

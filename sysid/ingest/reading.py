@@ -14,6 +14,7 @@ from sysid.ingest.assemble import Wanted, assemble
 from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions
 from sysid.ingest.readers import READERS, choose_reader, read_with
+from sysid.ingest.readers.text_source import bare_stem
 from sysid.ingest.table import RawTable
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.traces import Channel, Trace
@@ -97,7 +98,7 @@ def read_trace(
             return own
     chosen = tuple(channels) if channels is not None else _all_channels(table, files)
     step, timing = (sample_time, None) if sample_time is not None else _step(table, files, grid)
-    wanted = Wanted(name=name or path.stem, channels=chosen, sample_time=step, timing=timing)
+    wanted = Wanted(name=name or bare_stem(path), channels=chosen, sample_time=step, timing=timing)
     held = [table]
     del table  # given away: what assembles it lets go of columns that it no longer needs, and they may be large
     return assemble(held.pop(), wanted, files=files, grid=grid, repairs=repairs)

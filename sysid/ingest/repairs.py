@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError, did_you_mean
+from sysid.ingest.blanks import marks_in
 from sysid.ingest.options import RepairOptions
-from sysid.ingest.table import RawTable
+from sysid.ingest.table import RawColumn, RawTable
 
 HOUR = 3600.0
 
@@ -61,6 +62,38 @@ class Record:
     def noted(self, note: str) -> Record:
         """The same samples with a sentence added."""
         return replace(self, notes=(*self.notes, note))
+
+
+def marks(table: RawTable, column: RawColumn, repairs: RepairOptions) -> tuple[RawColumn, str]:
+    """Numbers that stand for missing values.
+
+    Args:
+        table: The file.
+        column: One of its columns, in the file's unit.
+        repairs: ``marks: missing`` takes them for missing, ``marks: accept`` for values.
+
+    Returns:
+        The column, and what was done, or the empty text.
+
+    Raises:
+        TraceError: If there are such numbers and nothing says what they are.
+    """
+    found = [] if repairs.marks == "accept" else marks_in(column.values)
+    if not found:
+        return column, ""
+    there = np.isin(column.values, found)
+    count, shown = int(there.sum()), ", ".join(f"{mark:.15g}" for mark in found)
+    if repairs.marks == "missing":
+        values = np.where(there, np.nan, column.values)
+        return replace(column, values=values), f"{column.name}: {shown} taken for missing, {count} values"
+    raise TraceError(
+        f"{column.name} holds {shown}, which loggers write for want of a value",
+        where=f"{table.source}, channel {column.name}, {table.place(int(np.flatnonzero(there)[0]))}",
+        expected="values near the others",
+        got=f"{shown} in {count} of {len(there)} samples, far from all others",
+        remedy="if it stands for a missing value, ask for repairs: {marks: missing, nan: mask}; if it was measured, "
+        "for repairs: {marks: accept}",
+    )
 
 
 def empty_stamps(record: Record, repairs: RepairOptions) -> Record:

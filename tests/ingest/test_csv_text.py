@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
+import io
+import lzma
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sysid.errors import ReaderError
-from sysid.ingest import FileOptions, RepairOptions, inspect_file, read_table
+from sysid.ingest import FileOptions, RepairOptions, inspect_file, propose_dataset, read_table, read_trace
 
 Write = Callable[[str, str | bytes], Path]
 
@@ -29,6 +33,7 @@ READABLE = {
     "separator at the end of every line": "t [s],u [V],\n0.0,1.5,\n0.1,-2.5,\n",
     "separator at the end of every row but not of the header": "t [s],u [V]\n0.0,1.5,\n0.1,-2.5,\n",
     "quoted cells": '"t [s]","u [V]"\n"0.0","1.5"\n"0.1","-2.5"\n',
+    "quoted cells with blanks between": '"t [s]" , "u [V]"\n"0.0" , "1.5"\n"0.1" ,  "-2.5"\n',
     "spaces around cells": "t [s] , u [V]\n 0.0 , 1.5\n 0.1 , -2.5\n",
 }
 
@@ -181,6 +186,41 @@ def test_a_packed_file_is_told_to_be_unpacked(write: Write) -> None:
     path.write_bytes(gzip.compress(b"t,u\n0,1\n1,2\n"))
     with pytest.raises(ReaderError, match=r"(?s)packed with gzip.*unpack"):
         read_table(path)
+
+
+def _zipped(data: bytes, *names: str) -> bytes:
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w") as archive:
+        for name in names:
+            archive.writestr(name, data)
+    return held.getvalue()
+
+
+PACKED = {"gz": gzip.compress, "bz2": bz2.compress, "xz": lzma.compress, "zip": lambda data: _zipped(data, "r/run.csv")}
+
+
+@pytest.mark.parametrize("ending", PACKED)
+def test_a_packed_table_is_read_as_it_is(write: Write, ending: str) -> None:
+    path = write(
+        f"run.csv.{ending}", PACKED[ending](b"t [s],u [V]\n" + b"".join(b"%d,%d\n" % (k, k % 3) for k in range(20)))
+    )
+    trace = read_trace(path)
+    assert (trace.name, trace["u"].tolist()) == ("run", [k % 3 for k in range(20)])
+    assert "name: run\n" in propose_dataset(inspect_file(path))
+
+
+@pytest.mark.parametrize(
+    ("ending", "data", "told"),
+    [
+        ("csv.gz", gzip.compress(b"t,u\n0,1\n1,2\n")[:-9], "cannot be unpacked"),
+        ("zip", _zipped(b"t,u\n0,1\n", "a.csv", "b.csv"), r"(?s)holds 2 files.*a\.csv, b\.csv"),
+        ("mat.gz", gzip.compress(b"\x00\x01" * 80), "not text"),
+    ],
+    ids=["cut short", "two files", "no text"],
+)
+def test_a_packed_file_that_is_no_table_is_refused(write: Write, ending: str, data: bytes, told: str) -> None:
+    with pytest.raises(ReaderError, match=told):
+        read_table(write(f"run.{ending}", data))
 
 
 ROWS = "".join(f"{k / 10},{k % 3},{k * k}\n" for k in range(5, 20))

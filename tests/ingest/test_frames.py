@@ -123,3 +123,9 @@ def test_inputs_that_cannot_be_run_are_refused(u: Any) -> None:
     with pytest.raises(UserError) as caught:
         inputs_of(u, ("u",))
     assert caught.value.remedy
+
+
+def test_a_pair_of_series_with_labels_of_time_needs_no_sample_time() -> None:
+    trace = data((pd.Series(U, index=T), pd.Series(Y, index=T))).traces[0]
+    assert trace.sample_time == pytest.approx(T[1] - T[0])
+    assert_array_equal(trace["y"], Y)

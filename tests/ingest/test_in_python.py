@@ -10,6 +10,7 @@ import pytest
 
 import sysid
 from sysid.errors import ChannelError, TraceError, UnitError
+from sysid.ingest import inspect_file
 
 U = np.arange(50.0)
 
@@ -57,3 +58,22 @@ def test_a_file_that_needs_options_says_how_it_gets_a_description(
     assert command
     assert run_cli(command[1].split()) == 0  # to the letter
     assert len(sysid.load("mine").traces[0]) == 40
+
+
+def test_numbers_that_mark_missing_values_are_no_values_unless_it_is_said(tmp_path: Path) -> None:
+    y = 2.0 * U
+    y[10:13] = -9999.0
+    with pytest.raises(TraceError, match=r'repairs=\{"marks": "missing", "nan": "mask"\}'):
+        sysid.data((U, y), sample_time=0.1)
+    masked = sysid.data((U, y), sample_time=0.1, repairs={"marks": "missing", "nan": "mask"}).traces[0]
+    assert np.flatnonzero(~masked.usable_samples).tolist() == [10, 11, 12]
+    kept = sysid.data((U, y), sample_time=0.1, repairs={"marks": "accept"}).traces[0]
+    assert kept["y"][10] == -9999.0
+    path = tmp_path / "run.csv"
+    path.write_text(
+        "t [s],u [V],y [V]\n" + "".join(f"{k / 10},{u},{v}\n" for k, (u, v) in enumerate(zip(U, y, strict=True)))
+    )
+    with pytest.raises(TraceError, match=r"y holds -9999"):
+        sysid.load(path)
+    np.savez(tmp_path / "run.npz", t=U / 10, u=U, y=y)
+    assert inspect_file(tmp_path / "run.npz").needed.marks == "missing"

@@ -82,7 +82,8 @@ def test_every_problem_is_told_and_its_repair_proposed(write: Write) -> None:
     )
     assert found.needed.model_dump() == {
         "ragged": "drop", "stamps": "drop", "backward": "sort", "duplicates": "drop",
-        "gaps": "mask", "nan": "mask", "repeats": None, "drift": None, "jitter": "resample", "constant": "accept",
+        "gaps": "mask", "nan": "mask", "marks": None, "repeats": None, "drift": None, "jitter": "resample",
+        "constant": "accept",
     }  # fmt: skip
     trace = proposed(path)["run"]
     assert (trace.sample_time, len(trace)) == (1.0, 21)
@@ -120,8 +121,8 @@ def test_a_sample_time_in_a_column_of_its_own_is_taken_and_is_no_channel(write: 
     said = rows(20, lambda i: f"{i % 4},{i % 3},{'4' if i == at else ''}")
     path = write("run.csv", f"u [V],y [V],Ts\n{said}")
     found = inspect_file(path)
-    assert (found.time.step, found.time_guessed) == (4.0, True)
-    assert found.problems == ("no time stamps", "Ts: one value only, 4")
+    assert (found.time.step, found.time_guessed) == (4.0, False)
+    assert found.problems == ("sample time 4 s, from column Ts", "Ts: one value only, 4")
     assert proposed(path)["run"].channel_names == ("u", "y")
     assert len(proposed(path)["run"].usable_samples) == 20
 
@@ -295,3 +296,10 @@ def test_stamps_that_are_uneven_by_a_third_of_a_step_lack_no_sample(write: Write
 )
 def test_a_rate_is_understood_by_its_unit(write: Write, head: str, first: str) -> None:
     assert inspect_file(write("rig.csv", f"{head}\n" + rows(20, lambda i: f"{first},{i % 3}"))).sample_time == 0.05
+
+
+def test_a_column_that_says_the_rate_is_no_guess_and_no_channel(write: Write) -> None:
+    found = inspect_file(write("run.csv", "u [V],y [V],fs\n" + rows(20, lambda i: f"{i % 3},{i % 5},20")))
+    assert (found.sample_time, found.time_guessed, [c.name for c in found.channels]) == (0.05, False, ["u", "y"])
+    assert "sample time 0.05 s, from column fs" in found.problems
+    assert "time: {step: 0.05}\n" in propose_dataset(found)

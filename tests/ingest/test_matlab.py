@@ -159,3 +159,19 @@ def test_a_simulation_result_gives_variables_with_units_aliases_and_parameters(t
     assert [column.unit for column in table.columns] == ["s", "V", "m", "m", None]
     np.testing.assert_allclose(table.find("rig.minus_y").values, -Y)
     assert (set(table.find("k").values), table.find("k").aside) == ({0.2}, "a parameter, 0.2 throughout")
+
+
+def _structure(stamps: np.ndarray, values: np.ndarray, label: str) -> dict[str, Any]:
+    return {"time": stamps[:, None], "signals": {"values": values[:, None], "dimensions": 1.0, "label": label}}
+
+
+def test_signals_that_were_saved_apart_with_clocks_of_their_own_are_one_record(tmp_path: Path) -> None:
+    t = 0.1 * np.arange(20)
+    slow = {"Name": "level", "Time": t[::2][:, None], "Data": 3.0 * t[::2][:, None]}
+    mat("5", pump=_structure(t, np.cos(t), "pump"), level=slow)(tmp_path / "run.mat")
+    table = read_table(tmp_path / "run.mat")
+    assert (table.names, table.time, table.others) == (("time", "pump", "level"), "time", ())
+    np.testing.assert_allclose(table.find("level").values[:19], 3.0 * t[:19])
+    assert any("level: interpolated from 0.2 s" in note for note in table.notes)
+    mat("5", est=_structure(t, np.cos(t), "a"), val=_structure(t[:15], np.sin(t[:15]), "b"))(tmp_path / "two.mat")
+    assert read_table(tmp_path / "two.mat").notes == (), "records stay apart"

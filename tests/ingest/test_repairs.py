@@ -106,6 +106,12 @@ REPAIRED: dict[str, Done] = {
         [5, 6, 7],
         "3 missing samples masked",
     ),
+    "marks: missing": (
+        {"values": [*range(5), -9999, *range(6, N)], "repairs": {"marks": "missing", "nan": "interpolate"}},
+        ramp(),
+        [],
+        "u: -9999 taken for missing, 1 values",
+    ),
     "duplicates: drop": (
         {"stamps": DUPLICATE, "values": [*range(5), 99, *range(5, N)], "repairs": {"duplicates": "drop"}},
         ramp(),

@@ -238,7 +238,7 @@ REFUSED: dict[str, tuple[str, Maker, str]] = {
 def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     # What is drawn is tested where it is drawn, and takes most of the time.
-    monkeypatch.setattr("sysid.workbench.commands.ingest._picture", lambda _: "none")
+    monkeypatch.setattr("sysid.workbench.commands.ingest._picture", lambda *_: "none")
 
 
 @pytest.mark.parametrize("kind", READ)

@@ -206,7 +206,7 @@ def test_what_is_proposed_for_a_file_reads_it_right(
     tmp_path: Path, animal: Animal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # What is drawn is tested where it is drawn.
-    monkeypatch.setattr("sysid.workbench.commands.ingest._picture", lambda _: "none")
+    monkeypatch.setattr("sysid.workbench.commands.ingest._picture", lambda *_: "none")
     path, proposed = tmp_path / f"record{animal.suffix}", tmp_path / "dataset.yaml"
     path.write_bytes(animal.text.encode(animal.encoding))
     assert run_cli(["ingest", str(path), "--propose", str(proposed)]) == 0

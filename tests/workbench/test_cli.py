@@ -246,6 +246,7 @@ def test_a_file_is_shown_and_a_data_set_proposed(workspace: Path, capsys: pytest
         assert label in picture
     proposal = workspace / "datasets" / "rig" / "proposed.yaml"
     assert run_cli(["ingest", "datasets/rig/run-1.csv", "--propose", str(proposal)]) == 0
+    assert proposal.with_name("run-1.ingest.svg").is_file(), "beside what was proposed"
     assert run_cli(["ingest", str(proposal)]) == 0
     assert "400" in capsys.readouterr().out
     assert run_cli(["ingest", "datasets/rig/run-1.csv", "--propose", str(proposal)]) == 2

@@ -41,7 +41,7 @@ def written(kind: str, folder: Path) -> tuple[Path, str, str]:
 def test_what_is_proposed_runs(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     # What a picture shows is tested where it is drawn.
-    monkeypatch.setattr("sysid.workbench.commands.ingest._picture", lambda _: "none")
+    monkeypatch.setattr("sysid.workbench.commands.ingest._picture", lambda *_: "none")
     path, u, y = written(kind, tmp_path)
     assert run_cli(["ingest", str(path), "--propose", "datasets/rig/dataset.yaml"]) == 0
     (tmp_path / "pipelines").mkdir()

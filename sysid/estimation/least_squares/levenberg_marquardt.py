@@ -272,7 +272,8 @@ class LevenbergMarquardt:
         while damping.factor <= MAX_DAMPING:
             step = _bounded(state.theta, provider.bounds, (H, damping, g))
             trial = state.theta + step
-            promised = -float(g @ step + 0.5 * step @ (H @ step))
+            with np.errstate(over="ignore", invalid="ignore"):  # what is promised is then no number, and nothing gained
+                promised = -float(g @ step + 0.5 * step @ (H @ step))
             gain = (now - provider.loss(trial) - state.prior.penalty(trial)) / promised if promised > 0.0 else -1.0
             if gain > MIN_GAIN:
                 at = provider.linearise(trial)

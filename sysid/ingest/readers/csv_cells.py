@@ -157,7 +157,10 @@ def split_rows(
     """
     # A comment becomes a blank line, so that the line numbers in messages stay those of the file.
     kept = ("\n" if text.startswith(comment) else text for text in lines)
-    if separator == BLANKS:
+    beside = re.compile(rf'(?<=")[ ]+(?={re.escape(separator)})|(?<={re.escape(separator)})[ ]+(?=")')
+    if separator != BLANKS:  # blanks between a quote and a separator are no part of a cell
+        kept = (beside.sub("", text) if '"' in text else text for text in kept)
+    else:
         kept = (TOUCHING.sub(" -", text.replace("\t", " ").strip()) + "\n" for text in kept)
     parser = csv.reader(kept, delimiter=separator, strict=True, skipinitialspace=separator == BLANKS)
     try:

@@ -23,7 +23,7 @@ from sysid.ingest.readers.csv_layout import Layout, recognise
 from sysid.ingest.readers.csv_sideways import sideways
 from sysid.ingest.readers.reader import Reader
 from sysid.ingest.readers.sheets import SheetText
-from sysid.ingest.readers.text_source import TextFile, ZeroBytesError, encodings, not_text
+from sysid.ingest.readers.text_source import PACKED_SUFFIXES, TextFile, ZeroBytesError, encodings, not_text
 from sysid.ingest.table import RawColumn, RawTable, recognise_time
 from sysid.ingest.words import WordCollector, states_for
 from sysid.names import from_csv_cell
@@ -100,7 +100,7 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
 
 READER = Reader(
     name="csv",
-    suffixes=(".csv", ".tsv", ".txt", ".dat", ".asc", ".prn", ".tab"),
+    suffixes=(".csv", ".tsv", ".txt", ".dat", ".asc", ".prn", ".tab", *PACKED_SUFFIXES),
     read=_read,
     options=frozenset(
         {"separator", "decimal", "thousands", "comment", "encoding", "skip_lines", "header", "units_line"}

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sysid.errors import ReaderError
+from sysid.ingest.readers.joining import Signal, joined_signals
 from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, refused, texts_of
+from sysid.ingest.readers.records import role_of
 
 _SECONDS = {
     "": 1.0, "seconds": 1.0, "second": 1.0, "s": 1.0, "sec": 1.0, "milliseconds": 1e-3, "ms": 1e-3,
@@ -19,23 +22,56 @@ _SECONDS = {
 _NAMED = {"InputName", "OutputName", "InputUnit", "OutputUnit"}
 
 
-def understood(node: Any) -> Any:
+def understood(node: Any, notes: list[str]) -> Any:
     """A tree with the structures that are known replaced by their columns.
 
     Args:
         node: The tree.
+        notes: Where it is told how signals of different clocks are brought together.
 
     Returns:
         The tree of columns.
     """
     if isinstance(node, list):
-        return [understood(item) for item in node]
+        return [understood(item, notes) for item in node]
     if not isinstance(node, Mapping) or isinstance(node, Whole):
         return node
     for is_one, columns in _FORMS:
         if is_one(node):
             return columns(node)
-    return {str(key): understood(value) for key, value in node.items()}
+    found = {str(key): understood(value, notes) for key, value in node.items()}
+    clocked = [str(key) for key, value in node.items() if isinstance(value, Mapping) and _is_clocked(value)]
+    return _on_one_clock(found, clocked, notes) if len(clocked) > 1 else found
+
+
+def _is_clocked(node: Mapping[str, Any]) -> bool:
+    return _is_timeseries(node) or _is_structure_with_time(node)
+
+
+def _on_one_clock(found: dict[str, Any], clocked: list[str], notes: list[str]) -> dict[str, Any]:
+    """Signals that were saved apart, each with a clock of its own, at the stamps of the fastest one.
+
+    Records stay apart: a word in their name says so, they hold the same signals, or are of other times.
+    """
+    parts = {key: {name: leaf for name, one in found[key].items() if (leaf := leaf_of(one))} for key in clocked}
+    clocks = [part["time"].values.astype(np.float64) for part in parts.values() if "time" in part]
+    if len(clocks) < len(parts) or any(part["time"].unit != "s" for part in parts.values()):
+        return found
+    names = [name for part in parts.values() for name in part if name != "time"]
+    records = len(set(names)) < len(names) or any(map(role_of, clocked))
+    together = max(clock[0] for clock in clocks) < min(clock[-1] for clock in clocks)
+    if records or not together or all(np.array_equal(clocks[0], clock) for clock in clocks):
+        return found
+    signals = [
+        Signal(name=key if key == name else f"{key}.{name}", group="", values=column, stamps=clock, unit=leaf.unit)
+        for (key, part), clock in zip(parts.items(), clocks, strict=True)
+        for name, leaf in part.items()
+        for column in np.atleast_2d(leaf.values.T)
+        if name != "time" and len(column) == len(clock)
+    ]
+    columns, told = joined_signals(signals, Path())
+    notes += told
+    return {**{key: one for key, one in found.items() if key not in clocked}, **columns}
 
 
 def _is_iddata(node: Mapping[str, Any]) -> bool:

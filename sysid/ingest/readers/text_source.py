@@ -1,12 +1,18 @@
-"""A text file as lines, a block at a time: ends of lines, encodings, and bounds before memory."""
+"""A text file as lines, a block at a time: packed or not, ends of lines, encodings, and bounds before memory."""
 
 from __future__ import annotations
 
+import bz2
 import codecs
-from collections.abc import Generator
-from contextlib import closing
+import gzip
+import lzma
+import zipfile
+import zlib
+from collections.abc import Callable, Generator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 
@@ -34,6 +40,11 @@ _PACKED = (
     (b"7z\xbc\xaf\x27\x1c", "7-Zip"),
 )
 _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
+PACKED_SUFFIXES = (".gz", ".bz2", ".xz", ".zip")
+"""Endings of the files that are opened here."""
+
+_OPEN: dict[bytes, Callable[[IO[bytes]], Any]] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ\x00": lzma.open}
+_ZIP = b"PK\x03\x04"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +168,7 @@ def encodings(path: Path, encoding: str | None) -> list[str]:
     """
     if encoding is not None:
         return [encoding]
-    with path.open("rb") as file:
+    with opened(path) as file:
         start = file.read(4)
     marked = next((name for mark, name in _MARKS if start.startswith(mark)), None)
     return [marked] if marked else ["utf-8", "cp1252"]
@@ -174,7 +185,7 @@ def not_text(path: Path, tries: list[str], problem: Exception) -> ReaderError:
     Returns:
         The error to raise.
     """
-    with path.open("rb") as file:
+    with opened(path) as file:
         begin = file.read(8)
     packed = next((kind for mark, kind in _PACKED if begin.startswith(mark)), None)
     if packed:
@@ -202,7 +213,7 @@ def _in_utf8(path: Path, encoding: str, size: int) -> Generator[bytes]:
     decoder = codecs.getincrementaldecoder(encoding)()
     plain = codecs.lookup(encoding).name in _ASCII_INSIDE
     first, held = True, b""
-    with path.open("rb") as file:
+    with opened(path) as file:
         while True:
             chunk = file.read(size)
             # ASCII is as it is in these encodings, and need not be decoded.
@@ -224,3 +235,66 @@ def _in_utf8(path: Path, encoding: str, size: int) -> Generator[bytes]:
                 yield data
             if not chunk:
                 return
+
+
+def bare_stem(path: Path) -> str:
+    """A file's name without its ending, and without that of what it is packed with.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The name.
+
+    Example:
+        >>> bare_stem(Path("rig/run.1.csv.gz")), bare_stem(Path("run.csv"))
+        ('run.1', 'run')
+    """
+    return Path(path.stem).stem if path.suffix.lower() in PACKED_SUFFIXES else path.stem
+
+
+@contextmanager
+def opened(path: Path) -> Generator[IO[bytes]]:
+    """A file's bytes; of a packed one what is in it.
+
+    Args:
+        path: The file; one with an ending of its own is what it is, whatever it begins with.
+
+    Yields:
+        The open file.
+
+    Raises:
+        ReaderError: If a zip holds another number of files than one, or what is packed is damaged.
+        OSError: If it cannot be read.
+    """
+    with path.open("rb") as file:
+        head = file.read(6) if path.suffix.lower() in PACKED_SUFFIXES else b""
+        file.seek(0)
+        unpack = next((one for mark, one in _OPEN.items() if head.startswith(mark)), None)
+        try:
+            if unpack is not None:
+                with unpack(file) as inner:
+                    yield inner
+            elif head.startswith(_ZIP):
+                with zipfile.ZipFile(file) as archive, archive.open(_only_file(archive, path)) as inner:
+                    yield inner
+            else:
+                yield file
+        except (EOFError, gzip.BadGzipFile, lzma.LZMAError, zlib.error, zipfile.BadZipFile) as error:
+            raise ReaderError(
+                "the packed file cannot be unpacked", where=path, expected="a whole file",
+                got=str(error) or type(error).__name__, remedy="copy it again, or unpack it by hand",
+            ) from error  # fmt: skip
+
+
+def _only_file(archive: zipfile.ZipFile, path: Path) -> zipfile.ZipInfo:
+    files = [one for one in archive.infolist() if not one.is_dir() and not one.filename.startswith("__MACOSX/")]
+    if len(files) == 1 and not files[0].flag_bits & 1:
+        return files[0]
+    raise ReaderError(
+        "the zip has a password" if len(files) == 1 else f"the zip holds {len(files)} files",
+        where=path,
+        expected="one table of text",
+        got=", ".join(one.filename for one in files[:5]) or "nothing",
+        remedy="unpack it, and name the files: in a dataset.yaml each is a case",
+    )

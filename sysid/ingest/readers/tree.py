@@ -59,7 +59,8 @@ def table_of(
         ReaderError: If there is no such group, or nothing in it is a column.
     """
     walk = _Walk(where=str(path), separator=separator, transpose=options.transpose)
-    shown = understood(tree)
+    joins = list[str]()
+    shown = understood(tree, joins)
     outer = walk.step_beside(shown, None)
     if options.group is not None:
         shown, outer = _group(shown, options.group, walk, outer)
@@ -86,7 +87,7 @@ def table_of(
         others=others,
         time=time,
         step=step,
-        notes=(*notes, *turned, *told, *renamed),
+        notes=(*notes, *joins, *turned, *told, *renamed),
         metadata=metadata or {},
         settings=settings,
     )

@@ -14,6 +14,7 @@ from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
 from sysid.ingest.findings import ColumnFinding
 from sysid.ingest.in_units import stamps_in_seconds
+from sysid.ingest.readers.text_source import bare_stem
 from sysid.reporting.figures.record_picture import record_picture
 from sysid.reporting.figures.svg import as_file
 from sysid.traces import TraceSet
@@ -132,11 +133,11 @@ def _show_file(found: FileFinding, propose: Path | None, split: Sequence[float] 
         target.print(f"look at: {problem}", soft_wrap=True)
     if propose is not None:
         write_bytes(propose, (schema_line(propose) + proposal).encode())
-    target.print(f"picture: {_picture(found)}", soft_wrap=True)
+    target.print(f"picture: {_picture(found, Path() if propose is None else propose.parent)}", soft_wrap=True)
     if propose is None:
         target.print("\nProposed dataset.yaml (each ? above and the comments below mark what was guessed):\n")
         target.print(proposal, markup=False, soft_wrap=True)
-        place = Path("datasets", found.path.stem, "dataset.yaml")
+        place = Path("datasets", bare_stem(found.path), "dataset.yaml")
         again = shlex.join(("sysid", "ingest", str(found.path), "--propose", str(place)))
         target.print(f"Next: {again}", markup=False, soft_wrap=True)
         return
@@ -147,8 +148,8 @@ def _steps(column: ColumnFinding) -> str:
     return f"comes in steps of {column.step:.3g}: coarse, see sysid advise" if column.step else ""
 
 
-def _picture(found: FileFinding) -> str:
-    """Draw the channels into the current folder, and say where, or why not."""
+def _picture(found: FileFinding, folder: Path) -> str:
+    """Draw the channels into a folder, and say where, or why not."""
     if not found.channels:
         return "none, as there is no column to draw"
     first = found.cases[0].finding if found.cases else found
@@ -160,7 +161,7 @@ def _picture(found: FileFinding) -> str:
         title=found.path.name,
         description=", ".join(labels.values()),
     )
-    target = Path(f"{found.path.stem}.ingest.svg")
+    target = folder / f"{bare_stem(found.path)}.ingest.svg"
     try:
         write_bytes(target, as_file(drawing))
     except OSError as error:

@@ -207,3 +207,22 @@ def test_a_precision_that_is_known_is_not_the_evidences_to_find() -> None:
     found, _ = update(prior, np.ones(2), at, 50)
     assert found.alphas[0] == 0.3
     assert found.alphas[1] != 0.3
+
+
+@dataclass(eq=False)
+class _Steep(AbstractProvider):
+    """A slope that a float holds and whose product with its own step it does not."""
+
+    n_samples: int = 1
+
+    def loss(self, theta):  # noqa: ARG002 - as every provider
+        return 1.0
+
+    def linearise(self, theta):  # noqa: ARG002
+        return Linearisation(loss=1.0, gradient=np.array([1e308]), gauss_newton=np.array([[1e300]]))
+
+
+def test_a_step_whose_promise_is_beyond_numbers_is_not_taken_and_no_warning() -> None:
+    engine = LevenbergMarquardt(termination=Termination(max_iterations=1), evidence_after=None)
+    solution = engine.minimise(_Steep(), np.zeros(1), flat_prior(1))
+    assert solution.theta.tolist() == [0.0]
