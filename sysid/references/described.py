@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,11 @@ import numpy as np
 
 from sysid.errors import ConfigError, did_you_mean
 from sysid.references.fmu import read_fmu
-from sysid.references.fmu_variables import INTEGERS, declared_unit
+from sysid.references.fmu_variables import INTEGERS, declared_unit, is_number
 
+TRUTH = {"false": "0", "true": "1"}
+UNBOUNDED = 1e30
+"""A min or max of this size is a tool's word for none."""
 SAMPLES = 500
 """Of an experiment, where the description says how long one is and not how finely it is sampled."""
 
@@ -59,13 +62,15 @@ def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
             got=missing[0], remedy=did_you_mean(missing[0], variables, "correct the name"),
         )  # fmt: skip
     notes: list[str] = []
-    inputs = {one.name: _input(one, wish, notes) for one in variables.values() if one.causality == "input"}
+    ports = _numbers_of(variables.values(), notes)
+    inputs = {one.name: _input(one, wish, notes) for one in ports if _moves(one, wish)}
+    _check_roles(path, wish, variables, inputs)
     unknown = [name for name, port in inputs.items() if "range" not in port]
     sample_time, duration = _times(described, wish, notes)
     asked = [f"--range {name}=LOW:HIGH" for name in unknown]
     asked += [] if sample_time else ["--sample-time SECONDS"]
     asked += [] if duration else ["--duration SECONDS"]
-    outputs = list(wish.outputs) or [one.name for one in variables.values() if one.causality == "output"]
+    outputs = list(wish.outputs) or [one.name for one in ports if one.causality == "output"]
     asked += [] if outputs else ["--output NAME"]
     asked += [] if inputs or wish.parameters else ["--parameter NAME=LOW:HIGH"]
     if asked:
@@ -75,6 +80,8 @@ def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
             got=f"nothing for {', '.join(one.split()[-1].partition('=')[0] for one in asked)}",
             remedy=f"say it: {' '.join(asked)}",
         )  # fmt: skip
+    for name, span in wish.parameters.items():
+        _told_beyond(variables[name], span, notes)
     fields = {
         "fmu": str(path.resolve()),
         "sample_time": sample_time,
@@ -83,6 +90,43 @@ def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
         "outputs": {name: {"unit": _unit(variables[name])} for name in outputs},
     }
     return {key: value for key, value in fields.items() if value}, float(duration or 0.0), notes
+
+
+def _numbers_of(variables: Iterable[Any], notes: list[str]) -> list[Any]:
+    """The variables that are numbers; of inputs and outputs that are none it is told that nothing is done with them."""
+    found = []
+    for one in variables:
+        if is_number(one):
+            found.append(one)
+        elif one.causality in {"input", "output"}:
+            notes.append(f"{one.name}: left out, as it is no number but {one.type}; an input stays at its start")
+    return found
+
+
+def _moves(variable: Any, wish: Wish) -> bool:
+    """Whether experiments move a variable: an input, or a parameter of which it was said, where it may be."""
+    return variable.causality == "input" or (variable.name in wish.ranges and variable.variability == "tunable")
+
+
+def _check_roles(path: Path, wish: Wish, variables: Mapping[str, Any], inputs: Mapping[str, Any]) -> None:
+    """Refuse what was said of a variable that is another thing, and would be passed over."""
+    for name in wish.ranges:
+        if name not in inputs:
+            one = variables[name]
+            numeric = is_number(one)
+            raise ConfigError(
+                f"{name} cannot be moved in a run", where=path, expected="--range of an input, or of what is tunable",
+                got=f"{one.causality}, {one.variability}" if numeric else f"{one.type}",
+                remedy=f"say --parameter {name}=LOW:HIGH, for a value that stays the same in each experiment"
+                if numeric and one.causality == "parameter" else "leave its --range out",
+            )  # fmt: skip
+    for name in wish.parameters:
+        if name in inputs:
+            one = variables[name]
+            raise ConfigError(
+                f"{name} moves in a run", where=path, expected="--parameter of what stays the same in each experiment",
+                got=f"{one.causality}, {one.variability}", remedy=f"say --range {name}=LOW:HIGH",
+            )  # fmt: skip
 
 
 def _parameter(variable: Any, span: tuple[float, float], ports: set[str]) -> tuple[str, dict[str, Any]]:
@@ -94,11 +138,12 @@ def _parameter(variable: Any, span: tuple[float, float], ports: set[str]) -> tup
 
 
 def _input(variable: Any, wish: Wish, notes: list[str]) -> dict[str, Any]:
-    low, high, start = (_number(getattr(variable, one)) for one in ("min", "max", "start"))
+    (low, high), start = _limits(variable), _number(variable.start)
     found: dict[str, Any] = {"unit": _unit(variable)}
     if variable.name in wish.ranges:
         found["range"] = list(wish.ranges[variable.name])
-    elif low is not None and high is not None and low < high and max(abs(low), abs(high)) < 1e30:
+        _told_beyond(variable, wish.ranges[variable.name], notes)
+    elif low is not None and high is not None and low < high:
         found["range"] = [low, high]
         notes.append(f"{variable.name}: {low:g} to {high:g}, as the model description has min and max")
     elif str(variable.type) == "Boolean":
@@ -108,8 +153,33 @@ def _input(variable: Any, wish: Wish, notes: list[str]) -> dict[str, Any]:
         low, high = found["range"]
         if start is not None and low <= start <= high:
             found["start"] = start
+        elif start is not None:
+            notes.append(
+                f"{variable.name}: its start of {start:g} is not within {low:g} to {high:g}; experiments begin in the "
+                "middle, where the model may not be at rest: settling, or another start, are said in the pipeline"
+            )
         found |= _levels(variable, low, high)
     return found
+
+
+def _limits(variable: Any) -> tuple[float | None, float | None]:
+    """Min and max, its own or of its type; what a tool writes for none is none."""
+    kind = variable.declaredType
+    own = {name: _number(getattr(variable, name)) for name in ("min", "max")}
+    found = {name: _number(getattr(kind, name, None)) if x is None else x for name, x in own.items()}
+    low, high = (None if x is None or abs(x) >= UNBOUNDED else x for x in found.values())
+    return low, high
+
+
+def _told_beyond(variable: Any, span: tuple[float, float], notes: list[str]) -> None:
+    """Tell where values are asked for that the description does not allow."""
+    low, high = _limits(variable)
+    if (low is not None and span[0] < low) or (high is not None and span[1] > high):
+        allowed = " to ".join("anything" if x is None else f"{x:g}" for x in (low, high))
+        notes.append(
+            f"{variable.name}: {span[0]:g} to {span[1]:g} was asked for; the model description allows {allowed}, and "
+            "says nothing of what lies beyond"
+        )
 
 
 def _levels(variable: Any, low: float, high: float) -> dict[str, list[float]]:
@@ -137,7 +207,7 @@ def _times(described: Any, wish: Wish, notes: list[str]) -> tuple[float | None, 
 
 def _number(text: object) -> float | None:
     try:
-        value = float(str(text))
+        value = float(TRUTH.get(str(text).lower(), str(text)))
     except ValueError:
         return None
     return value if np.isfinite(value) else None

@@ -54,7 +54,9 @@ def read_fmu(path: Path) -> Any:
     except Exception as error:  # noqa: BLE001 - fmpy raises whatever its parser does
         raise ConfigError(
             "this is no FMU that can be read", where=path, expected="an FMU of version 2.0 or 3.0",
-            got=f"{type(error).__name__}: {error}", remedy="check the path, and that the tool exported it whole",
+            got=f"{type(error).__name__}: {error}",
+            remedy="check the path, and that the tool exported it whole; a Python function or a program is named in a "
+            "pipeline of kind experiment, which says its ports (docs/how/slow-models.md)",
         ) from None  # fmt: skip
     if description is None:
         raise ConfigError(

@@ -31,6 +31,18 @@ def type_of(variable: Any) -> Any:
     return np.int32 if kind in INTEGERS else TYPES.get(kind, np.float64)
 
 
+def is_number(variable: Any) -> bool:
+    """Whether a variable is a number, an integer or a truth value.
+
+    Args:
+        variable: As fmpy has it.
+
+    Returns:
+        Whether it is, and not text, bytes or a clock.
+    """
+    return str(variable.type) in {*TYPES, *INTEGERS}
+
+
 def declared_unit(variable: Any) -> str | None:
     """The unit that the description gives a variable.
 
@@ -64,8 +76,8 @@ def check_variables(config: ReferenceConfig, variables: Mapping[str, Any], path:
 
     set_before = (*config.variables.values(), *config.constants)
     for name in (*config.inputs, *set_before, *config.outputs):
-        kind = str(variables[name].type)
-        if kind not in {*TYPES, *INTEGERS}:
+        if not is_number(variables[name]):
+            kind = str(variables[name].type)
             raise refused(name, "is no number", "a number, an integer or a truth value", kind, "name another variable")
     for name in config.inputs:
         one = variables[name]

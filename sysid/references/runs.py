@@ -19,9 +19,11 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +39,7 @@ from sysid.traces import Channel, Trace
 
 STARTING_S = 120.0
 """Seconds that loading a reference may take."""
+TOO_LONG = "it was not done after"
 Progress = Callable[[str, int, int], None]
 
 
@@ -236,7 +239,7 @@ class ReferenceRuns:
         Returns:
             Their number.
         """
-        return sum(self._note(self.key(case)).is_file() for case in cases)
+        return sum(self._told(self.key(case)) is not None for case in cases)
 
     def seconds_each(self) -> tuple[float | None, str]:
         """How long one run takes, and where that is known from."""
@@ -249,15 +252,19 @@ class ReferenceRuns:
     def _timed_as(self) -> str:
         return f"reference-{self.digest[:16]}-{self.config.sample_time!r}"
 
-    def run(self, cases: Sequence[Case], progress: Progress | None = None) -> list[Outcome]:
+    def run(
+        self, cases: Sequence[Case], progress: Progress | None = None, *, until: float = inf, fewest: int = 0
+    ) -> list[Outcome]:
         """Run experiments, or find them where they have been run.
 
         Args:
             cases: The experiments.
             progress: Told of each that is done: its name, how many are, and of how many.
+            until: The time of ``time.monotonic`` after which none is begun any more.
+            fewest: How many of the first are run whatever the time.
 
         Returns:
-            What came of each, in their order.
+            What came of each, in their order, but for those that were not begun.
 
         Raises:
             ConfigError: If the reference cannot be loaded.
@@ -265,43 +272,48 @@ class ReferenceRuns:
         found: dict[int, Outcome] = {}
         _ = self.digest
         with ThreadPoolExecutor(max(1, self.workers)) as threads:
-            waiting = {threads.submit(self._one, case): k for k, case in enumerate(cases)}
+            waiting = {threads.submit(self._one, case, inf if k < fewest else until): k for k, case in enumerate(cases)}
             try:
                 for done in as_completed(waiting):
-                    found[waiting[done]] = done.result()
+                    if (one := done.result()) is None:
+                        continue
+                    found[waiting[done]] = one
                     if progress is not None:
-                        progress(found[waiting[done]].case.name, len(found), len(cases))
+                        progress(one.case.name, len(found), len(cases))
             except BaseException:
-                for one in waiting:
-                    one.cancel()
+                for begun in waiting:
+                    begun.cancel()
                 raise
-        made = [one for one in found.values() if not one.stored and one.trace is not None]
+        # Those that gave no record too: a reference that hangs in one of ten takes as long as that.
+        made = [one for one in found.values() if not one.stored]
         if made:
             TraceCache(folder=self.folder).note_time(self._timed_as, float(np.mean([one.wall_s for one in made])))
-        return [found[k] for k in range(len(cases))]
+        return [found[k] for k in sorted(found)]
 
-    def _one(self, case: Case) -> Outcome:
+    def _one(self, case: Case, until: float) -> Outcome | None:
+        if time.monotonic() > until:
+            return None
         key = self.key(case)
         kept = None if self.fresh else self._kept(case, key)
         if kept is not None:
             return kept
         process = self._worker()
-        began, wall = time.perf_counter(), float("nan")
+        began = time.perf_counter()
         with _exchange() as (given, made):
             np.save(given, case.inputs, allow_pickle=False)
             parameters = {**self.config.constants, **case.parameters}
             process.send(json.dumps({"inputs": str(given), "outputs": str(made), "parameters": parameters}))
             try:
                 answer = process.receive(self.config.time_limit)
-                wall = time.perf_counter() - began
             except TimeoutError:
                 process.end()
-                answer = {"reason": f"it was not done after {self.config.time_limit:g} s, its time limit"}
+                answer = {"reason": self._too_long}
             else:
                 if answer is None:
                     answer = {"reason": f"it ended its process {process.end()}"}
                 else:
                     self._idle.append(process)
+            wall = time.perf_counter() - began
             values = np.load(made, allow_pickle=False) if answer["reason"] is None else None
         trace = None if values is None else self._trace(case, values[1:])
         before = {} if values is None else dict(zip(self.config.outputs, values[0].tolist(), strict=True))
@@ -333,9 +345,24 @@ class ReferenceRuns:
     def _note(self, key: str) -> Path:
         return self.folder / "references" / f"{key}.json"
 
-    def _kept(self, case: Case, key: str) -> Outcome | None:
+    @property
+    def _too_long(self) -> str:
+        return f"{TOO_LONG} {self.config.time_limit:g} s, its time limit"
+
+    def _told(self, key: str) -> dict[str, Any] | None:
+        """What is noted of a run; nothing of one that had another time limit, and was not done in it."""
         try:
-            note = json.loads(self._note(key).read_text(encoding="utf-8"))
+            note = dict(json.loads(self._note(key).read_text(encoding="utf-8")))
+            outdated = str(note["reason"]).startswith(TOO_LONG) and note["reason"] != self._too_long
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return None if outdated else note
+
+    def _kept(self, case: Case, key: str) -> Outcome | None:
+        note = self._told(key)
+        if note is None:
+            return None
+        try:
             trace = None if note["reason"] else TraceCache(folder=self.folder).load(key)
             if trace is None and not note["reason"]:
                 return None
@@ -364,6 +391,21 @@ class ReferenceRuns:
 
 def _number(value: float | None) -> float:
     return float("nan") if value is None else float(value)
+
+
+def reasons_of(outcomes: Iterable[Outcome], most: int = 3) -> str:
+    """Why some experiments gave no record, the most frequent reason first.
+
+    Args:
+        outcomes: What came of them; those that gave one say nothing.
+        most: Reasons that are told.
+
+    Returns:
+        In words; empty where all gave one.
+    """
+    counts = Counter(one.reason for one in outcomes if one.reason is not None).most_common()
+    told = [f"{reason} ({n})" for reason, n in counts[:most]]
+    return "; ".join([*told, *([f"and {len(counts) - most} other reasons"] if len(counts) > most else [])])
 
 
 def channels_of(config: ReferenceConfig) -> tuple[Channel, ...]:

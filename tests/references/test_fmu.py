@@ -194,3 +194,73 @@ def test_a_whole_number_is_not_set_to_another_than_the_record_says(port: dict[st
 def test_what_an_importer_would_pass_over_is_refused(second: Path, fields: dict[str, object], words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         FmuReference(reference(second, **fields))
+
+
+def variable(name: str, kind: str = "Real", **fields: object) -> SimpleNamespace:
+    """As fmpy has it."""
+    usual = {"causality": "input", "variability": "continuous", "min": None, "max": None, "start": None, "unit": None}
+    return SimpleNamespace(name=name, type=kind, **{**usual, "declaredType": None, "initial": None, **fields})
+
+
+OUTPUT = variable("y", causality="output")
+
+
+def asked(
+    monkeypatch: pytest.MonkeyPatch, *variables: SimpleNamespace, **wish: dict[str, tuple[float, float]]
+) -> tuple:
+    """What is proposed for an FMU of some variables, and what is told of it."""
+    default = SimpleNamespace(startTime=None, stopTime="10", stepSize="0.1")
+    described = SimpleNamespace(modelVariables=[*variables, OUTPUT], defaultExperiment=default)
+    monkeypatch.setattr("sysid.references.described.read_fmu", lambda _: described)
+    fields, _, notes = proposed(Path("a.fmu"), Wish(**{"ranges": {}, "parameters": {}, **wish}))
+    return fields, "; ".join(notes)
+
+
+def test_text_is_left_out_of_a_proposal_and_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    u, said = variable("u", min="0", max="2", start="1"), variable("label", "String", start="a")
+    fields, told = asked(monkeypatch, u, said, variable("state", "String", causality="output"))
+    assert (list(fields["inputs"]), list(fields["outputs"])) == (["u"], ["y"])
+    assert "label: left out, as it is no number but String" in told
+    assert "state: left out" in told
+
+
+def test_limits_are_those_of_the_type_where_a_variable_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    kind = SimpleNamespace(min="-1", max="5", unit=None)
+    fields, _ = asked(monkeypatch, variable("u", declaredType=kind), variable("v", declaredType=kind, max="3"))
+    assert [fields["inputs"][name]["range"] for name in "uv"] == [[-1.0, 5.0], [-1.0, 3.0]]
+    no_limit = SimpleNamespace(min="-1.8e308", max="1e60", unit=None)
+    with pytest.raises(ConfigError, match="does not say all"):
+        asked(monkeypatch, variable("u", declaredType=no_limit))
+
+
+def test_a_start_that_cannot_be_is_told_and_that_of_a_truth_value_is_heeded(monkeypatch: pytest.MonkeyPatch) -> None:
+    u, v = variable("u", start="7"), variable("open", "Boolean", start="true")
+    fields, told = asked(monkeypatch, u, v, ranges={"u": (0.0, 2.0)})
+    assert "start" not in fields["inputs"]["u"]
+    assert "u: its start of 7 is not within 0 to 2" in told
+    assert fields["inputs"]["open"]["start"] == 1.0
+
+
+def test_values_beyond_what_the_description_allows_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    u = variable("u", min="0", max="5", start="0")
+    mass = variable("mass", causality="parameter", variability="fixed", min="1")
+    _, told = asked(monkeypatch, u, mass, ranges={"u": (-1.0, 2.0)}, parameters={"mass": (0.5, 2.0)})
+    assert "u: -1 to 2 was asked for; the model description allows 0 to 5" in told
+    assert "mass: 0.5 to 2 was asked for; the model description allows 1 to anything" in told
+    assert "asked for" not in asked(monkeypatch, u, mass, parameters={"mass": (1.0, 2.0)})[1]
+
+
+def test_what_is_tunable_may_move_and_a_range_of_another_thing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    u = variable("u", min="0", max="5")
+    gain = variable("gain", causality="parameter", variability="tunable", start="1")
+    mass = variable("mass", causality="parameter", variability="fixed", start="1")
+    fields, _ = asked(monkeypatch, u, gain, mass, ranges={"gain": (0.0, 2.0)}, parameters={"mass": (1.0, 2.0)})
+    assert (list(fields["inputs"]), list(fields["parameters"])) == (["u", "gain"], ["mass"])
+    for ranges, parameters, remedy in (
+        ({"mass": (0.0, 1.0)}, {}, "say --parameter mass=LOW:HIGH"),
+        ({"y": (0.0, 1.0)}, {}, "leave its --range out"),
+        ({}, {"u": (0.0, 1.0)}, "say --range u=LOW:HIGH"),
+    ):
+        with pytest.raises(ConfigError, match="in a run") as caught:
+            asked(monkeypatch, u, gain, mass, ranges=ranges, parameters=parameters)
+        assert remedy in str(caught.value.remedy)

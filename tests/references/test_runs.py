@@ -17,7 +17,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.references.config import ReferenceConfig
-from sysid.references.runs import Case, Outcome, ReferenceRuns
+from sysid.references.runs import Case, Outcome, ReferenceRuns, reasons_of
 from tests.references import slow_models
 
 HERE = Path(__file__).parent
@@ -105,6 +105,35 @@ def test_what_has_been_run_is_found_whether_it_gave_a_record_or_not(tmp_path: Pa
     assert made[0].trace is not None
     assert again[0].trace.name == "again-a"
     np.testing.assert_array_equal(again[0].trace.values, made[0].trace.values)
+
+
+def test_what_was_not_done_in_a_time_limit_is_run_again_with_another(tmp_path: Path) -> None:
+    """The remedy that is told, a longer limit, found the old reason."""
+    config = reference("hangs", time_limit=0.1)
+    (one,) = run(config, tmp_path, CASES[1:2])
+    assert one.wall_s >= 0.1
+    for limit, kept in ((0.1, 1), (0.2, 0)):
+        with ReferenceRuns(config=config.model_copy(update={"time_limit": limit}), folder=tmp_path) as runs:
+            assert runs.kept(CASES[1:2]) == kept
+            assert (runs.run(CASES[1:2])[0].stored, runs.kept(CASES[1:2])) == (bool(kept), 1)
+
+
+def test_none_is_begun_after_a_time_but_for_the_first(tmp_path: Path) -> None:
+    told: list[str] = []
+    with ReferenceRuns(config=reference("first_order"), folder=tmp_path, workers=1) as runs:
+        cases = [Case(name=name, inputs=np.full((5, 1), 0.5)) for name in "abc"]
+        done = runs.run(cases, lambda name, *_: told.append(name), until=time.monotonic(), fewest=2)
+    assert [one.case.name for one in done] == told == ["a", "b"]
+
+
+def test_runs_without_a_record_count_in_what_one_takes_and_are_told_by_their_reasons(tmp_path: Path) -> None:
+    with ReferenceRuns(config=reference("raises"), folder=tmp_path, workers=1) as runs:
+        done = runs.run([CASES[1], Case(name="worse", inputs=np.full((30, 1), 1.9))])
+        assert runs.seconds_each()[0] == pytest.approx(np.mean([one.wall_s for one in done]))
+    assert reasons_of(done) == "it raised ValueError: valve jammed (2)"
+    many = [Outcome(case=CASES[0], trace=None, reason=reason) for reason in "abbc"]
+    assert reasons_of(many, 2) == "b (2); a (1); and 1 other reasons"
+    assert not reasons_of([Outcome(case=CASES[0], trace=None)])
 
 
 def test_other_inputs_parameters_or_code_are_other_runs(tmp_path: Path) -> None:

@@ -231,9 +231,11 @@ def _with_ensemble(
 def _pretraining(training: Training, task: _Task, experiments: Sequence[Experiment]) -> StepSamples | None:
     if not training.pretraining or not task.layout.linear or not task.layout.neurons:
         return None
-    return StepSamples.of(
+    found = StepSamples.of(
         task.template, experiments, task.layout, task.basis, samples=training.pretraining, seed=training.seed
     )
+    # A record that stands at its limits throughout, as a truth value does, has no sample that says what a step does.
+    return found if found.n_samples else None
 
 
 def _offset(experiments: Sequence[Experiment], mapping: Mapping, training: Training) -> list[Experiment]:

@@ -47,7 +47,30 @@ def whitener(residuals: Sequence[NDArray[np.float64]], most: int, *, exact: bool
     # A residual that grows over its stretch: mirrored, it has the same spectrum.
     outside = np.abs(roots) >= 1.0
     roots[outside] = 0.999 / np.conj(roots[outside])
-    return np.asarray(np.real(np.poly(roots)), dtype=np.float64)
+    return inside(roots.astype(np.complex128))
+
+
+def inside(roots: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """The polynomial of some roots inside the unit circle, as it is computed.
+
+    Where several lie close to the circle and to each other, their polynomial's digits no longer hold them inside: it is
+    then that of roots drawn towards 0 by a thousandth, as often as it takes.
+
+    Args:
+        roots: Magnitudes below 1; complex ones in pairs.
+
+    Returns:
+        Coefficients ``1, a1, ...``.
+
+    Example:
+        >>> crowded = np.full(8, 0.999)
+        >>> bool(np.abs(np.roots(np.poly(crowded))).max() < 1.0), bool(np.abs(np.roots(inside(crowded))).max() < 1.0)
+        (False, True)
+    """
+    a = np.asarray(np.real(np.poly(roots)), dtype=np.float64)
+    while np.abs(np.roots(a)).max(initial=0.0) >= 1.0:
+        a = a * 0.999 ** np.arange(len(a))
+    return a
 
 
 LONGEST_MEMORY = 12

@@ -40,7 +40,9 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
     rounds: Annotated[
         int | None, typer.Option(min=1, help="Rounds of experiments that are added where the surrogate is worst.")
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; as the pipeline says, and of an FMU two, by default.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/surrogate-<name> by default.")] = None,
     no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,

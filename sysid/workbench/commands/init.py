@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.references.described import Wish
+from sysid.workbench.commands.surrogate import no_options
 from sysid.workbench.runner.console import console
 from sysid.workbench.workspace import make_workspace
 
@@ -22,6 +23,7 @@ def init_command(folder: Path, *, reference: Path | None, wish: Wish) -> None:
     """
     target = console()
     if reference is None:
+        no_options(wish, "the command line", "there is no --reference that ports and times could be of")
         files, commands = make_workspace(folder), ["sysid run tank", "sysid ui"]
     else:
         from sysid.workbench.surrogates.begun import make_reference_workspace

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -21,20 +22,20 @@ from sysid.field_checks import check
 from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
-from sysid.references.runs import ReferenceRuns
+from sysid.references.runs import ReferenceRuns, reasons_of
 from sysid.reporting.growth import FILE
 from sysid.reporting.judging.results import FOLDER
 from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import finish_s
+from sysid.workbench.auto.finish import finish_s, span
 from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import MOVED, in_motion, span_of
 from sysid.workbench.auto.run import Searched, auto_of
 from sysid.workbench.auto.run import program_of as search_program
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
-from sysid.workbench.experiments.run import DATASET, Experimented
+from sysid.workbench.experiments.run import DATASET, Experimented, Experiments
 from sysid.workbench.experiments.run import program_of as experiment_program
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import data_of
@@ -44,13 +45,15 @@ from sysid.workbench.surrogates.grown import GROWN, Ground, grow
 from sysid.workbench.surrogates.grown import program_of as grown_program
 from sysid.workbench.surrogates.known import pipeline_of
 from sysid.workbench.surrogates.known import program_of as known_program
-from sysid.workbench.surrogates.plan import PROOF, RUNNING, Times, times
-from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
+from sysid.workbench.surrogates.plan import PROOF, RUNNING, SEARCHING, Times, times
+from sysid.workbench.surrogates.proof import FEWEST, Proof, fmu_of, prove
 from sysid.yaml_files import read_yaml
 
 T = TypeVar("T")
 Perform = Callable[[Program[Any], Path], Any]
 """Carries a program out in a folder, and gives its results."""
+RUNS_MOST = 1.0 - SEARCHING
+"""Share of the time beyond which it is told before, how long the experiments take."""
 GROWING = 0.25
 """Share of the time in which data grow, where they do; it is taken from the search's."""
 TIMES = "search-seconds.txt"
@@ -91,6 +94,7 @@ def make_surrogate(
     proof: int | None = None,
     iterations: int | None = None,
     rounds: int | None = None,
+    workers: int | None = None,
     seed: int = 0,
     say: Callable[[str], None] = lambda _: None,
 ) -> Made:
@@ -104,6 +108,7 @@ def make_surrogate(
         proof: New experiments; 1,000 by default, or as many as there is time for.
         iterations: In place of the search's time: the same result on every machine.
         rounds: Rounds of added experiments, in place of those of the pipeline.
+        workers: Processes, in place of those of the pipeline.
         seed: Of the search.
         say: Told what makes a surrogate wrong, and how the proof goes.
 
@@ -120,6 +125,7 @@ def make_surrogate(
             remedy="give some minutes: 5 for a fast model, 60 for a slow one",
         )  # fmt: skip
     config = check(ExperimentConfig, read_yaml(pipeline), where=pipeline)
+    config = config if workers is None else config.model_copy(update={"workers": workers})
     growth = config.grow if rounds is None else (config.grow or GrowConfig()).model_copy(update={"rounds": rounds})
     reference = config.reference.at(pipeline.resolve().parent)
     mapping = Mapping(inputs=(*reference.inputs, *reference.parameters), outputs=tuple(reference.outputs))
@@ -135,12 +141,14 @@ def make_surrogate(
                 got="both", remedy="leave rounds out, or the fits of the pipeline",
             )  # fmt: skip
     began = time.monotonic()
+    if (first := first_look(Experiments(config=config, reference=reference), minutes=minutes)) is not None:
+        say(first)
     found = work.experimented()
     _check_moving(found.traces.with_role(Role.ESTIMATION), reference)
     # What a search has to learn; of fits that are asked for somebody knows it.
     begins = [] if config.fits else restless(found, mapping)
     jumps = [] if config.fits else jumps_told(found.traces.with_role(Role.ESTIMATION), mapping)
-    notes = [*begins, *jumps]
+    notes = [*_failed(found), *begins, *jumps]
     for note in notes:  # before an hour is spent
         say(f"note: {note}")
     plan, count = work.planned(found, minutes=minutes, spent=time.monotonic() - began, proof=proof)
@@ -148,8 +156,9 @@ def make_surrogate(
         say(plan.sentence(count))
     seconds_left = _kept(folder / TIMES, plan.search) - (0.0 if growth is None else GROWING * plan.whole)
     proving = _Proving(
-        reference=reference, design=config.experiment, taught=found.traces, count=count, workers=config.workers, say=say
-    )
+        reference=reference, design=config.experiment, taught=found.traces, count=count, workers=config.workers,
+        until=inf if proof or iterations else began + plan.whole - plan.finish, say=say,
+    )  # fmt: skip
     place = folder / "model"
     if config.fits:
         work.fitted(found, seconds_left / 60.0)
@@ -169,8 +178,9 @@ def make_surrogate(
         page = write_report(place)
     if fmu is not None:
         fmu = Path(shutil.copyfile(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu"))
-    if len(shown.errors) < PROOF:
-        notes.append(f"the proof is of {len(shown.errors)} experiments; --proof 1000 makes it of 1,000")
+    if (run := len(shown.errors) + shown.failed) < PROOF:
+        why = f", not of {count:,}, as the time was up" if run < count else ""
+        notes.append(f"the proof is of {run} experiments{why}; --proof 1000 makes it of 1,000")
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes)
 
 
@@ -203,7 +213,7 @@ class _Work:
         with ReferenceRuns(config=self.reference) as runs:
             each = runs.seconds_each()[0]
         each = self.reference.time_limit if each is None else max(each, 1e-3)
-        count = proof or int(np.clip(RUNNING * 60.0 * minutes * workers / each, 20, PROOF))
+        count = proof or int(np.clip(RUNNING * 60.0 * minutes * workers / each, FEWEST, PROOF))
         found_out = times(each, minutes=minutes, spent=spent, experiments=count, workers=workers, finish=finish)
         return found_out, count
 
@@ -245,6 +255,7 @@ class _Proving:
     taught: TraceSet
     count: int
     workers: int
+    until: float
     say: Callable[[str], None]
     done: dict[Path, Proof] = field(default_factory=dict)
 
@@ -252,7 +263,7 @@ class _Proving:
         """Prove the bundle in a folder."""
         proof, section = prove(
             read_bundle(place / "bundle"), self.reference, self.design, self.taught, count=self.count,
-            workers=self.workers, tolerance=TOLERANCE, progress=self._progress,
+            workers=self.workers, tolerance=TOLERANCE, until=self.until, progress=self._progress,
         )  # fmt: skip
         (place / FOLDER).mkdir(exist_ok=True)
         write_record(place / FOLDER / "proof.json", section)
@@ -281,6 +292,45 @@ def _grown(
     else:
         write_record(place / FILE, grown.record)
     return place, grown.record.sentence
+
+
+def first_look(experiments: Experiments, *, minutes: float) -> str | None:
+    """What experiments take, told before they are run: the first is run to see where nobody knows.
+
+    Args:
+        experiments: What is to be run.
+        minutes: Time for all.
+
+    Returns:
+        A sentence where they take much of the time, or the first gave no record; else nothing.
+    """
+    config, cases = experiments.config, [case for some in experiments.cases().values() for case in some]
+    left, each, _ = experiments.lacking(cases)
+    failed = ""
+    if left and each is None:
+        with ReferenceRuns(config=experiments.reference, workers=1) as runs:
+            (one,) = runs.run(cases[:1])
+        left, each = left - 1, one.wall_s
+        failed = "" if one.reason is None else f"; it gave no record: {one.reason}"
+    each = each or 0.0
+    seconds = left * each / config.workers
+    if seconds <= RUNS_MOST * 60.0 * minutes and not failed:
+        return None
+    return (
+        f"Time: {left} experiments are to be run, about {span(seconds)} of the {span(60.0 * minutes)} that were "
+        f"asked for, as one takes {each:.3g} s{failed}. Fewer runs take less, and a shorter time_limit where they hang."
+    )
+
+
+def _failed(found: Experimented) -> list[str]:
+    """That some experiments gave no record, and why: the surrogate has seen nothing of what they would have shown."""
+    of = sum(map(len, found.outcomes.values()))
+    if not found.failed:
+        return []
+    return [
+        f"{len(found.failed)} of {of} experiments gave no record, so that nothing was learnt there: "
+        f"{reasons_of(found.failed)}"
+    ]
 
 
 def _check_moving(traces: Sequence[Trace], reference: ReferenceConfig) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,15 @@ from sysid.export.bundle import Bundle
 from sysid.extras import has
 from sysid.references.config import InputPort, ReferenceConfig
 from sysid.references.design import Design, drawn
-from sysid.references.runs import Case, Outcome, Progress, ReferenceRuns
+from sysid.references.runs import Case, Outcome, Progress, ReferenceRuns, reasons_of
 from sysid.reporting.judging.results import CurveRecord, JudgementRecord, QuantityRecord, SceneRecord
 from sysid.traces import TraceSet
 
 SEED = 77_001
 """Of the proof, behind the design's: no experiment that taught is drawn from it."""
 WORST, POINTS = 10, 400
+FEWEST = 20
+"""Experiments of a proof, whatever the time."""
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
 
 
@@ -35,6 +38,7 @@ class Proof:
         largest: Largest error, likewise.
         outcomes: The experiments that gave a record, in the same order.
         failed: Those of the reference that gave none.
+        why: Why these gave none, in words.
         tolerance: Share of the range.
         outputs: Their names.
         spans: Range of each.
@@ -50,6 +54,7 @@ class Proof:
     largest: NDArray[np.float64]
     outcomes: Sequence[Outcome]
     failed: int
+    why: str
     tolerance: float
     outputs: tuple[str, ...]
     spans: NDArray[np.float64]
@@ -86,7 +91,12 @@ class Proof:
             f"Of {len(self.errors)} new random experiments that taught nothing, {100.0 * self.share:.1f} % are within "
             f"{percent:g} % of the range of every output (root mean square of the free run), and "
             f"{100.0 * self.share_everywhere:.1f} % at every sample; {self.diverged} diverged"
-            + (f"; the reference itself gave no record of {self.failed} more" if self.failed else "")
+            + (
+                f"; the reference itself gave no record of {self.failed} more, where nobody knows how the surrogate "
+                f"does: {self.why}"
+                if self.failed
+                else ""
+            )
         ]
         for name, values in self.quantiles().items():
             said = ", ".join(f"{q:.0%}: {100.0 * v:.3g} %" for q, v in zip(QUANTILES, values, strict=True))
@@ -147,7 +157,7 @@ class Proof:
 
 def prove(
     bundle: Bundle, config: ReferenceConfig, design: Design, taught: TraceSet, *, count: int, workers: int,
-    tolerance: float = 0.01, progress: Progress | None = None,
+    tolerance: float = 0.01, until: float = inf, progress: Progress | None = None,
 ) -> tuple[Proof, JudgementRecord]:  # fmt: skip
     """Run reference and surrogate on new random experiments.
 
@@ -159,6 +169,7 @@ def prove(
         count: How many.
         workers: Processes.
         tolerance: Share of the range.
+        until: The time of ``time.monotonic`` after which no run is begun any more, but for the first :data:`FEWEST`.
         progress: Told of each run.
 
     Returns:
@@ -169,7 +180,7 @@ def prove(
     """
     cases = drawn(config, design, count, seed=(design.seed, SEED), prefix="N")
     with ReferenceRuns(config=config, workers=workers) as runs:
-        done = runs.run(cases, progress)
+        done = runs.run(cases, progress, until=until, fewest=FEWEST)
     there = [one for one in done if one.trace is not None]
     if not there:
         raise ConfigError(
@@ -190,7 +201,7 @@ def prove(
     dropped = _drop_in(bundle, config, there[0], runs_of[0], spans)
     proof = Proof(
         errors=np.array(errors), largest=np.array(largest), outcomes=there, failed=len(done) - len(there),
-        tolerance=tolerance, outputs=outputs, spans=spans, surrogate_s=max(spent, 1e-7),
+        why=reasons_of(done), tolerance=tolerance, outputs=outputs, spans=spans, surrogate_s=max(spent, 1e-7),
         reference_s=float(np.nanmean([one.cpu_s for one in there])), **dropped,
     )  # fmt: skip
     return proof, proof.record([runs_of[k] for k in proof.worst])

@@ -18,6 +18,7 @@ def surrogate(
     proof: int | None = None,
     iterations: int | None = None,
     rounds: int | None = None,
+    workers: int | None = None,
     seed: int = 0,
 ) -> Made:
     """Make a surrogate of a slow model: experiments, a model, its export as a drop-in FMU, and the proof.
@@ -29,6 +30,7 @@ def surrogate(
         proof: New random experiments that teach nothing; 1,000, or as many as there is time for.
         iterations: In place of the search's time: the same result on every machine.
         rounds: Rounds of experiments that are added where the surrogate is worst, in place of those of the pipeline.
+        workers: Processes, in place of those of the pipeline.
         seed: Of the search.
 
     Returns:
@@ -39,6 +41,6 @@ def surrogate(
     """
     return make_surrogate(
         Path(pipeline), Path(folder), minutes=minutes, proof=proof, iterations=iterations, rounds=rounds,
-        seed=seed,
+        workers=workers, seed=seed,
         perform=lambda program, place: carry_out(program, place, command=COMMAND),
     )  # fmt: skip

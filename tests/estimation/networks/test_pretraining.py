@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import sysid
 from sysid.estimation import Training, fit_narx
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.basis import RegressorBasis
@@ -162,3 +163,13 @@ def test_with_a_stride_the_loss_is_that_of_every_so_manieth_sample(stride):
     assert_allclose(some.loss(theta), found.loss, rtol=1e-10)
     assert_allclose(found.gradient, J[rows].T @ (w * residual), rtol=1e-7, atol=1e-9)
     assert_allclose(found.gauss_newton, (J[rows] * w[:, None]).T @ J[rows], rtol=1e-7, atol=1e-9)
+
+
+def test_a_record_that_stands_at_its_limits_throughout_is_fitted_without_it():
+    """A truth value: no sample says what a step does, and a start was drawn among none."""
+    u = np.repeat([0.0, *np.random.default_rng(0).integers(0, 2, 15)], 5)
+    trace = sysid.data({"u": u, "y": u}, inputs="u", outputs="y", sample_time=1.0).traces[0]
+    network = NARX(input_delays="0:1", output_delays=1, neurons=2, limits=[0.0, 1.0])
+    how = Training(max_iterations=10, starts=2, pretraining=50, pretraining_iterations=5)
+    fit = fit_narx([trace], Mapping.parse("u -> y"), network, how, rest_output=0.0)
+    assert_allclose(fit.model.simulate(u[:, np.newaxis], History.at_rest(inputs=u[:1], output=0.0)), u, atol=0.01)

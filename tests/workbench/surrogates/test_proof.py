@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import sysid
 from sysid.errors import ConfigError
 from sysid.export import Bundle
+from sysid.field_checks import check
 from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish, proposed
@@ -20,7 +22,8 @@ from sysid.reporting.judging.results import JudgementRecord
 from sysid.reporting.report import write_report
 from sysid.workbench.auto.families import Family, Try
 from sysid.workbench.cli import run_cli
-from sysid.workbench.experiments.run import Experimented
+from sysid.workbench.experiments.config import ExperimentConfig
+from sysid.workbench.experiments.run import Experimented, Experiments
 from sysid.workbench.surrogates import make
 from sysid.workbench.surrogates.make import beginning_of, restless
 from sysid.workbench.surrogates.plan import pairs, times
@@ -134,6 +137,52 @@ def test_the_page_of_a_search_is_made_once_and_has_the_proof(tmp_path: Path, mon
     more = sysid.surrogate(tmp_path / "lag.yaml", tmp_path / "out", iterations=20, proof=5)
     assert len(made_of) == 2
     assert "Of 5 new random experiments" in more.report.read_text(encoding="utf-8")
+
+
+def test_a_proof_ends_with_its_time_and_says_what_gave_no_record(
+    proven: tuple[Bundle, Proof, JudgementRecord], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path))
+    monkeypatch.setattr("sysid.workbench.surrogates.proof.FEWEST", 6)
+    config = ReferenceConfig.model_validate({**REFERENCE, "python": "slow_models:raises"})
+    design = Design.model_validate({**DESIGN, "excitations": ["events"], "hold": [8, 8], "seed": 3})
+    u = np.linspace(0.0, 1.0, 40)
+    traces = sysid.data({"u": u, "y": u}, inputs="u", outputs="y", sample_time=0.5)
+    proof, section = prove(proven[0], config, design, traces, count=1000, workers=1, until=time.monotonic())
+    assert len(proof.errors) + proof.failed == 6
+    assert f"of {proof.failed} more, where nobody knows how the surrogate does: it raised ValueError" in section.method
+
+
+def test_what_experiments_take_is_told_before_they_are_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path))
+    content = {"kind": "experiment", "name": "lag", "workers": 1, "experiment": {**DESIGN, "excitations": ["events"]}}
+
+    def told(function: str, **more: object) -> str | None:
+        config = check(ExperimentConfig, {**content, "reference": {**REFERENCE, "python": function, **more}}, where="")
+        reference = config.reference.at(tmp_path)
+        return make.first_look(Experiments(config=config, reference=reference), minutes=1.0)
+
+    slow = told("slow_models:raises", cost=20.0)
+    assert slow is not None
+    assert "4 experiments are to be run, about 80 s of the 60 s that were asked for, as one takes 20 s" in slow
+    failed = told("slow_models:raises", inputs={"u": {"unit": "V", "range": [1.5, 2]}})
+    assert failed is not None
+    assert "it gave no record: it raised ValueError: valve jammed" in failed
+
+
+def test_what_would_be_passed_over_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "lag.py").write_text("", encoding="utf-8")
+    (tmp_path / "lag.yaml").write_text("kind: experiment", encoding="utf-8")
+    for words, said in (
+        (["surrogate", str(tmp_path / "lag.yaml"), "--range", "u=0:1", "--duration", "5"], "--range, --duration"),
+        (["init", str(tmp_path / "ws"), "--parameter", "m=0:1"], "--parameter"),
+        (["surrogate", str(tmp_path / "lag.py")], "named in a pipeline of kind experiment"),
+        (["surrogate", "lag:lag", "--range", "u=0:1"], "named in a pipeline of kind experiment"),
+        (["init", str(tmp_path / "ws"), "--reference", str(tmp_path / "lag.py")], "named in a pipeline of kind"),
+    ):
+        assert run_cli(words) != 0
+        assert said in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "ws").exists()
 
 
 @pytest.mark.parametrize("text", ["u", "u=3:1", "=1:2", "u=a:b"])
