@@ -83,7 +83,9 @@ class NeuralEnsemble(NeuralForm):
     def joined(self) -> NeuralForm:
         """The same as one neural state space: its matrices have a block a member on their diagonal."""
         s, n = self.sizes, len(self.shares)
-        wide = replace(s, states=n * s.states, neurons=n * s.neurons, output_neurons=n * s.output_neurons)
+        wide = replace(
+            s, states=n * s.states, neurons=n * s.neurons, output_neurons=n * s.output_neurons, integrators=0
+        )
         theta = np.empty(wide.count)
         for part in ("linear", "hidden", "output_hidden"):
             theta[getattr(wide, part)] = np.ravel(self._rows(part, np.ones(n), blocks=True))

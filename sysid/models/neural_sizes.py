@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +22,7 @@ class Sizes:
         neurons: ``k``, in the state equation.
         output_neurons: ``q``, in the output equation.
         outputs: ``o``.
+        integrators: The last so many states are sums: :attr:`held` says which parameters that fixes.
 
     Example:
         >>> Sizes(states=2, inputs=1, neurons=5, output_neurons=0).count
@@ -29,6 +34,7 @@ class Sizes:
     neurons: int
     output_neurons: int
     outputs: int = 1
+    integrators: int = 0
 
     @property
     def row(self) -> int:
@@ -80,6 +86,42 @@ class Sizes:
     def start(self) -> slice:
         """``E``: the map to the initial state."""
         return slice(self.output.stop, self.output.stop + self.states * (self.inputs + self.outputs + 1))
+
+    @property
+    def sums(self) -> slice:
+        """The states that are sums."""
+        return slice(self.states - self.integrators, self.states)
+
+    @property
+    def unfed(self) -> slice:
+        """Sums that no neuron feeds: all of them where other states can bring what neurons give, else all but one."""
+        return slice(max(self.sums.start, min(1, self.integrators)), self.states)
+
+    @cached_property
+    def held(self) -> NDArray[np.int64]:
+        """Places of the parameters that are none, as some states are sums.
+
+        A sum is added to itself and to sums after it, and nothing else reads it; no neuron feeds it (:attr:`unfed`).
+        """
+        n, places = self.states, np.arange(self.count)
+        M, V = places[self.linear].reshape(n, self.row), places[self.readout].reshape(n, self.neurons)
+        neurons = [places[part].reshape(-1, self.row) for part in (self.hidden, self.output_hidden)]
+        kept = [column for j in range(n)[self.sums] for column in (M[: j + 1, j], *(W[:, j] for W in neurons))]
+        return np.concatenate([places[:0], *kept, V[self.unfed].ravel()])
+
+    def hold(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters of which those that are held have their values: 1 of a sum by itself, else 0.
+
+        Args:
+            theta: Flat parameters, those of records' initial states behind them or not.
+
+        Returns:
+            The same shape.
+        """
+        found = theta.copy()
+        found[self.held] = 0.0
+        found[np.arange(self.states)[self.sums] * (self.row + 1)] = 1.0
+        return found
 
     @property
     def count(self) -> int:

@@ -40,6 +40,9 @@ class NeuralStateSpace(AbstractStructure):
         activation: The kind of the neurons: ``tanh``, which saturates, ``cubic``, which goes on growing beyond the
             training range as springs do that stiffen, or another of :data:`sysid.kernels.neurons.NEURONS`.
         output: ``plain``, or ``absolute`` for a sensor that cannot tell a sign.
+        integrators: The last so many states are sums, exactly: ``x(t+1) = x(t) + a z + b u + c``, where ``z`` are the
+            states before it. Nothing else reads a sum but the outputs, so that the plant is the same wherever it
+            stands. Neurons feed the other states; where there are none, the first sum.
 
     Raises:
         ConfigError: If a number or a name cannot be used.
@@ -54,6 +57,7 @@ class NeuralStateSpace(AbstractStructure):
     output_neurons: int = 0
     activation: Activation = PLAIN
     output: str = "plain"
+    integrators: int = 0
 
     acts_at_once = True
     kind = "NSS"
@@ -71,6 +75,14 @@ class NeuralStateSpace(AbstractStructure):
                     got=shortened(value),
                     remedy="write for example {kind: NSS, states: 2, neurons: 10}",
                 )
+        if not whole(self.integrators) or not 0 <= self.integrators <= self.states:
+            raise ConfigError(
+                "not a number of integrators",
+                where="integrators",
+                expected=f"a whole number from 0 to the number of states, {self.states}",
+                got=shortened(self.integrators),
+                remedy="write for example {kind: NSS, states: 2, neurons: 4, integrators: 1}",
+            )
         check_activation(self.activation)
         if self.output not in OUTPUTS:
             raise ConfigError(
@@ -86,6 +98,8 @@ class NeuralStateSpace(AbstractStructure):
         """States and neurons as ``NSS 2/10``, with the output's neurons and what is not the default."""
         numbers = [self.states, self.neurons, *([self.output_neurons] if self.output_neurons else [])]
         words = [self.activation] * (self.activation != PLAIN) + [self.output] * (self.output != "plain")
+        if self.integrators:
+            words.append(f"{self.integrators} integrator{'s' * (self.integrators > 1)}")
         return " ".join([self.kind, "/".join(str(number) for number in numbers), *words])
 
     def for_outputs(self, n_outputs: int) -> NeuralStateSpace:
@@ -110,6 +124,7 @@ class NeuralStateSpace(AbstractStructure):
             neurons=self.neurons,
             output_neurons=self.output_neurons,
             outputs=n_outputs,
+            integrators=self.integrators,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -121,6 +136,7 @@ class NeuralStateSpace(AbstractStructure):
             "output_neurons": self.output_neurons,
             "activation": self.activation,
             "output": self.output,
+            **({"integrators": self.integrators} if self.integrators else {}),  # without any they keep their digest
         }
 
 

@@ -136,12 +136,12 @@ class United:
         left += _left_out("their own free run is not stable", self.unstable)
         return (f"An ensemble: the mean of {n} free runs as one model; {price}.{left}",)
 
-    def posterior(self, runs: Sequence[Experiment], unread: slice | None) -> Posterior | None:
+    def posterior(self, runs: Sequence[Experiment], unread: NDArray[np.int64]) -> Posterior | None:
         """The posterior of the mixture, not calibrated.
 
         Args:
             runs: The estimation records as the ensemble's free run goes over them.
-            unread: Parameters that no record's run depends on, whose uncertainty is not known.
+            unread: Places of parameters that are none, or that no record's run depends on: their uncertainty is not known.
 
         Returns:
             The posterior; ``None`` where a member's evidence was never computed.
@@ -152,8 +152,7 @@ class United:
         for member, weight in zip(self.members, form.weights, strict=True):
             state, turned = member.candidate.solution.state, np.diag(member.turned(sizes))
             to_plain = np.eye(sizes.count, len(state.theta))
-            if unread is not None:
-                to_plain[unread] = 0.0
+            to_plain[unread] = 0.0
             own = laplace(state, member.candidate.model, turned @ to_plain, runs, copies=1)
             if own is None:
                 return None

@@ -11,8 +11,11 @@ over the ``N`` samples of the records, with :math:`z_t = [u_t; y_t; 1]` measured
 run, and over ``K`` equilibria: inputs that the records have, held until the model stands still. The first tells where a
 plant in motion is, the second where one is that has stood; they count alike.
 
+A model with integrators does not settle. Its second part are the states at which its records begin, and they count
+:data:`AS_BEGUN` times: of a slow state that a few samples do not show, a run is as far off for ever as the map is.
+
 Limits: one linear map cannot give both of a strongly nonlinear plant. Several samples say more, and are estimated with
-(:meth:`NeuralForm.corrected`). What does not settle while inputs are held, as an integrator, has no second part.
+(:meth:`NeuralForm.corrected`).
 """
 
 from __future__ import annotations
@@ -28,6 +31,8 @@ from sysid.models import NeuralForm
 HELD, LONGEST, STILL = 16, 4096, 1e-6
 """Inputs that are held; samples for which they are at most; and how little a state still moves in a sample, where its
 range is of order 1, when it has settled."""
+AS_BEGUN = 1e4
+"""Times that the states at which records of a model with integrators begin count as much as those that they visit."""
 DEPENDENT = 1e-10
 """Singular values below this part of the largest belong to samples that depend on each other: a channel that never
 moves, or an output that its inputs give alone."""
@@ -48,14 +53,16 @@ def learnt_map(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[
         return theta
     width = provider.template.sizes.inputs + provider.template.sizes.outputs + 1
     square, across = np.zeros((width, width)), np.zeros((width, provider.template.sizes.states))
-    for pairs in (_visited(provider, theta), _equilibria(provider, theta)):
+    sums = provider.template.sizes.integrators > 0
+    second = _begun(provider, theta) if sums else _equilibria(provider, theta)
+    for pairs, weight in ((_visited(provider, theta), 1.0), (second, AS_BEGUN if sums else 1.0)):
         own, joint, counted = np.zeros_like(square), np.zeros_like(across), 0
         for z, x in pairs:
             own += z.T @ z
             joint += z.T @ x
             counted += len(z)
-        square += own / max(counted, 1)
-        across += joint / max(counted, 1)
+        square += weight * own / max(counted, 1)
+        across += weight * joint / max(counted, 1)
     if not np.isfinite(square).all() or not np.isfinite(across).all():
         return theta
     found = theta.copy()
@@ -73,6 +80,13 @@ def _visited(provider: NeuralProvider, theta: NDArray[np.float64]) -> Pairs:
         for rows, path in blocks:
             kept = counts[rows]
             yield np.column_stack([u[rows], y[rows], np.ones(len(path))])[kept], path[kept]
+
+
+def _begun(provider: NeuralProvider, theta: NDArray[np.float64]) -> Pairs:
+    """The first sample of each record, and the state before it."""
+    for (u, y), blocks in zip(provider.signals, provider.paths(theta), strict=True):
+        _, path = next(blocks)
+        yield np.column_stack([u[:1], y[:1], np.ones(1)]), path[:1]
 
 
 def _equilibria(provider: NeuralProvider, theta: NDArray[np.float64]) -> Pairs:

@@ -215,6 +215,8 @@ class NeuralProvider(AbstractProvider):
             self._add(self._of_begun(record, theta), raw_gradient, raw_matrix, gradient, matrix)
             for whole in residuals.T:
                 correlated += len(whole) * correlation_time(whole)
+        held = self.template.sizes.held
+        gradient[held], matrix[held], matrix[:, held] = 0.0, 0.0, 0.0
         return Linearisation(
             loss=loss,
             gradient=gradient,
@@ -443,4 +445,5 @@ class NeuralProvider(AbstractProvider):
             J = np.zeros((*raw.shape[:2], len(theta)))
             J[..., dynamic], J[..., output] = raw[..., dynamic], raw[..., begun.stop :]
             J[..., to] += raw[..., begun] @ D
+            J[..., self.template.sizes.held] = 0.0
             yield rows, y, J

@@ -19,6 +19,7 @@ from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.regression import lagged
 from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
 from sysid.estimation.networks.initialise import AbstractLayout
+from sysid.estimation.networks.neural_integrators import summed
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.kernels import linear as linear_kernel
 from sysid.models import Lags, LinearStateSpace, NeuralForm
@@ -102,10 +103,12 @@ class NeuralLayout(AbstractLayout):
         """
         s = self.sizes
         places = np.arange(len(centre))
+        places[s.held] = -1
         members = {"linear": places[s.linear], "readout": places[s.readout], "output": places[s.output_linear]}
         for name, part in (("hidden", s.hidden), ("output hidden", s.output_hidden)):
             members |= {f"{name} {i}": places[part].reshape(-1, s.row)[:, i] for i in range(s.row)}
         members |= {"output readout": places[s.output_readout], "start": places[s.start], "records": places[s.count :]}
+        members = {name: where[where >= 0] for name, where in members.items()} | {"held": s.held}
         groups = tuple(Group(name=name, members=where) for name, where in members.items() if len(where))
         alphas = [
             FLAT_ALPHA * beta if name in {"start", "records"} else alpha for name in members if len(members[name])
@@ -130,12 +133,13 @@ class NeuralLayout(AbstractLayout):
         """
         if number == 0:
             return self.draw(rng, self.base), self.base
-        base = self._random_dynamics(rng) if number % 2 else self.base
         s = self.sizes
+        # Dynamics that are random add up to anything in a sum: with one, all starts have those of the linear model.
+        base = self._random_dynamics(rng) if number % 2 and not s.integrators else self.base
         forgets = 1.0 - np.minimum(np.abs(np.diag(base[s.linear].reshape(s.states, -1))), LARGEST_POLE)
         theta = self.draw(rng, base)
         theta[s.readout] = (LOUD_SPREAD * forgets[:, None] * rng.standard_normal((s.states, s.neurons))).ravel()
-        return self._quietened(theta, base), base
+        return self._quietened(s.hold(theta), base), base
 
     def _quietened(self, theta: NDArray[np.float64], base: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same start, its neurons so quiet that they do not lead its free run away from all that is measured."""
@@ -198,7 +202,7 @@ class NeuralLayout(AbstractLayout):
             biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
             theta[hidden] = np.column_stack([weights, biases]).ravel()
             theta[readout] = READOUT_SPREAD * rng.standard_normal(readout.stop - readout.start)
-        return theta
+        return s.hold(theta)
 
 
 def _swinging(
@@ -245,7 +249,7 @@ def linear_start(provider: NeuralProvider, *, until: float = math.inf) -> NDArra
         # What it takes cannot be bounded closely: it is left out where the others took most of the time.
         if s.outputs > 1 and not whole.rectified and until - now() >= now() - began:
             fits += [_fitted(linear, one, until - now()) for one in _by_subspace(linear, until)]
-    theta = _levelled(linear, _unit_states(linear, min(fits, key=linear.loss)))
+    theta = s.hold(_levelled(linear, _unit_states(linear, min(fits, key=linear.loss))))
     base = np.zeros(provider.n_parameters)
     for to, of in ((whole.sizes.linear, s.linear), (whole.sizes.output_linear, s.output), (whole.sizes.start, s.start)):
         base[to] = theta[of]
@@ -269,9 +273,9 @@ def _by_subspace(provider: NeuralProvider, until: float) -> list[NDArray[np.floa
 
 
 def _parameters(provider: NeuralProvider, matrices: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
-    """``A``, ``B``, ``C``, ``D`` and constants as flat parameters; a record begins in equilibrium."""
-    A, B, C, D, constant = matrices
+    """``A``, ``B``, ``C``, ``D`` and constants as flat parameters, sums last; a record begins in equilibrium."""
     s = provider.template.sizes
+    A, B, C, D, constant = summed(matrices, s.integrators)
     theta = np.zeros(provider.n_parameters)
     theta[s.linear] = np.column_stack([A, B, np.zeros(s.states)]).ravel()
     theta[s.output] = np.column_stack([C, D, constant]).ravel()

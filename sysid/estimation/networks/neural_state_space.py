@@ -336,13 +336,14 @@ def _posterior(
     """Of the model's weights; those of its map to an initial state only where a record begins by it."""
     model = chosen.model
     runs, others = records.runs(model)
-    unread = provider.template.sizes.start if provider.all_free else None
+    sizes = provider.template.sizes
+    places = np.arange(sizes.count)
+    unread = np.concatenate([sizes.held, places[sizes.start] if provider.all_free else places[:0]])
     if whole is not None and chosen is whole.candidate:
         found = whole.posterior(runs, unread)
     else:
         to_plain = np.eye(model.n_parameters, provider.n_parameters)
-        if unread is not None:
-            to_plain[unread] = 0.0
+        to_plain[unread] = 0.0
         found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
     return None if found is None else calibrate(found, model, others)
 
