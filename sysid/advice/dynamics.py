@@ -11,6 +11,8 @@ from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 
+INTEGRATES = "settling.integrates"
+"""Of a plant whose output stays wherever it is left."""
 TOO_FAST, FAR_TOO_FAST, TOO_SLOW, GOOD = 30.0, 100.0, 1.5, 8.0
 """Samples from 10 to 90 % of a step response: above and below which the rate is not good, and what it should be."""
 VISIBLE = 0.05
@@ -76,7 +78,9 @@ def _settling(record: Record, whole: ImpulseResponse, j: int, name: str) -> Find
         "length": total / seconds if seconds > 0.0 else np.inf,
         "lags_seconds": float(whole.time[-1]),
     }
-    if whole.explained < BARELY:
+    if record.integrates:
+        code, verdict = INTEGRATES, Verdict.NOTE
+    elif whole.explained < BARELY:
         code, verdict = "settling.unknown", Verdict.UNKNOWN
     elif not whole.settled:
         code, verdict = "settling.never", Verdict.LOOK

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.advice.integrators import SAMPLES, integrates
 from sysid.errors import UserError
 from sysid.estimation.nonparametric.feedback import Feedback, find_feedback
 from sysid.estimation.nonparametric.impulse import estimate_impulse_response
@@ -125,6 +126,15 @@ class Record:
                 # What is fast is gone from means over blocks: they are no view of a record that lives of it.
                 return (other, factor) if slowly.explained > found.explained - 0.02 else (self.some, 1)
         return self.some, 1
+
+    @cached_property
+    def integrates(self) -> bool:
+        """Whether the plant adds up what its inputs bring; see :mod:`sysid.advice.integrators`."""
+        found = self.impulse
+        if isinstance(found, str) or found.settled:
+            return False
+        factor = -(-sum(map(len, self.some.traces)) // SAMPLES)
+        return integrates(_blocks(self.some.traces, factor), self.some.mapping)
 
     @cached_property
     def residuals(self) -> list[Residual]:

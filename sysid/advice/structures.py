@@ -9,7 +9,7 @@ from sysid.advice.finding import Finding, Suggestion
 from sysid.advice.record import Record
 from sysid.errors import UserError
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, search_orders
-from sysid.models import ARX, NARX, Start, StartKind, TransferFunction
+from sysid.models import ARX, NARX, NeuralStateSpace, Start, StartKind, TransferFunction
 
 NOT_LINEAR = {"linearity.curved", "linearity.distorted", "linearity.perhaps_curved", "linearity.nothing_explained"}
 NOT_LINEAR |= {"channel.clipped_above", "channel.clipped_below"}
@@ -44,6 +44,9 @@ def suggestions(record: Record, findings: Sequence[Finding]) -> tuple[Suggestion
             found.insert(0, Suggestion(structure=transfer, code="structure.transfer_function_noise"))
         else:
             found.append(Suggestion(structure=transfer, code="structure.transfer_function"))
+    if record.integrates:
+        sums = NeuralStateSpace(states=2, neurons=2 if codes & NOT_LINEAR else 0, integrators=1)
+        found.append(Suggestion(structure=sums, code="structure.integrates"))
     if codes & NOT_LINEAR:
         lags = max(arx.na, 2)
         late = 0 if "linearity.nothing_explained" in codes else max(arx.nk, default=0) + 1

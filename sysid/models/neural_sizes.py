@@ -23,6 +23,7 @@ class Sizes:
         output_neurons: ``q``, in the output equation.
         outputs: ``o``.
         integrators: The last so many states are sums: :attr:`held` says which parameters that fixes.
+        integrators_seen: Neurons read the sums all the same.
 
     Example:
         >>> Sizes(states=2, inputs=1, neurons=5, output_neurons=0).count
@@ -35,6 +36,7 @@ class Sizes:
     output_neurons: int
     outputs: int = 1
     integrators: int = 0
+    integrators_seen: bool = False
 
     @property
     def row(self) -> int:
@@ -101,11 +103,13 @@ class Sizes:
     def held(self) -> NDArray[np.int64]:
         """Places of the parameters that are none, as some states are sums.
 
-        A sum is added to itself and to sums after it, and nothing else reads it; no neuron feeds it (:attr:`unfed`).
+        A sum is added to itself and to sums after it, and nothing else reads it, but neurons where they see sums; no
+        neuron feeds it (:attr:`unfed`).
         """
         n, places = self.states, np.arange(self.count)
         M, V = places[self.linear].reshape(n, self.row), places[self.readout].reshape(n, self.neurons)
-        neurons = [places[part].reshape(-1, self.row) for part in (self.hidden, self.output_hidden)]
+        blind = () if self.integrators_seen else (self.hidden, self.output_hidden)
+        neurons = [places[part].reshape(-1, self.row) for part in blind]
         kept = [column for j in range(n)[self.sums] for column in (M[: j + 1, j], *(W[:, j] for W in neurons))]
         return np.concatenate([places[:0], *kept, V[self.unfed].ravel()])
 

@@ -43,6 +43,8 @@ class NeuralStateSpace(AbstractStructure):
         integrators: The last so many states are sums, exactly: ``x(t+1) = x(t) + a z + b u + c``, where ``z`` are the
             states before it. Nothing else reads a sum but the outputs, so that the plant is the same wherever it
             stands. Neurons feed the other states; where there are none, the first sum.
+        integrators_seen: Neurons read the sums too: friction or a load that depends on the place. No linear term does,
+            so that bounded neurons let nothing run away.
 
     Raises:
         ConfigError: If a number or a name cannot be used.
@@ -58,6 +60,7 @@ class NeuralStateSpace(AbstractStructure):
     activation: Activation = PLAIN
     output: str = "plain"
     integrators: int = 0
+    integrators_seen: bool = False
 
     acts_at_once = True
     kind = "NSS"
@@ -83,6 +86,14 @@ class NeuralStateSpace(AbstractStructure):
                 got=shortened(self.integrators),
                 remedy="write for example {kind: NSS, states: 2, neurons: 4, integrators: 1}",
             )
+        if self.integrators_seen and not self.integrators:
+            raise ConfigError(
+                "there is no integrator to be seen",
+                where="integrators_seen",
+                expected="integrators: 1 or more beside it",
+                got="integrators: 0",
+                remedy="declare the integrators, or leave integrators_seen out",
+            )
         check_activation(self.activation)
         if self.output not in OUTPUTS:
             raise ConfigError(
@@ -99,7 +110,9 @@ class NeuralStateSpace(AbstractStructure):
         numbers = [self.states, self.neurons, *([self.output_neurons] if self.output_neurons else [])]
         words = [self.activation] * (self.activation != PLAIN) + [self.output] * (self.output != "plain")
         if self.integrators:
-            words.append(f"{self.integrators} integrator{'s' * (self.integrators > 1)}")
+            words.append(
+                f"{self.integrators} integrator{'s' * (self.integrators > 1)}{' seen' * self.integrators_seen}"
+            )
         return " ".join([self.kind, "/".join(str(number) for number in numbers), *words])
 
     def for_outputs(self, n_outputs: int) -> NeuralStateSpace:
@@ -125,6 +138,7 @@ class NeuralStateSpace(AbstractStructure):
             output_neurons=self.output_neurons,
             outputs=n_outputs,
             integrators=self.integrators,
+            integrators_seen=self.integrators_seen,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -136,7 +150,10 @@ class NeuralStateSpace(AbstractStructure):
             "output_neurons": self.output_neurons,
             "activation": self.activation,
             "output": self.output,
-            **({"integrators": self.integrators} if self.integrators else {}),  # without any they keep their digest
+            # Without any they keep their digest.
+            **(
+                {"integrators": self.integrators, "integrators_seen": self.integrators_seen} if self.integrators else {}
+            ),
         }
 
 

@@ -158,6 +158,10 @@ SAID: Final[dict[str, Words]] = {
         "A step of {who} takes {seconds:.3g} s to settle; the record is only {length:.1f} times that.",
         "Record ten times the settling time at least.",
     ),
+    "settling.integrates": Words(
+        "A step of {who} does not settle: the plant integrates, its output stays wherever it is left.",
+        "Fit what adds up exactly: NSS with integrators: 1, whose free run does not drift as a pole near one makes it.",
+    ),
     "settling.never": Words(
         "A step of {who} does not settle within {lags_seconds:.3g} s.",
         "An integrator, a very slow mode or a drift: fit with a pole near one, or record longer.",
@@ -246,6 +250,7 @@ SAID: Final[dict[str, Words]] = {
     "structure.transfer_function_noise": Words(
         "{label}: a transfer function; what is left is noise on the output, which ARX takes for dynamics."
     ),
+    "structure.integrates": Words("{label}: its output adds up exactly, as the plant's does."),
     "structure.network": Words("{label}: a network, since a line is not enough."),
 }
 

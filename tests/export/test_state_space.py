@@ -136,6 +136,12 @@ def build_vector() -> VectorStateSpaceModel:
     )  # fmt: skip
 
 
+def build_integrating() -> NeuralStateSpaceModel:
+    """A state that adds up, and neurons that see it."""
+    model = build_neural(neurons=3, integrators=1, integrators_seen=True)
+    return replace(model, theta=model.recursion.sizes.hold(model.theta))
+
+
 def build_vector_neural(**options) -> VectorNeuralStateSpaceModel:
     """Two outputs that share three states, and the output's neurons."""
     network = VectorNeuralStateSpace(states=3, **options)
@@ -168,6 +174,7 @@ TERMS = ("scaling", "mapping", "sample_time", "input_units", "output_unit", "res
 MODELS = {
     "innovations": build_innovations,
     "innovations, two outputs": build_vector,
+    "neural, an integrator": build_integrating,
     "Box-Jenkins": lambda: build_polynomial(
         BJ(nb=(1, 2), nc=1, nd=1, nf=(2, 1), nk=(3, 0)), [0.1, 0.2, -0.1, -1.8, 0.85, -0.9, 0.4, -0.9, 0.1]
     ),

@@ -141,7 +141,8 @@ class United:
 
         Args:
             runs: The estimation records as the ensemble's free run goes over them.
-            unread: Places of parameters that are none, or that no record's run depends on: their uncertainty is not known.
+            unread: Places of parameters that are none, or that no record's run depends on: their uncertainty is not
+                known.
 
         Returns:
             The posterior; ``None`` where a member's evidence was never computed.

@@ -8,7 +8,7 @@ from scipy import linalg
 
 
 def summed(matrices: tuple[NDArray[np.float64], ...], count: int) -> tuple[NDArray[np.float64], ...]:
-    r"""A linear model whose poles nearest 1 are moved there, their states the last ones and read by nothing before them.
+    r"""A linear model whose poles nearest 1 are moved there, their states last: nothing before them reads one.
 
     The real Schur form of :math:`A^T`, these poles last, gives orthogonal coordinates in which
     :math:`A = \begin{pmatrix} A_0 & 0 \\ A_1 & S \end{pmatrix}`; :math:`S` then becomes the identity, and what of it a

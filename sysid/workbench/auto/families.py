@@ -89,6 +89,8 @@ def _transfer_functions(looked: Looked) -> list[Try]:
 
 
 def _neural(looked: Looked) -> list[Try]:
+    if looked.integrators:
+        return _neural_sums(looked.integrators)
     sizes = ((2, 8, None), (2, 8, 0.03), (2, 8, 0.1), (2, 4, 1e-3), (3, 8, 0.03))
     found = [
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
@@ -100,6 +102,20 @@ def _neural(looked: Looked) -> list[Try]:
     return found
 
 
+def _neural_sums(integrators: int) -> list[Try]:
+    """Few neurons where they do not see what adds up; more where they do, as for what depends on the place."""
+    sizes = ((1, 0, None, False), (1, 1, 1e-3, False), (1, 2, 1e-3, False), (1, 4, 1.0, True), (1, 8, 1.0, True))
+    return [
+        Try(
+            structure=NeuralStateSpace(
+                states=integrators + n, neurons=k, integrators=integrators, integrators_seen=seen
+            ),
+            training={} if r is None else {"regularisation": r},
+        )
+        for n, k, r, seen in sizes
+    ]
+
+
 def _neural_in_motion(_: Looked) -> list[Try]:
     return [Try(structure=NeuralStateSpace(states=n, neurons=k)) for n, k in ((1, 4), (2, 8), (3, 8), (2, 0), (3, 0))]
 
@@ -109,9 +125,11 @@ def _around_neural(one: Try, looked: Looked) -> list[Try]:
     wider = {"neurons": round(1.6 * network.neurons) + 1}
     narrower = {"neurons": max(1, round(0.6 * network.neurons))}
     moves: list[dict[str, Any]] = [{"states": network.states + 1}, wider]
-    if looked.never_negative:
+    if network.integrators:
+        moves.insert(0, {"integrators_seen": not network.integrators_seen})
+    elif looked.never_negative:
         moves.insert(0, {"output": "absolute" if network.output == "plain" else "plain"})
-    moves += [{"states": network.states - 1}] if network.states > 1 else []
+    moves += [{"states": network.states - 1}] if network.states > 1 + network.integrators else []
     moves += [{"activation": "cubic" if network.activation == "tanh" else "tanh"}, narrower]
     return _moved(one, moves)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid.advice import Verdict
+from sysid.advice.dynamics import INTEGRATES
 from sysid.api.looking import Advice, SystemAdvice, advise
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
@@ -40,6 +41,7 @@ class Looked:
         ends: Whether an output stands at an end while inputs move on, as what integrates until it meets a stop: then
             what holds outputs there is tried first.
         all_end: Whether every one does, so that each may have a model of its own.
+        integrators: Outputs that add up what inputs bring: neural state spaces then have as many integrators.
         in_motion: Whether outputs move before any input does though each run begins as if they had stood: then what
             remembers one sample, or learns where it begins, is tried first.
     """
@@ -53,6 +55,7 @@ class Looked:
     in_motion: bool = False
     ends: bool = False
     all_end: bool = False
+    integrators: int = 0
 
     @property
     def lags(self) -> int:
@@ -89,6 +92,7 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         cautions=tuple(_cautions(advice)),
         ends=any(ends.values()),
         all_end=all(ends.values()),
+        integrators=sum(any(finding.code == INTEGRATES for finding in one.record.findings) for one in advice),
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
     )
 

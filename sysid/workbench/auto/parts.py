@@ -89,13 +89,15 @@ class Parts:
         return SEARCH if self.trained_on else {**SEARCH, "choose_by": "evidence"}
 
 
-def part(data: Data, start: Start, wall_s: float | None = None) -> Parts:
+def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool = False) -> Parts:
     """Part the estimation traces into what is fitted and what chooses.
 
     Args:
         data: The traces of the pipeline.
         start: How each free run begins.
         wall_s: Seconds of the search; ``None`` where iterations are counted.
+        in_turn: Whether every part chooses however long the record is: what adds up its errors may be right over one
+            part of a movement by chance.
 
     Returns:
         The parts.
@@ -108,7 +110,7 @@ def part(data: Data, start: Start, wall_s: float | None = None) -> Parts:
         names = ", ".join(trace.name for trace in data.selection)
         pairs, partial, told = [(list(traces), list(data.selection))], False, f"The selection traces chose: {names}."
     else:
-        pairs, told = _held_out(traces, start)
+        pairs, told = _held_out(traces, start, in_turn=in_turn)
         partial = True
     least = min(sum(int(trace.usable_samples.sum()) for trace in chooses) for _, chooses in pairs)
     if least < FEWEST:
@@ -158,7 +160,7 @@ def ends_held_out(traces: Sequence[Trace]) -> tuple[tuple[Trace, ...], tuple[Tra
 Pairs = list[tuple[list[Trace], list[Trace]]]
 
 
-def _held_out(traces: Sequence[Trace], start: Start) -> tuple[Pairs, str]:
+def _held_out(traces: Sequence[Trace], start: Start, *, in_turn: bool) -> tuple[Pairs, str]:
     """What is fitted and what chooses, fold by fold, and the rule."""
     if len(traces) >= FOLDS:
         groups = [list(traces[k::FOLDS]) for k in range(FOLDS)]
@@ -169,7 +171,7 @@ def _held_out(traces: Sequence[Trace], start: Start) -> tuple[Pairs, str]:
         pairs = [_masked(traces, k, start) for k in range(FOLDS)]
         what = f"every {FOLDS}th of {max(blocks)} blocks of {'the' if len(traces) == 1 else 'each'} estimation trace"
     rule = f"No selection traces are declared, so that {what} chose"
-    if sum(map(len, traces)) <= SHORT:
+    if in_turn or sum(map(len, traces)) <= SHORT:
         return pairs, f"{rule}, all of them in turn, and was not fitted meanwhile."
     return pairs[-1:], f"{rule} and was not fitted meanwhile."
 

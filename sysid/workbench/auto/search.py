@@ -126,7 +126,8 @@ class Search:
         Raises:
             ConfigError: If the record is too short.
         """
-        parts = part(data, config.start, config.wall_s)
+        looked = look(data, config.mapping, config.start)
+        parts = part(data, config.start, config.wall_s, in_turn=looked.integrators > 0)
         structure = stand_in(config)
         pipeline = config.sweep(structure).pipeline([FitConfig(name=FOUND, structure=structure)])
         if config.wall_s is not None:
@@ -143,7 +144,6 @@ class Search:
             folds=tuple((fold.fitted, fold.chooses) for fold in parts.folds),
             processor_time=True,
         )
-        looked = look(data, config.mapping, config.start)
         return cls(config=config, data=data, run=run, parts=parts, bench=bench, looked=looked)
 
     @property

@@ -1,5 +1,8 @@
 """States that are sums: exact in what is fitted, found from linear models, and better than poles near 1."""
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -10,7 +13,16 @@ from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks.neural_integrators import summed
 from sysid.estimation.networks.neural_map import learnt_map
 from sysid.estimation.networks.neural_provider import NeuralProvider
-from sysid.models import History, Mapping, NeuralForm, NeuralStateSpace, Scaling, Start, StartKind
+from sysid.models import (
+    History,
+    Mapping,
+    NeuralForm,
+    NeuralStateSpace,
+    Scaling,
+    Start,
+    StartKind,
+    structure_from_dict,
+)
 from sysid.models.neural_sizes import Sizes
 from sysid.traces import Channel, Trace
 
@@ -110,18 +122,19 @@ def test_neurons_feed_what_is_no_sum(states: int, integrators: int, unfed: int) 
     assert np.count_nonzero(np.abs(np.linalg.eigvals(A) - 1.0) < 1e-6) >= integrators
 
 
+@pytest.mark.parametrize("seen", [False, True], ids=["", "seen"])
 @pytest.mark.parametrize("start", [ESTIMATED, MEASURED, Start()], ids=["estimated", "measured", "at rest"])
-def test_sensitivities_are_those_of_what_is_free(start: Start) -> None:
-    network = NeuralStateSpace(states=3, neurons=2, output_neurons=1, integrators=1)
+def test_sensitivities_are_those_of_what_is_free(start: Start, seen: bool) -> None:
+    network = NeuralStateSpace(states=3, neurons=2, output_neurons=1, integrators=1, integrators_seen=seen)
     rows = a_provider(network, carried(1, 80), start)
     sizes = rows.template.sizes
     theta = sizes.hold(0.3 * np.random.default_rng(0).standard_normal(rows.n_parameters))
     J, held = rows.jacobian(theta), np.isin(np.arange(len(theta)), sizes.held)
     assert not J[:, held].any()
-    for at in np.flatnonzero(~held):
-        step = np.where(np.arange(len(theta)) == at, 1e-6, 0.0)
+    for place in np.flatnonzero(~held):
+        step = np.where(np.arange(len(theta)) == place, 1e-6, 0.0)
         slope = (rows.outputs(theta + step) - rows.outputs(theta - step)).ravel() / 2e-6
-        np.testing.assert_allclose(J[:, at], slope, atol=1e-6)
+        np.testing.assert_allclose(J[:, place], slope, atol=1e-6)
     at = rows.linearise(theta)
     assert not at.gradient[held].any()
     np.testing.assert_allclose(at.gauss_newton, J.T @ J, atol=1e-9)
@@ -144,7 +157,7 @@ def test_a_system_is_the_same_in_the_coordinates_of_its_sums(count: int) -> None
     A[3:, :3] = rng.standard_normal((count, 3))
     n = len(A)
     T, B, C = rng.standard_normal((n, n)), rng.standard_normal((n, 2)), rng.standard_normal((1, n))
-    own = (np.linalg.solve(T, A @ T), np.linalg.solve(T, B), C @ T, np.zeros((1, 2)), np.zeros(1))
+    own: tuple[Any, ...] = (np.linalg.solve(T, A @ T), np.linalg.solve(T, B), C @ T, np.zeros((1, 2)), np.zeros(1))
     found = summed(own, count)
     responses = [[C @ np.linalg.matrix_power(A, k) @ B for k in range(12)] for A, B, C, *_ in (own, found)]
     np.testing.assert_allclose(responses[1], responses[0], rtol=1e-4, atol=1e-4)
@@ -166,8 +179,20 @@ def test_other_numbers_are_refused(integrators: object) -> None:
         NeuralStateSpace(states=2, neurons=1, integrators=integrators)  # type: ignore[arg-type]
 
 
+def test_neurons_may_see_where_the_plant_stands_and_nothing_linear_does() -> None:
+    plain, seen = (
+        NeuralStateSpace(states=2, neurons=3, integrators=1, integrators_seen=seen).sizes(1) for seen in (False, True)
+    )
+    more = np.setdiff1d(plain.held, seen.held)
+    assert set(more) == set(np.arange(plain.count)[plain.hidden].reshape(3, -1)[:, 1])
+    with pytest.raises(ConfigError, match="no integrator to be seen"):
+        NeuralStateSpace(states=2, neurons=3, integrators_seen=True)
+
+
 def test_it_is_named_and_stored() -> None:
     network = NeuralStateSpace(states=3, neurons=2, integrators=2)
     assert network.label == "NSS 3/2 2 integrators"
+    assert structure_from_dict(network.to_dict()) == network
+    assert structure_from_dict(replace(network, integrators_seen=True).to_dict()).label.endswith("2 integrators seen")
     assert network.to_dict()["integrators"] == 2
     assert "integrators" not in NeuralStateSpace(states=3, neurons=2).to_dict()

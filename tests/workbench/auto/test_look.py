@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid.models import Mapping, Start, StartKind
+from sysid.models import Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Role, Trace
+from sysid.workbench.auto.families import FAMILIES
 from sysid.workbench.auto.look import Looked, at_ends, in_motion, look
 from tests.workbench.auto.conftest import data, record
 
@@ -60,8 +61,19 @@ def test_traces_that_only_score_have_no_say(looked: Looked) -> None:
 def test_a_sensor_that_may_not_tell_a_sign_is_known_but_for_its_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sysid.workbench.auto.look._orders", lambda *_: ())
     monkeypatch.setattr("sysid.workbench.auto.look.advise", lambda *_: replaced)
-    replaced = type("Advice", (), {"suggestions": (), "record": None, "mapping": MAPPING})
+    nothing = type("Record", (), {"findings": ()})
+    replaced = type("Advice", (), {"suggestions": (), "record": nothing, "mapping": MAPPING})
     monkeypatch.setattr("sysid.workbench.auto.look.lines", lambda _: [])
     lowest = float(record("a", 200)["y"].min())
     for by, one_sign in ((0.0, False), (-lowest, True), (-lowest - 0.005, True), (-lowest - 0.1, False)):
         assert look(data(shifted(record("a", 200), by)), MAPPING, ESTIMATED).never_negative is one_sign
+
+
+def test_what_adds_up_is_known(monkeypatch: pytest.MonkeyPatch, looked: Looked) -> None:
+    monkeypatch.setattr("sysid.workbench.auto.look._orders", lambda *_: ())
+    settles = record("a", 300)
+    summed = replace(settles, values=np.column_stack([settles.columns(["u"]), np.cumsum(settles["u"])]))
+    found = look(data(summed), MAPPING, ESTIMATED)
+    assert (looked.integrators, found.integrators) == (0, 1)
+    first = next(family for family in FAMILIES if family.kind == NeuralStateSpace.kind).first(found)
+    assert {one.structure.to_dict().get("integrators") for one in first} == {1}

@@ -1,0 +1,76 @@
+"""Whether the plant integrates: whether a linear model that adds up exactly does as well as one that need not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from sysid.errors import UserError
+from sysid.estimation.experiment import experiments_of, unit_range
+from sysid.estimation.networks.neural_provider import NeuralProvider
+from sysid.estimation.networks.neural_start import linear_start
+from sysid.models import Mapping, NeuralForm, Start, StartKind
+from sysid.models.neural_sizes import Sizes
+from sysid.traces import Trace
+
+STATES = (2, 3)
+"""Of the linear models that are compared."""
+SAMPLES = 1_000
+"""To which a longer record is slowed by means over blocks: it is about what is slow."""
+NO_WORSE, EXACT = 1.5, 1e-10
+"""Times the mean squared error of a model that need not add up which one that does may have; and the share of the
+output's variance below which an error is none."""
+UNEXPLAINED = 0.1
+"""Share of the output's variance that the best model may leave: of what it leaves, nobody knows whether it adds up."""
+BRINGS = 0.5
+"""Share of the output's variance that has to come from the sum: one that brings nothing does no harm either."""
+
+
+def integrates(traces: Sequence[Trace], mapping: Mapping) -> bool:
+    r"""Whether the plant adds up what its inputs bring, so that its output stays wherever it is left.
+
+    Linear state spaces are fitted to the free run, with and without a pole that is 1 exactly. A pole that is found near
+    1 says little: of a plant with friction it lies beside 1 by more than its interval. What a record does show is
+    whether anything is lost where the level of the output changes nothing. A plant integrates where the sum brings
+    most of the output, and the model that has it leaves about as little as one that is free.
+
+    Args:
+        traces: The records.
+        mapping: Inputs and output.
+
+    Returns:
+        Whether it does; not where linear models explain too little to say.
+    """
+    try:
+        rest = float(np.mean([trace[mapping.output][0] for trace in traces]))
+        experiments = experiments_of(traces, mapping, Start(kind=StartKind.ESTIMATED), rest)
+    except UserError:
+        return False
+    sizes = Sizes(states=1, inputs=len(mapping.inputs), neurons=0, output_neurons=0)
+    form = NeuralForm(sizes=sizes, theta=np.zeros(sizes.count), scaling=unit_range(experiments))
+    records = NeuralProvider(template=form, experiments=experiments)
+    values = [y[counts] for (_, y), counts in zip(records.signals, records.counted, strict=True)]
+    variance = float(np.var(np.concatenate(values)))
+    free = min(_left(records, states, 0)[0] for states in STATES)
+    if free > UNEXPLAINED * variance:
+        return False
+    left, brought = min(_left(records, states, 1) for states in STATES)
+    return left <= max(NO_WORSE * free, EXACT * variance) and brought >= BRINGS * variance
+
+
+def _left(records: NeuralProvider, states: int, integrators: int) -> tuple[float, float]:
+    """Mean squared error of the best linear model, and the variance that the mode at 1 brings; in scaled numbers."""
+    sizes = replace(records.template.sizes, states=states, integrators=integrators)
+    form = replace(records.template, sizes=sizes, theta=np.zeros(sizes.count))
+    provider = replace(records, template=form)
+    theta = linear_start(provider)
+    M = theta[sizes.linear].reshape(states, -1)[:, :states]
+    values, left, right = scipy.linalg.eig(M, left=True)
+    last = np.argmin(np.abs(values - 1.0))
+    mode, shape = left[:, last].real, right[:, last].real
+    brings = float(theta[sizes.output_linear][:states] @ shape) / float(mode @ shape or 1.0)
+    paths = np.concatenate(provider.states(theta))
+    return 2.0 * provider.loss(theta) / provider.n_samples, float(np.var(brings * (paths @ mode)))

@@ -1,0 +1,83 @@
+"""A plant that adds up is told from one that is slow, and from one that is hidden in noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from sysid.advice import Advice, Verdict, advise
+from sysid.advice.integrators import integrates
+from sysid.models import Mapping, NeuralStateSpace
+from sysid.traces import Channel, Role, Trace, TraceSet
+
+Array = NDArray[np.float64]
+MAPPING = Mapping.parse("u -> y")
+N = 900
+STEPS = np.repeat(np.random.default_rng(3).uniform(-1.0, 1.0, N // 15), 15)
+
+
+def a_trace(u: Array, y: Array, noise: float = 0.01) -> Trace:
+    """With noise as a share of the output's deviation."""
+    noisy = y + noise * np.std(y) * np.random.default_rng(9).standard_normal(len(y))
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
+    return Trace(name="a", sample_time=0.1, channels=channels, values=np.column_stack([u, noisy]))
+
+
+def carriage(n: int = N) -> tuple[Array, Array]:
+    """Friction, a load that nobody measures, and a controller: as machines that position something are recorded."""
+    wanted = np.repeat(np.random.default_rng(1).uniform(-1.0, 1.0, n // 60), 60)
+    u, y, speed, place = np.empty(n), np.empty(n), 0.0, 0.0
+    for t in range(n):
+        y[t] = place
+        u[t] = 2.0 * (wanted[t] - place) - 1.5 * speed
+        place += 0.1 * speed
+        speed += 0.1 * (u[t] + 0.1 - 0.8 * speed - 0.06 * np.tanh(20.0 * speed))
+    return u, y
+
+
+def first_order(pole: float) -> Array:
+    return np.asarray(lfilter([0.0, 1.0], [1.0, -pole], STEPS))
+
+
+@pytest.mark.parametrize(
+    ("u", "y"),
+    [
+        pytest.param(STEPS, np.cumsum(STEPS), id="an integrator"),
+        pytest.param(STEPS + 0.3, np.cumsum(lfilter([0.2], [1.0, -0.8], STEPS)), id="an offset of the input"),
+        pytest.param(*carriage(), id="with friction, in a loop"),
+    ],
+)
+def test_what_adds_up_is_found(u: Array, y: Array) -> None:
+    assert integrates([a_trace(u, y)], MAPPING)
+    assert integrates([a_trace(u, y + 40.0)], MAPPING)
+    assert integrates([a_trace(u, y, noise=0.0)], MAPPING)
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "noise"),
+    [
+        pytest.param(STEPS, first_order(0.97), 0.01, id="a slow pole"),
+        pytest.param(STEPS, first_order(0.99), 0.01, id="a very slow one"),
+        pytest.param(STEPS, lfilter([0.1], [1.0, -1.8, 0.9], STEPS), 0.01, id="a resonance"),
+        pytest.param(STEPS, first_order(0.9) + np.linspace(0.0, 5.0, N), 0.01, id="a drift beside it"),
+        pytest.param(STEPS, np.cumsum(STEPS), 0.5, id="nothing but noise can be said"),
+    ],
+)
+def test_what_settles_is_not_taken_for_it(u: Array, y: Array, noise: float) -> None:
+    assert not integrates([a_trace(u, y, noise)], MAPPING)
+
+
+def look(u: Array, y: Array) -> Advice:
+    return advise(TraceSet(name="x", traces=(a_trace(u, y),), roles={"a": Role.ESTIMATION}), MAPPING)
+
+
+def test_it_is_told_and_what_is_suggested_has_it() -> None:
+    found = look(*carriage())
+    told = found.find("settling.integrates", "u")
+    assert told is not None
+    assert told.verdict is Verdict.NOTE
+    networks = [one.structure for one in found.suggestions if isinstance(one.structure, NeuralStateSpace)]
+    assert [one.integrators for one in networks] == [1]
+    assert "integrates" in str(found)
