@@ -18,12 +18,14 @@ from sysid.reporting.fit_tables import (
     accuracy_table,
     case_columns,
     data_table,
+    drawn_cases,
     export_table,
     quality_table,
     ranking_table,
     run_time_table,
     scored_cases,
     systems_table,
+    told_of_drawn,
 )
 from sysid.reporting.growth import growth_section
 from sysid.reporting.judging.document import judgement_sections
@@ -156,14 +158,16 @@ def _quality(fit: FitRecord) -> list[Table]:
 
 def _columns(results: Results) -> int:
     """How finely time plots are drawn, so that a page with many of them stays under three megabytes."""
-    pictures = sum(len(fit.cases) for fit in results.fits)
+    pictures = sum(len(drawn_cases(fit)) for fit in results.fits)
     return max(60, min(450, 450 * 30 // pictures))
 
 
 def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int) -> list[Part]:
-    output = output_side(fit.mapping)
-    parts: list[Part] = []
+    output, drawn = output_side(fit.mapping), drawn_cases(fit)
+    parts: list[Part] = [*told_of_drawn(len(drawn), len(fit.cases))]
     for index, (name, case) in enumerate(fit.cases.items()):
+        if name not in drawn:
+            continue
         signal = signals[name]
         figure = figures.case_figure(
             signal.time,

@@ -16,6 +16,54 @@ SCORED = (Role.VALIDATION, Role.TEST)
 """Roles of the cases that a verdict rests on: nothing was fitted to them or chosen on them."""
 
 
+DRAWN, DRAWN_SCORED = 12, 8
+"""Cases that are drawn one by one, and how many of them at least are such as a verdict rests on, where there are so
+many: drawing all takes longer than a fit, and nobody looks through them."""
+
+
+def drawn_cases(fit: FitRecord) -> list[str]:
+    """The cases of a fit that are drawn: all where they are few, else the worst of those that a verdict rests on.
+
+    Where these leave room, the worst of the others stand beside them.
+
+    Args:
+        fit: The fit.
+
+    Returns:
+        Their names, in the order of the file.
+    """
+    if len(fit.cases) <= DRAWN:
+        return list(fit.cases)
+
+    def worst(names: Collection[str]) -> list[str]:
+        return sorted(names, key=lambda name: -_size(fit.cases[name].free_run.mse))
+
+    scored = worst(scored_cases(fit))
+    rest = worst([name for name in fit.cases if name not in scored])
+    first = scored[: max(DRAWN_SCORED, DRAWN - len(rest))]
+    kept = {*first, *rest[: DRAWN - len(first)]}
+    return [name for name in fit.cases if name in kept]
+
+
+def worst_case(fit: FitRecord) -> str:
+    """The case in which a fit is weakest, of those that a verdict rests on where there are some."""
+    return max(scored_cases(fit) or fit.cases, key=lambda name: _size(fit.cases[name].free_run.mse))
+
+
+def told_of_drawn(drawn: int, of: int) -> list[str]:
+    """That not all cases are drawn, where that is so."""
+    if drawn == of:
+        return []
+    return [
+        f"Drawn are {drawn} of {of} cases: the worst of those that were not fitted, and of those that were. The "
+        "tables have all."
+    ]
+
+
+def _size(mse: float) -> float:
+    return math.inf if math.isnan(mse) else mse
+
+
 def case_columns(fits: Sequence[FitRecord]) -> dict[str, Role]:
     """The cases of some fits with their roles, in the order of the file."""
     return {name: case.role for fit in fits for name, case in fit.cases.items()}

@@ -8,7 +8,7 @@ from typing import Final
 
 from sysid.reporting.figures.comparison_figure import Overlay, comparison_figure
 from sysid.reporting.figures.style import PALETTE
-from sysid.reporting.fit_tables import SCORED, case_columns
+from sysid.reporting.fit_tables import SCORED, case_columns, drawn_cases, told_of_drawn, worst_case
 from sysid.reporting.parts import Gallery, Part, Section, picture
 from sysid.reporting.results import FitRecord, Results
 from sysid.reporting.signals import CaseSignals
@@ -32,9 +32,10 @@ def overview_section(results: Results, signals: Dict[str, Dict[str, CaseSignals]
     """
     parts: list[Part] = []
     for index, (mapping, fits) in enumerate(results.mappings().items()):
-        shown = sorted(fits, key=_rank)[:MOST]
+        shown = _shown(fits)
         if len(shown) < len(fits):
             parts.append(f"{mapping}: the {MOST} best of {len(fits)} models on the traces that choose.")
+        parts += told_of_drawn(len(overview_cases(fits)), len(case_columns(fits)))
         parts.append(_gallery(mapping, shown, signals, f"overview-{index}"))
     return Section(anchor="overview", title="All models over the measured output", parts=tuple(parts))
 
@@ -75,10 +76,16 @@ def overview_cases(fits: list[FitRecord]) -> list[str]:
         fits: Of one mapping.
 
     Returns:
-        Names of the cases.
+        Names of the cases that are drawn.
     """
-    roles = case_columns(fits)
-    return sorted(roles, key=lambda case: roles[case] not in SCORED)
+    roles, shown = case_columns(fits), _shown(fits)
+    # Those of the best, and the worst of each other.
+    drawn = {*drawn_cases(shown[0]), *(worst_case(fit) for fit in shown)}
+    return sorted((case for case in roles if case in drawn), key=lambda case: roles[case] not in SCORED)
+
+
+def _shown(fits: list[FitRecord]) -> list[FitRecord]:
+    return sorted(fits, key=_rank)[:MOST]
 
 
 def _rank(fit: FitRecord) -> tuple[bool, float]:

@@ -9,7 +9,7 @@ from typing import Final
 
 from sysid.errors import ConfigError
 from sysid.names import markdown, markdown_cell, markdown_code
-from sysid.reporting.fit_tables import scored_cases
+from sysid.reporting.fit_tables import worst_case
 from sysid.reporting.html import readable
 from sysid.reporting.kinds import read_run, run_document, run_scores
 from sysid.reporting.markdown import (
@@ -121,7 +121,7 @@ def _page(document: Document, name: str, command: str, folder: Path) -> str:
     for section in document.sections:
         if not section.anchor.startswith(LEFT_OUT):
             lines += section_lines(section, drawings)
-    lines += ["", "The whole report, with every case of every fit: run the command above and open `report/index.html`."]
+    lines += ["", "The whole report, with the cases of every fit: run the command above and open `report/index.html`."]
     return "\n".join(lines) + "\n"
 
 
@@ -144,7 +144,6 @@ def _belongs(drawing: str, results: RunResults) -> bool:
     best = results.best_fit
     if best is None:
         return drawing.startswith("overview-") and drawing.endswith("-0")
-    judged = scored_cases(best) or best.cases
-    worst = max(judged, key=lambda case: judged[case].free_run.mse)
+    worst = worst_case(best)
     cases = overview_cases(results.mappings()[best.mapping]) if drawing.startswith("overview-") else list(best.cases)
-    return drawing.endswith(f"-{cases.index(worst)}")
+    return drawing.endswith(f"-{cases.index(worst) if worst in cases else 0}")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 
+from sysid.reporting.fit_tables import DRAWN
+
 FINISHING_S, PICTURE_S = 15.0, 0.25
 """Processor seconds that scores, export and what has to be loaded for them take, and each picture of the report."""
 PROBE_S, MOST = 0.2, 10.0
@@ -14,7 +16,7 @@ def finish_s(records: int, outputs: int, *, slowed: float | None = None) -> floa
     """About how long scores, export and report take.
 
     Args:
-        records: That the report draws.
+        records: Of the data; the report draws :data:`~sysid.reporting.fit_tables.DRAWN` of them at most.
         outputs: Of each.
         slowed: How many times as long a second of work takes; measured now by default.
 
@@ -23,9 +25,9 @@ def finish_s(records: int, outputs: int, *, slowed: float | None = None) -> floa
 
     Example:
         >>> finish_s(20, 2, slowed=1.0)
-        35.0
+        27.0
     """
-    pictures = 2.0 * records * outputs  # a gallery of all models, and each model by itself
+    pictures = 2.0 * min(records, DRAWN) * outputs  # a gallery of all models, and each model by itself
     return (slowness() if slowed is None else slowed) * (FINISHING_S + PICTURE_S * pictures)
 
 

@@ -162,7 +162,7 @@ class Times:
             return f"{said}."
         return (
             f"{said}: about {span(whole)} in all, more than the {span(self.whole)} that were asked for. Fewer "
-            "experiments of the proof (--proof), and fewer that the report draws, take less."
+            "experiments of the proof (--proof) take less."
         )
 
 
