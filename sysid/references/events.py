@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sysid.field_checks import FieldError
 from sysid.references.config import InputPort
 
+BLOCK = 8
+"""Departures over which levels are spread: about as many as an experiment has."""
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -47,6 +51,10 @@ class Events(BaseModel):
     ) -> NDArray[np.float64]:
         """An input that moves so.
 
+        How far its departures go, in how many steps and whether they are taken back is spread evenly over them, as the
+        levels of an ``aprbs`` are: each drawn by itself, few departures may miss an end of the range, or all go there.
+        Times are random: spread evenly too, long ones would make up for short ones, and nothing add up for long.
+
         Args:
             rng: What is random.
             length: Samples.
@@ -59,26 +67,32 @@ class Events(BaseModel):
         """
         shortest, longest = holds
         rests = (shortest, 2 * longest) if self.rest is None else tuple(max(1, round(one / h)) for one in self.rest)
-        x, at = np.full(length, port.begin), 0
+        x, at, departures = np.full(length, port.begin), 0, _evenly(rng, 5)
         while at < length:
             at += int(rng.integers(rests[0], rests[1] + 1))
-            held = int(rng.integers(shortest, longest + 1))
-            for number, level in enumerate(self._levels(rng, port)):
-                held = int(rng.integers(shortest, longest + 1)) if number else held
+            for level in self._levels(port, next(departures)):
+                held = int(rng.integers(shortest, longest + 1))
                 x[at : at + held] = level
                 at += held
         return x
 
-    def _levels(self, rng: np.random.Generator, port: InputPort) -> list[float]:
-        """The levels of one departure, in their order."""
-        begin, drawn = port.begin, float(rng.uniform(*port.range))
-        end = port.range[1] if drawn >= begin else port.range[0]
-        share = 0.0 if end == begin else self.least + (1.0 - self.least) * (drawn - begin) / (end - begin)
-        if self.ends and rng.random() < self.ends:
-            share = float(rng.choice([self.least or 1.0, 1.0]))
-        count = int(rng.integers(1, self.steps + 1)) if self.steps > 1 else 1
+    def _levels(self, port: InputPort, drawn: NDArray[np.float64]) -> list[float]:
+        """The levels of one departure in their order, by five numbers from 0 to 1: what differs between departures."""
+        end, place, steps, back, kept = drawn.tolist()
+        begin, level = port.begin, port.range[0] + place * (port.range[1] - port.range[0])
+        far = port.range[1] if level >= begin else port.range[0]
+        share = 0.0 if far == begin else self.least + (1.0 - self.least) * (level - begin) / (far - begin)
+        if end < self.ends:
+            share = (self.least or 1.0) if end < 0.5 * self.ends else 1.0
+        count = 1 + int(steps * self.steps)
         shares = np.linspace(max(self.least, share / count), share, count) if count > 1 else np.array([share])
-        if self.back and rng.random() < self.back:
-            shares = np.append(shares, share * rng.uniform(0.0, 0.8))
-        # One level as it was drawn: to go there by its share would move its last digit.
-        return [drawn] if self == Events(rest=self.rest) else (begin + shares * (end - begin)).tolist()
+        if back < self.back:
+            shares = np.append(shares, share * 0.8 * kept)
+        return list((begin + shares * (far - begin)).tolist())
+
+
+def _evenly(rng: np.random.Generator, columns: int) -> Iterator[NDArray[np.float64]]:
+    """Rows of numbers from 0 to 1: of each block that follow each other one in each strip of each column."""
+    cube = scipy.stats.qmc.LatinHypercube(columns, rng=rng)
+    while True:
+        yield from cube.random(BLOCK)

@@ -44,6 +44,23 @@ def test_as_they_are_by_default_each_is_one_level_anywhere_in_the_range() -> Non
     assert max(level for level, _ in away) > 88.0
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_few_departures_go_evenly_far_and_none_of_the_ends_is_missed(seed: int) -> None:
+    x = Events().drawn(np.random.default_rng(seed), 4_000, 0.5, (10, 30), HANDLE)
+    away = [level for level, _ in stretches(x) if level != 90.0]
+    for first in (0, 8, 16):
+        assert sorted(np.floor((np.array(away[first : first + 8]) - 60.0) / 30.0 * 8)) == list(range(8))
+    x = BRAKE.drawn(np.random.default_rng(seed), 2_000, 0.5, (10, 30), HANDLE)
+    assert {60.0, 84.0} <= {round(level, 9) for level, _ in stretches(x)}
+
+
+def test_times_are_random_or_what_adds_up_would_not_for_long() -> None:
+    x = Events(rest=(20.0, 59.5)).drawn(np.random.default_rng(0), 400_000, 0.5, (10, 25), HANDLE)
+    rests = np.array([count for level, count in stretches(x) if level == 90.0], dtype=float)
+    sums = rests[: len(rests) // 8 * 8].reshape(-1, 8).sum(axis=1)
+    assert np.var(sums) == pytest.approx(8 * np.var(rests), rel=0.2)
+
+
 @pytest.mark.parametrize("options", [{"steps": 0}, {"least": 2.0}, {"rest": [5, 1]}, {"stpes": 2}])
 def test_options_that_cannot_be_are_refused(options: dict[str, object]) -> None:
     with pytest.raises(ValueError, match="events cannot be so"):
