@@ -18,7 +18,7 @@ from sysid.traces import Trace
 
 STATES = (2, 3)
 """Of the linear models that are compared."""
-SAMPLES = 1_000
+SAMPLES = 500
 """To which a longer record is slowed by means over blocks: it is about what is slow."""
 NO_WORSE, EXACT = 1.5, 1e-10
 """Times the mean squared error of a model that need not add up which one that does may have; and the share of the

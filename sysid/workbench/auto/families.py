@@ -56,6 +56,7 @@ class Family:
         in_motion: What of it is tried before all else where runs do not begin at rest: what learns where it begins, or
             remembers one sample alone.
         at_ends: What of it is tried before all else where outputs stand at ends: what is held there.
+        adds_up: What of it is tried before all else where outputs add up what inputs bring.
     """
 
     kind: str
@@ -64,6 +65,7 @@ class Family:
     around: Callable[[Try, Looked], Sequence[Try]] = lambda _, __: ()
     in_motion: Callable[[Looked], Sequence[Try]] = lambda _: ()
     at_ends: Callable[[Looked], Sequence[Try]] = lambda _: ()
+    adds_up: Callable[[Looked], Sequence[Try]] = lambda _: ()
 
 
 def _arx(looked: Looked) -> list[Try]:
@@ -90,7 +92,7 @@ def _transfer_functions(looked: Looked) -> list[Try]:
 
 def _neural(looked: Looked) -> list[Try]:
     if looked.integrators:
-        return _neural_sums(looked.integrators)
+        return _neural_sums(looked)
     sizes = ((2, 8, None), (2, 8, 0.03), (2, 8, 0.1), (2, 4, 1e-3), (3, 8, 0.03))
     found = [
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
@@ -102,14 +104,13 @@ def _neural(looked: Looked) -> list[Try]:
     return found
 
 
-def _neural_sums(integrators: int) -> list[Try]:
+def _neural_sums(looked: Looked) -> list[Try]:
     """Few neurons where they do not see what adds up; more where they do, as for what depends on the place."""
     sizes = ((1, 0, None, False), (1, 1, 1e-3, False), (1, 2, 1e-3, False), (1, 4, 1.0, True), (1, 8, 1.0, True))
+    sums = looked.integrators
     return [
         Try(
-            structure=NeuralStateSpace(
-                states=integrators + n, neurons=k, integrators=integrators, integrators_seen=seen
-            ),
+            structure=NeuralStateSpace(states=sums + n, neurons=k, integrators=sums, integrators_seen=seen),
             training={} if r is None else {"regularisation": r},
         )
         for n, k, r, seen in sizes
@@ -255,7 +256,14 @@ FAMILIES = (
     Family(kind=ARX.kind, linear=True, first=_arx, in_motion=_shortest_arx),
     Family(kind=TransferFunction.kind, linear=True, first=_transfer_functions),
     Family(kind=LinearStateSpace.kind, linear=True, first=_state_spaces),
-    Family(kind=NeuralStateSpace.kind, linear=False, first=_neural, around=_around_neural, in_motion=_neural_in_motion),
+    Family(
+        kind=NeuralStateSpace.kind,
+        linear=False,
+        first=_neural,
+        around=_around_neural,
+        in_motion=_neural_in_motion,
+        adds_up=_neural_sums,
+    ),
     Family(
         kind=NARX.kind,
         linear=False,

@@ -82,7 +82,9 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
     known = _set(data, data.estimation, data.selection)
     found = advise(known, mapping)
     advice = list(found.outputs.values()) if isinstance(found, SystemAdvice) else [found]
-    ends = at_ends(data.estimation, mapping)
+    integrators = sum(any(finding.code == INTEGRATES for finding in one.record.findings) for one in advice)
+    # A line that adds up would not explain a stop: what stands at its least was left there.
+    ends = {} if integrators else at_ends(data.estimation, mapping)
     return Looked(
         n_inputs=len(mapping.inputs),
         n_outputs=len(mapping.outputs),
@@ -91,8 +93,8 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         suggested=tuple(one.structure for one in advice[0].suggestions) if len(advice) == 1 else (),
         cautions=tuple(_cautions(advice)),
         ends=any(ends.values()),
-        all_end=all(ends.values()),
-        integrators=sum(any(finding.code == INTEGRATES for finding in one.record.findings) for one in advice),
+        all_end=bool(ends) and all(ends.values()),
+        integrators=integrators,
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
     )
 

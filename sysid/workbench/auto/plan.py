@@ -208,6 +208,10 @@ class Plan:
 
     def _search(self) -> Iterator[list[Try]]:
         nonlinear_first = sorted(self.families, key=lambda family: family.linear)
+        # Whatever else adds up drifts, and is close to what was held out by luck.
+        if self.looked.integrators:
+            self.budget.unlimited = 1
+            yield from self._rounds_of([one for family in nonlinear_first for one in family.adds_up(self.looked)])
         # In motion, what begins at rest is far off, however large: what learns where it begins comes first.
         if self.looked.in_motion:
             self.budget.unlimited = 1

@@ -76,6 +76,9 @@ def test_no_trace_that_only_scores_is_among_the_parts() -> None:
 def test_a_long_record_is_searched_by_a_part_and_fitted_whole() -> None:
     long = part(data(record("a", SHORT + 1)), STARTS[0])
     assert (len(long.folds), long.partial) == (1, True)
+    in_turn = part(data(record("a", SHORT + 1)), STARTS[0], in_turn=True)
+    assert len(in_turn.folds) == FOLDS
+    assert "all of them in turn" in in_turn.told[0]
     declared = {Role.SELECTION: record("b", 100, seed=1)}
     longer = part(data(record("a", 2 * SEARCHED), others=declared), STARTS[0])
     assert len(longer.folds[0].fitted.traces[0]) == SEARCHED

@@ -243,3 +243,14 @@ def test_what_begins_in_motion_has_first_what_remembers_one_sample_or_learns_whe
         tried = [point.structure.label for points in rounds[:3] for point in points]
         assert linear(rounds[0][0]) is not in_motion
         assert all((label in tried) is in_motion for label in ("ARX [1; 1; 1]", "NSS 2/0", "NSS 1/4", "NARX 1/1/10"))
+
+
+def test_what_adds_up_has_first_what_adds_up_exactly() -> None:
+    for sums in (0, 1, 2):
+        _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, integrators=sums, n_outputs=max(sums, 1)))
+        spaces = [p.structure for points in rounds for p in points if isinstance(p.structure, NeuralStateSpace)]
+        assert {one.integrators for one in spaces} == {sums}
+        assert {one.integrators_seen for one in spaces} == ({False, True} if sums else {False})
+        assert {one.output for one in spaces} <= {"plain", "absolute"} - ({"absolute"} if sums else set())
+        assert linear(rounds[0][0]) is (sums == 0)
+        assert min(one.states for one in spaces) > sums or not sums
