@@ -9,6 +9,7 @@ import cmath
 import tempfile
 from collections.abc import Callable
 from collections.abc import Mapping as Dict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -234,36 +235,52 @@ class EquationTwin:
         """
         system, model = self.system, self.model
         right = {one.name: one.right for one in system.equations}
-        self.inputs = inputs
+        ahead, self.way = model.lowered.ahead, 0.0
+        # Where inputs move, the state is that of one sample before the first, at which they stand.
+        self.inputs = np.concatenate([inputs[:1], inputs]) if ahead else inputs
         self.past: list[dict[str, complex]] = []
         self.begin = dict(begin)
         states = {name: begin[name] for name in system.states}
         self.memory = {name: begin[name] for name in model.lowered.states if name.split()[0] in _REMEMBERING}
         found, steps = [], model.substeps
         h = model.sample_time / steps
-        for _ in inputs:
+        for _ in self.inputs:
             now = self._all(states)
             found.append([now[name] for name in model.mapping.outputs])
             later = {name: self._of(right[name], now) for name in system.discrete}
             remembered = dict(self.remembered)
             moving = np.array([states[n] for n in system.continuous], dtype=np.complex128)
 
-            def rates(x: NDArray[np.complex128], held: Dict[str, complex] = states) -> NDArray[np.complex128]:
+            def rates(
+                x: NDArray[np.complex128], behind: float, part: int, held: Dict[str, complex] = states
+            ) -> NDArray[np.complex128]:
+                self.way = (part + behind) / steps
                 here = self._all({**held, **dict(zip(system.continuous, x, strict=True))})
-                return np.array([self._of(right[n], here) for n in system.continuous], dtype=np.complex128)
+                found = np.array([self._of(right[n], here) for n in system.continuous], dtype=np.complex128)
+                self.way = 0.0
+                return found
 
-            for _ in range(steps if system.continuous else 0):
-                moving = moving + h * (_explicit if model.solver == RUNGE_KUTTA else _implicit)(rates, moving, h)
+            for part in range(steps if system.continuous else 0):
+                method = _explicit if model.solver == RUNGE_KUTTA else _implicit
+                moving = moving + h * method(partial(rates, part=part), moving, h)
             self.past.append(now)
             states = dict(zip(system.continuous, moving, strict=True)) | later
             self.memory = remembered
-        return np.array(found)
+        return np.array(found[int(ahead) :])
+
+    def _input(self, name: str, at: int) -> complex:
+        """An input at a sample, or on the way from there to the next."""
+        channels = self.model.mapping.inputs
+        values = self.inputs[:, channels.index(name)]
+        way = self.way * self.model.grey.moving(channels)[channels.index(name)]
+        now, later = (values[min(max(k, 0), len(values) - 1)] for k in (at, at + 1))
+        return complex(now + way * (later - now))
 
     def _all(self, states: Dict[str, complex]) -> dict[str, complex]:
         """Everything that has a name, at some states."""
         self.remembered: dict[str, complex] = {}
-        inputs = self.inputs[len(self.past)]
-        now = {**self.values, **states, **dict(zip(self.model.mapping.inputs, inputs, strict=True))}
+        now = {**self.values, **states}
+        now |= {name: self._input(name, len(self.past)) for name in self.model.mapping.inputs}
         for name in self.system.order:
             now[name] = self._of(self.system.definitions[name].right, now)
         for one in self.system.equations:
@@ -290,10 +307,10 @@ class EquationTwin:
         t = len(self.past)
         if lag == 0:
             return now[name]
+        if name in self.model.mapping.inputs:
+            return self._input(name, t - lag)
         if lag <= t:
             return self.past[t - lag][name]
-        if name in self.model.mapping.inputs:
-            return complex(self.inputs[0][self.model.mapping.inputs.index(name)])
         return self.begin[f"{name}[k-{lag - t}]"]
 
     def _called(self, node: Call, now: Dict[str, complex]) -> complex:
@@ -347,30 +364,33 @@ class _MemberTwin(EquationTwin):
 
 _REMEMBERING = ("relay", "latch", "hold")
 
-_Rates = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+_Rates = Callable[[NDArray[np.complex128], float], NDArray[np.complex128]]
+"""Of states, and how much of a step lies behind."""
 
 
 def _explicit(rates: _Rates, x: NDArray[np.complex128], h: float) -> NDArray[np.complex128]:
     """The mean slope over a step of the classical Runge-Kutta method."""
-    first = rates(x)
-    second = rates(x + h / 2.0 * first)
-    third = rates(x + h / 2.0 * second)
-    return (first + 2.0 * second + 2.0 * third + rates(x + h * third)) / 6.0
+    first = rates(x, 0.0)
+    second = rates(x + h / 2.0 * first, 0.5)
+    third = rates(x + h / 2.0 * second, 0.5)
+    return (first + 2.0 * second + 2.0 * third + rates(x + h * third, 1.0)) / 6.0
 
 
 def _implicit(rates: _Rates, x: NDArray[np.complex128], h: float) -> NDArray[np.complex128]:
     """The mean slope over a Rosenbrock step as its authors write it: ``k_i = f(x + h a k) + h J (gamma k)``."""
     weights, apart = (1 / 280, -4 / 105, 1 / 5, -4 / 5), 0.01  # central differences of order 8
-    J = np.zeros((len(x), len(x)), dtype=np.complex128)
+    J, drift = np.zeros((len(x), len(x)), dtype=np.complex128), np.zeros(len(x), dtype=np.complex128)
+    for reach, weight in zip((4, 3, 2, 1), weights, strict=True):
+        drift += weight * (rates(x, -reach * apart) - rates(x, reach * apart)) / apart
     for j in range(len(x)):
         for reach, weight in zip((4, 3, 2, 1), weights, strict=True):
             away = reach * apart * np.eye(len(x))[j]
-            J[:, j] += weight * (rates(x - away) - rates(x + away)) / apart
+            J[:, j] += weight * (rates(x - away, 0.0) - rates(x + away, 0.0)) / apart
     k: list[NDArray[np.complex128]] = []
     for i in range(4):
         ahead = sum((implicit.ALPHAS[i, j] * k[j] for j in range(i)), np.zeros_like(x))
         coupled = sum((implicit.GAMMAS[i, j] * k[j] for j in range(i)), np.zeros_like(x))
-        right = rates(x + h * ahead) + h * J @ coupled
+        right = rates(x + h * ahead, implicit.ALPHAS[i].sum()) + h * J @ coupled + implicit.GAMMAS[i].sum() * drift
         k.append(np.asarray(np.linalg.solve(np.eye(len(x)) - h * implicit.GAMMA * J, right), dtype=np.complex128))
     return np.asarray(implicit.WEIGHTS @ np.array(k))
 

@@ -5,4 +5,14 @@ from sysid.equations.lowered import ROSENBROCK, RUNGE_KUTTA, SOLVERS, Lowered, N
 from sysid.equations.lowering import lower
 from sysid.equations.system import System
 
-__all__ = ["MOST_STATES_IMPLICIT", "ROSENBROCK", "RUNGE_KUTTA", "SOLVERS", "Lowered", "Net", "System", "Terms", "lower"]
+__all__ = [
+    "MOST_STATES_IMPLICIT",
+    "ROSENBROCK",
+    "RUNGE_KUTTA",
+    "SOLVERS",
+    "Lowered",
+    "Net",
+    "System",
+    "Terms",
+    "lower",
+]

@@ -17,11 +17,11 @@ MOST_NODES = 50_000
 """Values of one set of equations."""
 
 CONSTANT = "constant"
-FREE, WEIGHT, FIXED, NORM, STEP = "free", "weight", "fixed", "norm", "step"
+FREE, WEIGHT, FIXED, NORM, STEP, SHARE = "free", "weight", "fixed", "norm", "step", "share"
 """Parameters: those that have names and are estimated, weights of networks, those that are declared, the levels and
-scales of what a network sees, and the seconds of a step."""
+scales of what a network sees, the seconds of a step, and the share of the way to a sample that lies behind."""
 CONTINUOUS_STATE, DISCRETE_STATE, INPUT = "continuous", "discrete", "input"
-LEAVES = (FREE, WEIGHT, FIXED, NORM, STEP, CONTINUOUS_STATE, DISCRETE_STATE, INPUT)
+LEAVES = (FREE, WEIGHT, FIXED, NORM, STEP, SHARE, CONTINUOUS_STATE, DISCRETE_STATE, INPUT)
 """What is given to a program, in the order of its registers."""
 
 WITH_OWN = frozenset({machine.GREATER, machine.NOT_LESS, machine.SIGN, machine.SQRT, machine.TABLE})
@@ -214,7 +214,7 @@ class Graph:
         at, firsts = len(constants), {}
         for kind in LEAVES:
             firsts[kind], at = at, at + counts[kind]
-        n_theta = counts[FREE] + counts[WEIGHT] + counts[FIXED] + counts[NORM] + counts[STEP]
+        n_theta = sum(counts[kind] for kind in LEAVES[: LEAVES.index(CONTINUOUS_STATE)])
         sizes = (n_theta, counts[CONTINUOUS_STATE] + counts[DISCRETE_STATE], counts[INPUT])
         code: list[list[int]] = []
         for node in needed:

@@ -8,6 +8,9 @@ accurate, of order 3 with any matrix in the place of the Jacobian. With :math:`\
 .. math:: (I - \gamma h J)\, w_i = \gamma \Big( f\big(x + h \sum_{j<i} a_{ij} w_j\big) + \sum_{j<i} c_{ij} w_j \Big),
     \qquad x' = x + h \sum_i m_i w_i .
 
+Where inputs move between samples the rates hang on time: a stage is :math:`\alpha_i h` later, and
+:math:`\gamma_i h\, \partial f / \partial t` joins what stands in brackets (IV.7, equation 7.25).
+
 What is lowered is :math:`\sum_i m_i w_i`, the mean slope over a step: an explicit step of one stage along it is the
 whole method. The linear systems are solved by elimination over those entries that are not 0 for certain, without
 exchanging rows: at :math:`h \to 0` the matrix is that of no exchange, and whether a step is short enough for that too
@@ -21,7 +24,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.equations.graph import CONTINUOUS_STATE, STEP, Graph
+from sysid.equations.graph import CONTINUOUS_STATE, SHARE, STEP, Graph
 from sysid.equations.slopes import jacobian
 from sysid.kernels import register_machine as machine
 
@@ -52,35 +55,53 @@ _NOTHING = 1e-14
 """A coefficient that is 0 but for rounding."""
 
 
-def implicit_slopes(graph: Graph, rates: Sequence[int], slope_of_table: Callable[[int], int]) -> list[int]:
+def implicit_slopes(
+    graph: Graph, rates: Sequence[int], slope_of_table: Callable[[int], int], sample_time: float = 1.0
+) -> list[int]:
     """The mean slopes of the continuous states over an implicit step.
 
     Args:
         graph: The graph.
         rates: Of each continuous state.
         slope_of_table: From a table the table of its slope.
+        sample_time: Seconds over which the share goes from 0 to 1, where inputs move between samples.
 
     Returns:
         The slopes, in the states' order.
     """
     n = len(rates)
     x, step = [graph.leaf(CONTINUOUS_STATE, i) for i in range(n)], graph.leaf(STEP, 0)
-    system = _Eliminated(graph, jacobian(graph, rates, n, slope_of_table))
+    by_leaf = jacobian(graph, rates, [*x, graph.leaf(SHARE, 0)], slope_of_table)
+    by_share = [row.pop(n, None) for row in by_leaf]
+    system = _Eliminated(graph, by_leaf)
+    shares = graph.apply(machine.MUL, step, graph.constant(1.0 / sample_time))
     slopes: list[list[int]] = []
     for i in range(len(MEAN)):
         ahead = [_combined(graph, STAGES[i, :i], [one[j] for one in slopes]) for j in range(n)]
         moved = {
             x[j]: graph.apply(machine.FMA, step, along, x[j]) for j, along in enumerate(ahead) if along is not None
         }
+        moved |= _later(graph, shares, float(ALPHAS[i].sum()))
         here = graph.replaced(rates, moved)
         right = []
         for j in range(n):
             coupled = _combined(graph, COUPLING[i, :i], [one[j] for one in slopes])
             total = here[j] if coupled is None else graph.apply(machine.ADD, here[j], coupled)
+            if (moves := by_share[j]) is not None:
+                drifts = graph.apply(machine.MUL, graph.constant(float(GAMMAS[i].sum())), shares)
+                total = graph.apply(machine.FMA, drifts, moves, total)
             right.append(graph.apply(machine.MUL, graph.constant(GAMMA), total))
         slopes.append(system.solved(right))
     found = [_combined(graph, MEAN, [one[j] for one in slopes]) for j in range(n)]
     return [graph.constant(0.0) if one is None else one for one in found]
+
+
+def _later(graph: Graph, shares: int, part: float) -> dict[int, int]:
+    """The share that lies behind, some part of a step later."""
+    if not part:
+        return {}
+    share = graph.leaf(SHARE, 0)
+    return {share: graph.apply(machine.FMA, graph.constant(part), shares, share)}
 
 
 def _combined(graph: Graph, weights: NDArray[np.float64], values: Sequence[int]) -> int | None:

@@ -16,11 +16,11 @@ SOLVERS = (RUNGE_KUTTA, ROSENBROCK)
 """How continuous states go on: explicitly, or implicitly, for equations that are stiff."""
 
 METHODS = {
-    RUNGE_KUTTA: np.array([[1.0, 0.5], [2.0, 0.5], [2.0, 1.0], [1.0, 0.0]]),
-    ROSENBROCK: np.array([[1.0, 0.0]]),
+    RUNGE_KUTTA: np.array([[1.0, 0.5, 0.0], [2.0, 0.5, 0.5], [2.0, 1.0, 0.5], [1.0, 0.0, 1.0]]),
+    ROSENBROCK: np.array([[1.0, 0.0, 0.0]]),
 }
-"""Of each the stages of a step: how much a stage's slope counts, and how much of a step ahead the next one is. The
-slope of the one stage of ``rosenbrock`` is that over the whole implicit step."""
+"""Of each the stages of a step: how much a stage's slope counts, how much of a step ahead the next one is, and how much
+of it lies behind. The slope of the one stage of ``rosenbrock`` is that over the whole implicit step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,6 +98,8 @@ class Lowered:
         norms: The levels and scales as they are before any data are seen.
         places: Of each table its first row and its rows.
         table: Rows of all tables, shape ``(n_rows, 2)``.
+        ahead: Whether a sample is reached by a step that ends there, on the way of its inputs from the sample before:
+            the state before a sample is then that at the one before. Otherwise a step goes on from a sample.
     """
 
     rates: Program
@@ -114,6 +116,7 @@ class Lowered:
     norms: tuple[float, ...]
     places: NDArray[np.int64]
     table: NDArray[np.float64]
+    ahead: bool = False
 
     @property
     def n_continuous(self) -> int:
@@ -179,6 +182,7 @@ class Terms:
         fixed: Names of the others.
         tables: Points of each table.
         solver: How the continuous states go on.
+        moving: By input, whether it goes straight from sample to sample; it is held otherwise.
     """
 
     inputs: tuple[str, ...]
@@ -188,3 +192,4 @@ class Terms:
     fixed: tuple[str, ...]
     tables: Dict[str, tuple[tuple[float, float], ...]]
     solver: str = RUNGE_KUTTA
+    moving: tuple[bool, ...] = ()

@@ -17,6 +17,7 @@ from sysid.equations.graph import (
     FREE,
     INPUT,
     NORM,
+    SHARE,
     STEP,
     WEIGHT,
     Graph,
@@ -58,7 +59,8 @@ def lower(system: System, terms: Terms) -> Lowered:
         work.updates[work.state(name)] = work.value(right[name])
     outputs = [work.named(name, 0) for name in terms.outputs]
     work.finish_delays()
-    return work.programs(rates, work.slopes(rates), outputs)
+    ahead = any(terms.moving) and len(rates) > 0
+    return work.programs(rates, work.slopes(work.between(rates) if ahead else rates), outputs, ahead=ahead)
 
 
 @dataclass(kw_only=True)
@@ -367,6 +369,21 @@ class _Lowering:
 
     # Programs
 
+    def between(self, rates: list[int]) -> list[int]:
+        """Rates on the way from the sample before, where what is held, and what goes on by samples, has its inputs."""
+        graph, share = self.graph, self.graph.leaf(SHARE, 0)
+        now, before = {}, {}
+        for (channel, lag), place in tuple(self.lagged.items()):
+            leaf = graph.leaf(INPUT, place)
+            before[leaf] = graph.leaf(INPUT, self.lagged.setdefault((channel, lag + 1.0), len(self.lagged)))
+            way = self.apply(machine.SUB, leaf, before[leaf])
+            now[leaf] = (
+                self.apply(machine.FMA, share, way, before[leaf]) if self.terms.moving[channel] else before[leaf]
+            )
+        states = list(self.updates)
+        self.updates = dict(zip(states, graph.replaced(list(self.updates.values()), before), strict=True))
+        return graph.replaced(rates, now)
+
     def slopes(self, rates: list[int]) -> list[int]:
         """What a step goes along."""
         if self.terms.solver != ROSENBROCK or not rates:
@@ -379,14 +396,14 @@ class _Lowering:
                 got=len(rates),
                 remedy="write solver: runge-kutta, or make what is fast algebraic",
             )
-        return implicit_slopes(self.graph, rates, self._slope_of_table)
+        return implicit_slopes(self.graph, rates, self._slope_of_table, self.terms.sample_time or 1.0)
 
     def _slope_of_table(self, own: int) -> int:
         names = list(self.terms.tables)
         self.steep.setdefault(names[own], slopes_of(self.terms.tables[names[own]]))
         return len(names) + list(self.steep).index(names[own])
 
-    def programs(self, rates: list[int], slopes: list[int], outputs: list[int]) -> Lowered:
+    def programs(self, rates: list[int], slopes: list[int], outputs: list[int], *, ahead: bool) -> Lowered:
         """All that was lowered, as programs."""
         system, terms, graph = self.system, self.terms, self.graph
         names = (*system.continuous, *system.discrete, *self.hidden)
@@ -395,7 +412,7 @@ class _Lowering:
         counts[DISCRETE_STATE] = len(system.discrete) + len(self.hidden)
         counts[FREE], counts[FIXED] = len(terms.free), len(terms.fixed)
         counts[WEIGHT], counts[NORM] = (self.nets[-1].stop if self.nets else 0), len(self.norms)
-        counts[INPUT], counts[STEP] = len(self.lagged), 1
+        counts[INPUT], counts[STEP], counts[SHARE] = len(self.lagged), 1, 1
         updates = [self.updates[graph.leaf(DISCRETE_STATE, i)] for i in range(counts[DISCRETE_STATE])]
         points = [*terms.tables.values(), *self.steep.values()]
         begins = np.cumsum([0, *map(len, points)])
@@ -416,6 +433,7 @@ class _Lowering:
                 [[begin, len(one)] for begin, one in zip(begins[:-1], points, strict=True)], dtype=np.int64
             ).reshape(-1, 2),
             table=np.array([point for one in points for point in one], dtype=np.float64).reshape(-1, 2),
+            ahead=ahead,
         )
 
 

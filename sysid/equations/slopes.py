@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from sysid.equations.graph import CONTINUOUS_STATE, OPERATION, Graph
+from sysid.equations.graph import OPERATION, Graph
 from sysid.kernels import register_machine as machine
 
 TINY = 1e-12
@@ -24,24 +24,24 @@ Column = dict[int, int]
 
 
 def jacobian(
-    graph: Graph, results: Sequence[int], n: int, slope_of_table: Callable[[int], int]
+    graph: Graph, results: Sequence[int], leaves: Sequence[int], slope_of_table: Callable[[int], int]
 ) -> list[dict[int, int]]:
-    """How some values move with the continuous states.
+    """How some values move with some leaves.
 
     Args:
         graph: The graph.
         results: The values.
-        n: How many continuous states there are.
+        leaves: The leaves.
         slope_of_table: From a table the table of its slope.
 
     Returns:
-        Of each value, by state, the derivative; what is 0 for certain is left out.
+        Of each value, by place among the leaves, the derivative; what is 0 for certain is left out.
     """
     columns: list[Column] = []
     needed = graph.needed(results)
     local: dict[int, list[tuple[int, int]]] = {}
-    for j in range(n):
-        moves: Column = {graph.leaf(CONTINUOUS_STATE, j): graph.constant(1.0)}
+    for leaf in leaves:
+        moves: Column = {leaf: graph.constant(1.0)}
         for node in needed:
             value = graph.nodes[node]
             if value.kind != OPERATION or not any(one in moves for one in value.reads):
@@ -56,7 +56,7 @@ def jacobian(
             if total is not None:
                 moves[node] = total
         columns.append(moves)
-    return [{j: columns[j][one] for j in range(n) if one in columns[j]} for one in results]
+    return [{j: moves[one] for j, moves in enumerate(columns) if one in moves} for one in results]
 
 
 def _slopes(graph: Graph, node: int, slope_of_table: Callable[[int], int]) -> list[tuple[int, int]]:

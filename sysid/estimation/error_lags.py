@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.informative import SAME, by_chance, informative, unit, with_past
-from sysid.models import AbstractModel
+from sysid.models import AbstractModel, GreyBox, TransferFunction
+from sysid.models.intersample import MOVING
+from sysid.models.orthonormal_basis import Domain
 
 LAGS = 5
 """Past errors and inputs that are taken out of the error, before the input of one sample is looked at; and lags after
@@ -65,7 +67,18 @@ def _at_once(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: 
         return []
     moves = f"{100 * share:.0f} % of what is new in the error of {target} moves with {name} of the same sample."
     leaves = f"which this model leaves out ({at_lag(model, 0)})"
-    return [f"{moves} Either {name} acts at once, {leaves}, or it is fed back from {target}."]
+    between = f", or it moves between samples (intersample: {MOVING})" if _holds(model, j) else ""
+    return [f"{moves} Either {name} acts at once, {leaves}{between}, or it is fed back from {target}."]
+
+
+def _holds(model: AbstractModel, j: int) -> bool:
+    """Whether a model goes on by rates between samples, and takes an input to keep its value there."""
+    structure = model.structure
+    if isinstance(structure, TransferFunction):
+        return structure.domain is Domain.CONTINUOUS and not structure.moving(model.mapping.inputs)[j]
+    if isinstance(structure, GreyBox):
+        return bool(structure.system.continuous) and not structure.moving(model.mapping.inputs)[j]
+    return False
 
 
 def _elsewhere(model: AbstractModel, run: FreeRun, error: NDArray[np.float64], j: int, i: int) -> list[str]:
@@ -115,6 +128,8 @@ def at_lag(model: AbstractModel, lag: int) -> str:
         return f"input_delays from {lag}"
     if lag == 0 and hasattr(structure, "feedthrough"):
         return "feedthrough: true"
+    if lag == 0 and isinstance(structure, TransferFunction) and structure.domain is Domain.CONTINUOUS:
+        return "delays: 0, and as many zeros as poles"
     for field in ("nk", "delays"):
         if hasattr(structure, field):
             return f"{field}: {lag}"

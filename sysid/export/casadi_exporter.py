@@ -220,6 +220,8 @@ def _space(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tuple[li
 
 def _equations(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tuple[list[Any], Any]:
     """Outputs of equations, and their next state, which hangs on no output."""
+    import casadi
+
     form, layout = stage.equations
     known, n, n_c = [*scaled, *past], form.n_state, form.n_continuous
 
@@ -230,18 +232,19 @@ def _equations(stage: Stage, scaled: Sequence[Any], past: Sequence[Any]) -> tupl
     x = list(past[:n])
     total = sum(x) if x else 0
     lost = _choice(total < np.inf, _choice(total > -np.inf, 0, np.nan), np.nan)  # by a state that is no number
-    outputs = [one + lost for one in _listed(form.outputs, x, u)]
     updates = _listed(form.updates, x, u)
     now = x[:n_c]
-    for _ in range(form.substeps if n_c else 0):
+    for part in range(form.substeps if n_c else 0):
         at, moved = now, [0.0] * n_c
-        for share, ahead in form.stages:
-            slope = _listed(form.slopes, [*at, *x[n_c:]], u)
+        for share, ahead, behind in form.stages:
+            slope = _listed(form.slopes, [*at, *x[n_c:]], [*u, casadi.SX((part + behind) / form.substeps)])
             moved = [one + share * form.step * own for one, own in zip(moved, slope, strict=True)]
             at = [one + ahead * own for one, own in zip(now, slope, strict=True)]
         now = [one + own for one, own in zip(now, moved, strict=True)]
-    after = [one + lost for one in (*now, *updates)] + [known[column] for column in layout.next_columns()]
-    return outputs, lambda _: after
+    after = [one + lost for one in (*now, *updates)]
+    outputs = [one + lost for one in _listed(form.outputs, after if form.ahead else x, u)]
+    following = after + [known[column] for column in layout.next_columns()]
+    return outputs, lambda _: following
 
 
 def _listed(listing: Listing, x: Sequence[Any], u: Sequence[Any]) -> list[Any]:

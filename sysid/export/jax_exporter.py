@@ -294,18 +294,18 @@ def _equations(stage: Stage, scaled: Any, past: Any) -> tuple[Any, Callable[[Any
     u = [sum(sample(channel, lag) * weight for channel, lag, weight in parts) for parts in form.given]
     x = past[:n]
     lost = jnp.where(jnp.isfinite(jnp.sum(x)), 0.0, np.nan)  # by a state that is no number
-    outputs = _listed(form.outputs, x, u) + lost
 
-    def substep(now: Any, _: None) -> tuple[Any, None]:
+    def substep(now: Any, part: Any) -> tuple[Any, None]:
         at, total = now, 0.0
-        for share, ahead in form.stages:
-            slope = _listed(form.slopes, jnp.concatenate([at, x[n_c:]]), u)
+        for share, ahead, behind in form.stages:
+            slope = _listed(form.slopes, jnp.concatenate([at, x[n_c:]]), [*u, (part + behind) / form.substeps])
             total = total + share * form.step * slope
             at = now + ahead * slope
         return now + total, None
 
-    now = jax.lax.scan(substep, x[:n_c], None, length=form.substeps)[0] if n_c else x[:0]
+    now = jax.lax.scan(substep, x[:n_c], jnp.arange(form.substeps, dtype=np.float64))[0] if n_c else x[:0]
     after = jnp.concatenate([now, _listed(form.updates, x, u)]) + lost
+    outputs = _listed(form.outputs, after if form.ahead else x, u) + lost
     following = jnp.concatenate([after, known[np.array(layout.next_columns(), dtype=np.int32)]])
     return outputs, lambda _: following
 

@@ -81,14 +81,16 @@ def stepped(nodes: Nodes, block: Block, terms: Sequence[str], memory: str, *, ke
     x, u = list(terms[:n]), list(terms[n : n + len(form.given)])
     kept = list(terms[n + len(form.given) : n + len(form.given) + n]) if keeps else []
     cars = _Rows(nodes, memory)
-    y = cars.joined(_listed(nodes, form.outputs, x, u, "y"), "y")
     if not n:
+        y = cars.joined(_listed(nodes, form.outputs, (x, u), "y"), "y")
         return Stepped(total=y, change=y, last=y)
     before = join_rows(nodes, x, "x")
     total = nodes.add("ReduceSum", [before, nodes.integers([0])], "sum_of_states", keepdims=1)
     lost = nodes.add("Sub", [total, total], "lost")  # nothing, or not a number
-    parts = [nodes.add("Add", [y, lost], "y_or_lost")]
-    changes, lasts, n_c = [parts[0]], [parts[0]], form.n_continuous
+    parts: list[str] = []
+    changes: list[str] = []
+    lasts: list[str] = []
+    n_c = form.n_continuous
     if n_c:
         moved = _moved(nodes, form, (x, u), cars, lost)
         if kept:
@@ -98,10 +100,15 @@ def stepped(nodes: Nodes, block: Block, terms: Sequence[str], memory: str, *, ke
         changes.append(moved)
         lasts.append(begun)
     if n > n_c:
-        after = nodes.add("Add", [cars.joined(_listed(nodes, form.updates, x, u, "g"), "after"), lost], "after_or_lost")
+        after = nodes.add(
+            "Add", [cars.joined(_listed(nodes, form.updates, (x, u), "g"), "after"), lost], "after_or_lost"
+        )
         parts.append(after)
         changes.append(nodes.add("Sub", [after, after], "nothing"))
         lasts.append(after)
+    seen = nodes.cut(join_rows(nodes, parts, "reached"), {f"x_reached{i}": 1 for i in range(n)}) if form.ahead else x
+    y = nodes.add("Add", [cars.joined(_listed(nodes, form.outputs, (seen, u), "y"), "y"), lost], "y_or_lost")
+    parts, changes, lasts = [y, *parts], [y, *changes], [y, *lasts]
     found = (join_rows(nodes, one, name) for one, name in ((parts, "total"), (changes, "change"), (lasts, "last")))
     return Stepped(total=next(found), change=next(found) if keeps else "", last=next(found) if keeps else "")
 
@@ -138,10 +145,11 @@ def _moved(nodes: Nodes, form: ProgramForm, given: Given, cars: _Rows, lost: str
     """What the states with a rate move by over a sample."""
     n_c = form.n_continuous
     if form.substeps == 1:
-        return nodes.add("Add", [_substep(nodes, form, given, cars.memory, ""), lost], "moved")
+        return nodes.add("Add", [_substep(nodes, form, given, cars.memory), lost], "moved")
     body = Nodes(nodes.dtype, f"{nodes.prefix}substep_")
     inner, on = f"{body.prefix}moved_in", f"{body.prefix}goes_on_in"
-    moved = body.add("Add", [inner, _substep(body, form, given, cars.memory, inner)], "moved_out")
+    turn = body.add("Cast", [f"{body.prefix}turn"], "turn_real", to=body.kind()) if form.ahead else ""
+    moved = body.add("Add", [inner, _substep(body, form, given, cars.memory, (inner, turn))], "moved_out")
     goes_on = body.add("Identity", [on], "goes_on_out")
     graph = body.graph(
         "substep",
@@ -164,17 +172,18 @@ def _moved(nodes: Nodes, form: ProgramForm, given: Given, cars: _Rows, lost: str
     return made
 
 
-def _substep(nodes: Nodes, form: ProgramForm, given: Given, memory: str, moved: str) -> str:
-    """What one step of the solver adds."""
-    n_c, (x, u) = form.n_continuous, given
+def _substep(nodes: Nodes, form: ProgramForm, given: Given, memory: str, before: tuple[str, str] = ("", "")) -> str:
+    """What one step of the solver adds, behind what those before added and their number, where there are several."""
+    (moved, turn), n_c, (x, u) = before, form.n_continuous, given
     begun = join_rows(nodes, x[:n_c], "begun_here")
     if moved:
         begun = nodes.add("Add", [begun, moved], "here")
     at, total = begun, ""
-    for part, (share, ahead) in enumerate(form.stages):
+    for part, (share, ahead, behind) in enumerate(form.stages):
         own = nodes.within(f"{nodes.prefix}part{part}_")
         states = [*own.cut(at, {f"x{i}": 1 for i in range(n_c)}), *x[n_c:]]
-        slope = _Rows(own, memory).joined(_listed(own, form.slopes, states, u, "f"), "slope")
+        way = _share(own, form, behind, turn) if form.ahead else ""
+        slope = _Rows(own, memory).joined(_listed(own, form.slopes, (states, u), "f", way), "slope")
         counted = own.add("Mul", [slope, own.numbers("counts", share * form.step)], "counted")
         total = counted if not total else own.add("Add", [total, counted], "total")
         if ahead:
@@ -183,12 +192,20 @@ def _substep(nodes: Nodes, form: ProgramForm, given: Given, memory: str, moved: 
     return total
 
 
-def _listed(
-    nodes: Nodes, listing: Listing, x: Sequence[str], u: Sequence[str], name: str
-) -> list[tuple[str, bool]]:  # fmt: skip
+def _share(nodes: Nodes, form: ProgramForm, behind: float, turn: str) -> str:
+    """How much of the way from sample to sample lies behind a stage, as a number."""
+    begun = nodes.numbers("behind", behind / form.substeps)
+    if not turn:
+        return begun
+    whole = nodes.add("Mul", [turn, nodes.numbers("of_substeps", 1.0 / form.substeps)], "whole_steps")
+    return nodes.add("Add", [whole, begun], "share")
+
+
+def _listed(nodes: Nodes, listing: Listing, rows: Given, name: str, share: str = "") -> list[tuple[str, bool]]:
     """The results of a listing, and whether each is a row: a number is none."""
     values: list[tuple[str, bool]] = []
-    given: dict[str, Sequence[Any]] = {STATE: [(one, True) for one in x], INPUT: [(one, True) for one in u]}
+    x, u = ([(one, True) for one in side] for side in rows)
+    given: dict[str, Sequence[Any]] = {STATE: x, INPUT: [*u, (share, False)]}
 
     def read(one: Read) -> tuple[str, bool]:
         if isinstance(one, float):

@@ -80,8 +80,9 @@ class Listing:
             The listing.
         """
         low, (n_theta, n, m) = form.lowered, program.sizes
-        numbers = [*map(float, program.constants), *map(float, form.filled[:n_theta])]
-        known: list[Read] = [*numbers, *(Place(STATE, i) for i in range(n)), *(Place(INPUT, j) for j in range(m))]
+        numbers = [*map(float, program.constants), *map(float, form.filled[: n_theta - 1])]
+        inputs = [Place(INPUT, j) for j in range(m + 1)]  # behind them the share of the way that lies behind
+        known: list[Read] = [*numbers, inputs[m], *(Place(STATE, i) for i in range(n)), *inputs[:m]]
         found: list[Instruction] = []
         for number, *registers, own in program.code.tolist():
             reads = tuple(known[one] for one in registers[: len(OPERATIONS[number].slopes)])
@@ -140,11 +141,16 @@ class ProgramForm:
         return Listing.of(self.lowered.lowered.slopes, self.lowered)
 
     @property
-    def stages(self) -> tuple[tuple[float, float], ...]:
-        """Of each stage of a step how much its slope counts, of one in all, and how many seconds ahead the next is."""
+    def stages(self) -> tuple[tuple[float, float, float], ...]:
+        """Of each stage of a step how much its slope counts, how many seconds ahead the next is, what lies behind."""
         method = self.lowered.lowered.method
-        share = method[:, 0] / method[:, 0].sum()
-        return tuple(zip(map(float, share), map(float, method[:, 1] * self.step), strict=True))
+        rows = np.column_stack([method[:, 0] / method[:, 0].sum(), method[:, 1] * self.step, method[:, 2]])
+        return tuple((counts, ahead, behind) for counts, ahead, behind in rows.tolist())
+
+    @property
+    def ahead(self) -> bool:
+        """Whether a sample begins with the way to it, and slopes read behind the inputs the share that lies behind."""
+        return self.lowered.lowered.ahead
 
     @cached_property
     def updates(self) -> Listing:

@@ -135,7 +135,7 @@ def _sizes(stages: Sequence[dict[str, Any]]) -> dict[str, int]:
         hidden = 0 if stage["kind"] == "lagged" else form.n_state
         lengths = {
             "x": len(stage["columns"]) if stage["kind"] == "lagged" else hidden + stage["n"],
-            "u": len(stage.get("given", ())),
+            "u": len(stage.get("given", ())) + getattr(form, "ahead", False),
             "y": len(stage["outputs"]),
             "scaled": len(stage["scaled"]),
             "after": hidden,

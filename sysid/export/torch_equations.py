@@ -30,7 +30,7 @@ class Program(nn.Module):
 
         Args:
             x: States, shape ``(batch, n_states)``.
-            u: What the programs read of the inputs, shape ``(batch, n_given)``.
+            u: What the programs read of the inputs, shape ``(batch, n_given)``; slopes read one more, the share.
             like: Anything of shape ``(batch,)``.
 
         Returns:
@@ -65,7 +65,7 @@ class EquationStep(nn.Module):
     sources: Tensor
     line_columns: Tensor
     given: list[list[tuple[int, float]]]
-    stages: list[tuple[float, float]]
+    stages: list[tuple[float, float, float]]
 
     def __init__(self, stage: Stage, limits: nn.Module) -> None:
         super().__init__()
@@ -86,8 +86,8 @@ class EquationStep(nn.Module):
             form.n_state,
             form.n_continuous,
         )
-        self.stages = [(share * form.step, ahead) for share, ahead in form.stages]
-        self.substeps, self.limited = form.substeps, stage.limited
+        self.stages = [(share * form.step, ahead, behind) for share, ahead, behind in form.stages]
+        self.substeps, self.limited, self.ahead = form.substeps, stage.limited, form.ahead
         self.limits = limits
 
     def forward(self, known: Tensor, whole_state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -106,34 +106,36 @@ class EquationStep(nn.Module):
         x = state.narrow(1, 0, self.n)
         # What a state that is no number makes of the rest.
         lost = (x.sum(dim=1, keepdim=True) * 0.0) if self.n > 0 else torch.zeros_like(known.narrow(1, 0, 1))
-        y = self.outputs(x, u, like) + lost
-        reached = torch.zeros_like(y.narrow(1, 0, 1), dtype=torch.bool)
-        outputs = y
-        if self.limited:
-            y, outputs, reached = self.limits(known, y, y)
-        held = torch.zeros_like(reached)
         parts_after: list[Tensor] = []
         if self.n_continuous > 0:
             now = x.narrow(1, 0, self.n_continuous)
             others = x.narrow(1, self.n_continuous, self.n - self.n_continuous)
-            for _ in range(self.substeps):
+            for part in range(self.substeps):
                 at, total = now, torch.zeros_like(now)
-                for counts, ahead in self.stages:
-                    slope = self.slopes(torch.cat([at, others], dim=1), u, like)
+                for counts, ahead, behind in self.stages:
+                    share = torch.full_like(like, (part + behind) / self.substeps).unsqueeze(1)
+                    slope = self.slopes(torch.cat([at, others], dim=1), torch.cat([u, share], dim=1), like)
                     total = total + counts * slope
                     at = now + ahead * slope
                 now = now + total
             parts_after.append(now + lost)
         if self.n > self.n_continuous:
             parts_after.append(self.updates(x, u, like) + lost)
+        y = self.outputs(torch.cat(parts_after, dim=1) if self.ahead else x, u, like) + lost
+        reached = torch.zeros_like(y.narrow(1, 0, 1), dtype=torch.bool)
+        outputs = y
+        if self.limited:
+            y, outputs, reached = self.limits(known, y, y)
+        held = torch.zeros_like(reached)
         parts_after.append(together.index_select(1, self.line_columns))
         return outputs, torch.cat(parts_after, dim=1), held, reached
 
     def traced(self) -> None:
         """Put traces in the place of the programs, so that the step can be scripted."""
-        u, like = torch.zeros(2, len(self.given), dtype=torch.float64), torch.zeros(2, dtype=torch.float64)
+        like = torch.zeros(2, dtype=torch.float64)
         for name in ("slopes", "updates", "outputs"):
             program = getattr(self, name)
+            u = torch.zeros(2, len(self.given) + (name == "slopes"), dtype=torch.float64)
             if program.listing.results:
                 example = (torch.ones(2, self.n, dtype=torch.float64), u, like)
                 with warnings.catch_warnings():  # the points of tables are constants, as the warning wants them to be

@@ -1,9 +1,12 @@
 r"""The free run of a grey box, and its exact sensitivities, from sample to sample.
 
 Three programs make a model: the slopes :math:`f = dx_c/dt` of the continuous states, the updates :math:`x_d(k+1)` of
-the others, and the outputs. Continuous states go from sample to sample in ``substeps`` equal steps, inputs and other
-states being held: by the classical Runge-Kutta method, or by one stage whose slope is that over a whole implicit step
-(:mod:`sysid.equations.implicit`). The step itself is a parameter, the last.
+the others, and the outputs. Continuous states go from sample to sample in ``substeps`` equal steps, other states being
+held, inputs held or on a straight way from the sample before: by the classical Runge-Kutta method, or by one stage
+whose slope is that over a whole implicit step (:mod:`sysid.equations.implicit`). The step itself is a parameter, the
+last but one; the last is the share of the way that lies behind. Held inputs say at a sample how to go on to the next;
+of those that move it is known at the next sample how they came there, so that each sample begins with the way to it
+(``ahead``).
 
 The sensitivities are those of what is computed, steps and all, not of the differential equation. Each instruction
 leaves its partial derivatives; one pass back over them per result gives a row of :math:`\partial f/\partial x` and
@@ -37,7 +40,7 @@ def _finite(x):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def free_run(programs, theta, x, u, method, substeps, step, widths, places, table, y, path):
+def free_run(programs, theta, x, u, method, substeps, step, ahead, widths, places, table, y, path):
     """Run a model, writing ``y`` and leaving in ``x`` the state after the last sample.
 
     Args:
@@ -45,9 +48,11 @@ def free_run(programs, theta, x, u, method, substeps, step, widths, places, tabl
         theta: Parameters, those that are not fitted behind those that are.
         x: Continuous states, then the others, before the first sample, shape ``(n,)``; overwritten.
         u: Inputs, shape ``(n_samples, m)``.
-        method: Stages of a step: how much each counts, and how much of a step ahead the next is, shape ``(n, 2)``.
+        method: Stages of a step: how much each counts, how much of a step ahead the next is, and how much lies behind,
+            shape ``(n, 3)``.
         substeps: Steps from sample to sample.
         step: Seconds of one of them.
+        ahead: Whether a sample begins with the way to it; otherwise it ends with the way from it.
         widths: Of each switch; 0 is exact.
         places: Of each table its first row and its rows.
         table: Rows of all tables.
@@ -64,7 +69,35 @@ def free_run(programs, theta, x, u, method, substeps, step, widths, places, tabl
     slope, total = np.empty(n_c), np.empty(n_c)
     stage = x.copy()
     counted = method[:, 0].sum()
-    for t in range(len(u)):
+    for t in range(len(u) + (not ahead)):
+        way = t if ahead else t - 1
+        if n > n_c and way >= 0:
+            fill(vg, ag, x, u[way])
+            evaluate(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table)
+            for i in range(n - n_c):
+                later[i] = vg[updates[1][i]]
+        if n_c > 0 and way >= 0:
+            fill(vf, af, x, u[way])
+            for part in range(substeps):
+                copy_numbers(x, stage)
+                total[:] = 0.0
+                for s in range(len(method)):
+                    vf[af - 1] = (part + method[s, 2]) / substeps
+                    for i in range(n_c):
+                        vf[af + i] = stage[i]
+                    evaluate(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table)
+                    weight, on = method[s, 0], method[s, 1] * step
+                    for i in range(n_c):
+                        slope[i] = vf[rates[1][i]]
+                        total[i] += weight * slope[i]
+                        stage[i] = x[i] + on * slope[i]
+                for i in range(n_c):
+                    x[i] += step / counted * total[i]
+        if way >= 0:
+            for i in range(n - n_c):
+                x[n_c + i] = later[i]
+        if t == len(u):
+            return
         if not _finite(x):
             y[t:] = math.nan
             path[t:] = math.nan
@@ -75,29 +108,6 @@ def free_run(programs, theta, x, u, method, substeps, step, widths, places, tabl
         evaluate(outputs[0], 0, len(outputs[0]), vh, ah + n + m, widths, places, table)
         for j in range(len(outputs[1])):
             y[t, j] = vh[outputs[1][j]]
-        if n > n_c:
-            fill(vg, ag, x, u[t])
-            evaluate(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table)
-            for i in range(n - n_c):
-                later[i] = vg[updates[1][i]]
-        if n_c > 0:
-            fill(vf, af, x, u[t])
-            for _ in range(substeps):
-                copy_numbers(x, stage)
-                total[:] = 0.0
-                for s in range(len(method)):
-                    for i in range(n_c):
-                        vf[af + i] = stage[i]
-                    evaluate(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table)
-                    weight, ahead = method[s, 0], method[s, 1] * step
-                    for i in range(n_c):
-                        slope[i] = vf[rates[1][i]]
-                        total[i] += weight * slope[i]
-                        stage[i] = x[i] + ahead * slope[i]
-                for i in range(n_c):
-                    x[i] += step / counted * total[i]
-        for i in range(n - n_c):
-            x[n_c + i] = later[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -118,7 +128,7 @@ def _moves(bar, begin, states, S, p, moved, place):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sensitivities(programs, theta, p, x, S, u, method, substeps, step, widths, places, table, y, J):
+def sensitivities(programs, theta, p, x, S, u, method, substeps, step, ahead, widths, places, table, y, J):
     """Run a model with the derivatives of its outputs.
 
     Args:
@@ -128,9 +138,11 @@ def sensitivities(programs, theta, p, x, S, u, method, substeps, step, widths, p
         x: State before the first sample, shape ``(n,)``; overwritten.
         S: Its derivatives, shape ``(n, n_columns)``; overwritten.
         u: Inputs, shape ``(n_samples, m)``.
-        method: Stages of a step: how much each counts, and how much of a step ahead the next is, shape ``(n, 2)``.
+        method: Stages of a step: how much each counts, how much of a step ahead the next is, and how much lies behind,
+            shape ``(n, 3)``.
         substeps: Steps from sample to sample.
         step: Seconds of one of them.
+        ahead: Whether a sample begins with the way to it; otherwise it ends with the way from it.
         widths: Of each switch; 0 is exact.
         places: Of each table.
         table: Rows of all tables.
@@ -151,7 +163,52 @@ def sensitivities(programs, theta, p, x, S, u, method, substeps, step, widths, p
     stage, S_stage = x.copy(), S.copy()
     flat_J, later_S, slope_S = J.reshape(-1), S_later.reshape(-1), S_slope.reshape(-1)
     counted = method[:, 0].sum()
-    for t in range(len(u)):
+    for t in range(len(u) + (not ahead)):
+        way = t if ahead else t - 1
+        if n > n_c and way >= 0:
+            fill(vg, ag, x, u[way])
+            evaluate(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table)
+            partials(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table, dg)
+            for i in range(n - n_c):
+                later[i] = vg[updates[1][i]]
+                moves_of(updates[0], 0, len(updates[0]), dg, updates[1][i], 0, ag + n + m, bg)
+                _moves(bg, len(updates[2]), ag, S, p, later_S, i * columns)
+        if n_c > 0 and way >= 0:
+            fill(vf, af, x, u[way])
+            copy_rows(S[n_c:], S_stage[n_c:])
+            for part in range(substeps):
+                copy_numbers(x, stage)
+                copy_rows(S[:n_c], S_stage)
+                total[:] = 0.0
+                S_total[:] = 0.0
+                for s in range(len(method)):
+                    vf[af - 1] = (part + method[s, 2]) / substeps
+                    for i in range(n_c):
+                        vf[af + i] = stage[i]
+                    evaluate(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table)
+                    partials(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table, df)
+                    weight, on = method[s, 0], method[s, 1] * step
+                    for i in range(n_c):
+                        slope[i] = vf[rates[1][i]]
+                        total[i] += weight * slope[i]
+                        moves_of(rates[0], 0, len(rates[0]), df, rates[1][i], 0, af + n + m, bf)
+                        _moves(bf, len(rates[2]), af, S_stage, p, slope_S, i * columns)
+                    for i in range(n_c):
+                        stage[i] = x[i] + on * slope[i]
+                        for q in range(columns):
+                            S_total[i, q] += weight * S_slope[i, q]
+                            S_stage[i, q] = S[i, q] + on * S_slope[i, q]
+                for i in range(n_c):
+                    x[i] += step / counted * total[i]
+                    for q in range(columns):
+                        S[i, q] += step / counted * S_total[i, q]
+        if way >= 0:
+            for i in range(n - n_c):
+                x[n_c + i] = later[i]
+                for q in range(columns):
+                    S[n_c + i, q] = S_later[i, q]
+        if t == len(u):
+            return
         if not _finite(x):
             y[t:] = math.nan
             J[t:] = math.nan
@@ -163,43 +220,3 @@ def sensitivities(programs, theta, p, x, S, u, method, substeps, step, widths, p
             y[t, j] = vh[outputs[1][j]]
             moves_of(outputs[0], 0, len(outputs[0]), dh, outputs[1][j], 0, ah + n + m, bh)
             _moves(bh, len(outputs[2]), ah, S, p, flat_J, (t * len(outputs[1]) + j) * columns)
-        if n > n_c:
-            fill(vg, ag, x, u[t])
-            evaluate(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table)
-            partials(updates[0], 0, len(updates[0]), vg, ag + n + m, widths, places, table, dg)
-            for i in range(n - n_c):
-                later[i] = vg[updates[1][i]]
-                moves_of(updates[0], 0, len(updates[0]), dg, updates[1][i], 0, ag + n + m, bg)
-                _moves(bg, len(updates[2]), ag, S, p, later_S, i * columns)
-        if n_c > 0:
-            fill(vf, af, x, u[t])
-            copy_rows(S[n_c:], S_stage[n_c:])
-            for _ in range(substeps):
-                copy_numbers(x, stage)
-                copy_rows(S[:n_c], S_stage)
-                total[:] = 0.0
-                S_total[:] = 0.0
-                for s in range(len(method)):
-                    for i in range(n_c):
-                        vf[af + i] = stage[i]
-                    evaluate(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table)
-                    partials(rates[0], 0, len(rates[0]), vf, af + n + m, widths, places, table, df)
-                    weight, ahead = method[s, 0], method[s, 1] * step
-                    for i in range(n_c):
-                        slope[i] = vf[rates[1][i]]
-                        total[i] += weight * slope[i]
-                        moves_of(rates[0], 0, len(rates[0]), df, rates[1][i], 0, af + n + m, bf)
-                        _moves(bf, len(rates[2]), af, S_stage, p, slope_S, i * columns)
-                    for i in range(n_c):
-                        stage[i] = x[i] + ahead * slope[i]
-                        for q in range(columns):
-                            S_total[i, q] += weight * S_slope[i, q]
-                            S_stage[i, q] = S[i, q] + ahead * S_slope[i, q]
-                for i in range(n_c):
-                    x[i] += step / counted * total[i]
-                    for q in range(columns):
-                        S[i, q] += step / counted * S_total[i, q]
-        for i in range(n - n_c):
-            x[n_c + i] = later[i]
-            for q in range(columns):
-                S[n_c + i, q] = S_later[i, q]

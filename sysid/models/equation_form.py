@@ -174,8 +174,8 @@ class EquationForm(AbstractForm):
 
     @cached_property
     def filled(self) -> Array:
-        """What stands in the programs' registers: parameters, and the step."""
-        return np.append(self.theta, self.step)
+        """What stands in the programs' registers: parameters, the step, and the share of the way behind, here none."""
+        return np.append(self.theta, [self.step, 0.0])
 
     @cached_property
     def output_scale(self) -> Array:
@@ -184,7 +184,7 @@ class EquationForm(AbstractForm):
 
     @property
     def _own(self) -> tuple[object, ...]:
-        return self.lowered.method, self.substeps, self.step, *self._tables
+        return self.lowered.method, self.substeps, self.step, self.lowered.ahead, *self._tables
 
     @property
     def _tables(self) -> tuple[object, ...]:

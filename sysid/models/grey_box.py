@@ -14,6 +14,7 @@ from sysid.equations import RUNGE_KUTTA, SOLVERS, Lowered, System, Terms, lower
 from sysid.errors import ConfigError, did_you_mean, shortened
 from sysid.models.case_values import case_of, cases_among, cases_of, unknown_case
 from sysid.models.history import Start, StartKind
+from sysid.models.intersample import HELD, InterSample, intersample_of, moving, to_fields
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.structure import AbstractStructure
@@ -160,6 +161,8 @@ class GreyBox(AbstractStructure):
             that the equations need where their parameters start, which is told.
         cases: By case the names of its records, which share its values of the parameters that are ``per: case``. A
             record that is not named is a case of its own.
+        intersample: What inputs do between samples: ``zoh``, held, or ``foh``, straight to the next sample; for all,
+            or by input as in ``{force: foh}``. A state with a rate then begins one sample before the first.
         intervals: ``wald``, from the curvature at the minimum; or ``profile``, by profile likelihood beside it, for
             which the others are fitted again some ten times for each parameter.
 
@@ -180,6 +183,7 @@ class GreyBox(AbstractStructure):
     solver: str | None = None
     cases: tuple[tuple[str, tuple[str, ...]], ...] | Dict[str, Any] = ()
     intervals: str = WALD
+    intersample: InterSample | Dict[str, str] = HELD
 
     kind = "GreyBox"
 
@@ -197,6 +201,7 @@ class GreyBox(AbstractStructure):
         object.__setattr__(self, "initial", _entries(self.initial, InitialState, "initial"))
         object.__setattr__(self, "tables", _tables(self.tables))
         object.__setattr__(self, "cases", cases_of(self.cases))
+        object.__setattr__(self, "intersample", intersample_of(self.intersample))
         if self.cases and not self.by_case:
             raise ConfigError(
                 "no parameter has a value per case", where="cases", expected=f"a parameter with per: {CASE}",
@@ -224,6 +229,12 @@ class GreyBox(AbstractStructure):
     def _check_system(self) -> None:
         """Refuse equations that cannot be lowered for any mapping, before one is known."""
         system = self.system
+        if any(self.moving(system.others)) and not system.continuous:
+            raise ConfigError(
+                "no equation has a rate, which inputs between samples would act on", where="intersample",
+                expected=f"intersample: {HELD}, or an equation dx/dt = ...", got=self.intersample,
+                remedy="remove intersample",
+            )  # fmt: skip
         lowered(self, system.others, (*system.states, *system.definitions), None, self.solver or RUNGE_KUTTA)
         for one in self._states_given:
             if one.name not in system.states:
@@ -276,6 +287,10 @@ class GreyBox(AbstractStructure):
         """By table its points."""
         return dict(self.tables)
 
+    def moving(self, inputs: Sequence[str]) -> tuple[bool, ...]:
+        """By input, whether it goes straight from sample to sample; it is held otherwise."""
+        return moving(self.intersample, inputs)  # type: ignore[arg-type]  # in this form when it was made
+
     @property
     def system(self) -> System:
         """The equations, read."""
@@ -320,6 +335,7 @@ class GreyBox(AbstractStructure):
         }
         if self.cases:
             found["cases"] = {name: list(records) for name, records in self.grouped}
+        found |= to_fields(self.intersample)  # type: ignore[arg-type]  # in this form when it was made
         return found if self.intervals == WALD else found | {"intervals": self.intervals}
 
 
@@ -367,6 +383,7 @@ def lowered(
         fixed=tuple(one.name for one in structure.fixed),
         tables=structure.points,
         solver=solver,
+        moving=structure.moving(inputs),
     )
     return lower(structure.system, terms)
 

@@ -27,6 +27,7 @@ class Polynomials:
         constant: Output without inputs.
         delays: Dead times in samples.
         sample_time: Seconds; ``None`` where the powers are of ``1/q`` and not of ``s``.
+        moving: By input, whether it goes straight from sample to sample; it is held otherwise.
     """
 
     numerators: Sequence[NDArray[np.float64]]
@@ -34,6 +35,7 @@ class Polynomials:
     constant: float
     delays: Sequence[int]
     sample_time: float | None
+    moving: Sequence[bool]
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -62,7 +64,7 @@ class Polynomials:
             at += len(B) + len(F) - 1
         return Polynomials(
             numerators=numerators, denominators=denominators, constant=float(vector[-1]), delays=self.delays,
-            sample_time=self.sample_time,
+            sample_time=self.sample_time, moving=self.moving,
         )  # fmt: skip
 
     def moves(self, factor: NDArray[np.float64], inputs: NDArray[np.float64], *, known: bool) -> NDArray[np.float64]:
@@ -96,7 +98,9 @@ class Polynomials:
         leading = np.trim_zeros(np.where(np.abs(top) > NOTHING * size, top, 0.0), "b")
         if not len(leading):
             return np.zeros(1), np.asarray(scipy.signal.cont2discrete(([1.0], (F * powers)[::-1]), 1.0)[1])
-        num, den, _ = scipy.signal.cont2discrete((leading[::-1] / size, (F * powers)[::-1]), 1.0, method="zoh")
+        num, den, _ = scipy.signal.cont2discrete(
+            (leading[::-1] / size, (F * powers)[::-1]), 1.0, method="foh" if self.moving[j] else "zoh"
+        )
         return np.atleast_1d(size * np.squeeze(num)), np.asarray(den)
 
     def _levels(self, first: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -29,20 +29,28 @@ class Realisation:
     C: NDArray[np.float64]
     D: NDArray[np.float64]
 
-    def sampled(self, sample_time: float) -> Realisation:
-        """The same system seen at the samples, its input held between them; for a continuous realisation.
+    def sampled(self, sample_time: float, *, moving: bool = False) -> Realisation:
+        """The same system seen at the samples; for a continuous realisation.
 
         Args:
             sample_time: Seconds.
+            moving: Whether its input goes straight from sample to sample; it is held between them otherwise. The
+                state is then what the input of its own sample has not moved yet.
 
         Returns:
             A discrete realisation, exact (Van Loan 1978, "Computing integrals involving the matrix exponential").
         """
         n = len(self.A)
-        block = np.zeros((n + 1, n + 1))
-        block[:n, :n], block[:n, n] = self.A, self.B
-        exponential = scipy.linalg.expm(block * sample_time)
-        return Realisation(A=exponential[:n, :n], B=exponential[:n, n], C=self.C, D=self.D)
+        block = np.zeros((n + 1 + moving, n + 1 + moving))
+        block[:n, :n], block[:n, n] = self.A * sample_time, self.B * sample_time
+        if moving:
+            block[n, n + 1] = 1.0
+        exponential = scipy.linalg.expm(block)
+        A, held = exponential[:n, :n], exponential[:n, n]
+        if not moving:
+            return Realisation(A=A, B=held, C=self.C, D=self.D)
+        ramp = exponential[:n, n + 1]
+        return Realisation(A=A, B=held - ramp + A @ ramp, C=self.C, D=self.D + self.C @ ramp)
 
     def equilibrium(self, u: float) -> NDArray[np.float64]:
         """The state at which a discrete realisation stays while its input is held.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any
@@ -15,6 +16,7 @@ from sysid.errors import ConfigError, shortened
 from sysid.models import orthonormal_basis as bases
 from sysid.models.continuous import ContinuousStateSpace
 from sysid.models.history import History
+from sysid.models.intersample import HELD, InterSample, intersample_of, moving, to_fields
 from sysid.models.lags import MOST, per_input, whole
 from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
@@ -43,8 +45,10 @@ class TransferFunction(AbstractStructure):
             dead time reacts to its input at once, and one that is sampled from a plant has a dead time of at least 1:
             none is found only where that leaves clearly less, and is told.
         domain: ``discrete``: ``B(1/q) / F(1/q)``, where ``zeros`` is the degree of ``B``; or ``continuous``:
-            ``B(s) / F(s)``, its input held between samples.
+            ``B(s) / F(s)``.
         intercept: Fit a constant output beside them.
+        intersample: What inputs do between samples, for a continuous one: ``zoh``, held, or ``foh``, straight to the
+            next sample; for all, or by input as in ``{force: foh}``.
 
     Raises:
         ConfigError: If the numbers are not those of a transfer function, or differ in length.
@@ -59,6 +63,7 @@ class TransferFunction(AbstractStructure):
     delays: tuple[int, ...] | None = None
     domain: Domain = Domain.DISCRETE
     intercept: bool = True
+    intersample: InterSample | Dict[str, str] = HELD
 
     kind = "TransferFunction"
     per_input = ("poles", "zeros", "delays")
@@ -73,6 +78,13 @@ class TransferFunction(AbstractStructure):
             None if delays is None or delays == "auto" else per_input(delays),
         )
         object.__setattr__(self, "domain", _domain(self.domain))
+        object.__setattr__(self, "intersample", intersample_of(self.intersample))
+        if self.domain is Domain.DISCRETE and self.intersample != HELD:
+            raise ConfigError(
+                "a discrete transfer function knows nothing of its inputs between samples", where="intersample",
+                expected="domain: continuous, or no intersample", got=f"domain: {self.domain.value}",
+                remedy="write domain: continuous, or remove intersample",
+            )  # fmt: skip
         known = self.delays or (0,) * len(self.poles)
         same = len(self.poles) == len(self.zeros) == len(known)
         numbers = all(map(whole, (*self.poles, *self.zeros, *known)))
@@ -90,12 +102,28 @@ class TransferFunction(AbstractStructure):
     def label(self) -> str:
         """Poles, zeros and dead times; ``?`` where they are to be searched."""
         rows = [self.poles, self.zeros, ("?",) if self.delays is None else self.delays]
-        prefix = "TF" if self.domain is Domain.DISCRETE else "continuous TF"
+        prefix = "TF" if self.domain is Domain.DISCRETE else "continuous TF" + " foh" * (self.intersample != HELD)
         return f"{prefix} [{'; '.join(' '.join(map(str, row)) for row in rows)}]"
+
+    def moving(self, inputs: Sequence[str]) -> tuple[bool, ...]:
+        """By input, whether it goes straight from sample to sample.
+
+        Args:
+            inputs: Names of the inputs.
+
+        Returns:
+            An entry for each.
+        """
+        return moving(self.intersample, inputs)  # type: ignore[arg-type]  # in this form when it was made
+
+    def check_mapping(self, mapping: Mapping) -> None:
+        """Refuse a mapping that has not the inputs that are named; see the base class."""
+        super().check_mapping(mapping)
+        self.moving(mapping.inputs)
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
-        return {
+        found = {
             "kind": self.kind,
             "poles": list(self.poles),
             "zeros": list(self.zeros),
@@ -103,6 +131,7 @@ class TransferFunction(AbstractStructure):
             "domain": self.domain.value,
             "intercept": self.intercept,
         }
+        return found | to_fields(self.intersample)  # type: ignore[arg-type]  # in this form when it was made
 
 
 def _proper(poles: int, zeros: int) -> bool:
@@ -243,6 +272,7 @@ class TransferFunctionModel(LinearForms):
             constant=form.output_offset + form.output_scale * self.constant,
             delays=self.delays,
             sample_time=None if self.orders.domain is Domain.DISCRETE else self.sample_time,
+            moving=self.orders.moving(self.mapping.inputs),
         )
 
     def output_moves(
@@ -315,7 +345,7 @@ class TransferFunctionModel(LinearForms):
         """One input's dead time and basis, with the weighted taps as its output."""
         part = realise(self.basis(j), self.orders.domain)
         if self.orders.domain is Domain.CONTINUOUS:
-            part = part.sampled(self.sample_time)
+            part = part.sampled(self.sample_time, moving=self.orders.moving(self.mapping.inputs)[j])
         row, direct = self.taps[j] @ part.C, float(self.taps[j] @ part.D)
         n, k = len(part.A), self.delays[j]
         if k == 0:

@@ -87,6 +87,7 @@ def gradient() -> None:
     record = TimeRecord(
         inputs=np.asfortranarray(u), past=u[0], target=rng.normal(size=SAMPLES), root_weights=np.ones(SAMPLES),
         domain=Domain.DISCRETE, sample_time=1.0, free_start=False,
+        moving=(False, False),
     )  # fmt: skip
     poles = PoleParameters(n_poles=(POLES, POLES), domain=Domain.DISCRETE, stable=True)
     provider = SeparableProvider(poles=poles, n_zeros=(POLES - 1, POLES - 1), records=(record,), constant=True)

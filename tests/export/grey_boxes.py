@@ -62,6 +62,13 @@ STIFF = """
     BC = w + 0.1*q
 """
 
+MOVING = """
+    dx/dt = 0.5*(BP - x) - 0.02*AR[k-1] + 0.05*sin(x) - 0.01*BP(t - 0.25) + net(0.02*x, 0.02*BP; neurons=2)
+    dv/dt = 3*relay(x, on=20, off=10) - v
+    z[k+1] = 0.9*z + 0.1*hold(AR, BP > 50)
+    BC = z + v + 0.1*x + 0.02*BP + 0.1*delay(x, 0.1)
+"""
+
 GREY_BOXES: dict[str, Callable[[], Model]] = {
     "tanks": lambda: build_grey(
         "dx1/dt = k2*BP - k1*sqrt(x1)\ndBC/dt = k1*sqrt(x1) - k1*sqrt(max(BC, 0.1*AR))",
@@ -78,5 +85,7 @@ GREY_BOXES: dict[str, Callable[[], Model]] = {
         "dq/dt = v\ndv/dt = 0.1*(BP - AR) - v\nBC = q", substeps=1
     ),
     "stiff": lambda: build_grey(STIFF, solver=ROSENBROCK, tables=VALVE),
+    "moving": lambda: build_grey(MOVING, initial={"z": 3.0}, intersample={"BP": "foh"}),
+    "stiff, moving": lambda: build_grey(STIFF, solver=ROSENBROCK, tables=VALVE, intersample="foh"),
     "declared states": lambda: build_grey("dBC/dt = 0.3*(BP - BC)", initial={"BC": {"start": 12, "fixed": True}}),
 }

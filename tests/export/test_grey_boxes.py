@@ -32,8 +32,9 @@ PAIRS = [
     (name, kind)
     for name in GREY_BOXES
     for kind in EXPORTERS
-    if name in ("everything", "stiff") or kind in ("onnx", "c")
-    if kind != "torch-export" or name not in ("everything", "stiff")  # it writes every step out: the next test has one
+    if name in ("everything", "stiff", "moving") or kind in ("onnx", "c")
+    if kind != "torch-export"
+    or name not in ("everything", "stiff", "moving")  # it writes every step out: the next test has one
 ]
 
 
@@ -64,14 +65,15 @@ def test_files_compute_what_the_equations_compute(name, kind, inputs, tmp_path) 
 
 
 @pytest.mark.parametrize(
-    ("text", "solver", "initial"),
+    ("text", "solver", "fields"),
     [
-        (EVERYTHING, RUNGE_KUTTA, {"z": 3.0}),
+        (EVERYTHING, RUNGE_KUTTA, {"initial": {"z": 3.0}}),
         ("dp/dt = 2e4*(valve(BP) - p)\ndBC/dt = 0.5*(p - BC*abs(AR - BC))", ROSENBROCK, {}),
+        ("dBC/dt = 0.5*(valve(BP) - BC) - 0.1*abs(AR - BC)", RUNGE_KUTTA, {"intersample": "foh"}),
     ],
 )
-def test_torch_export_writes_the_steps_out(text, solver, initial, inputs, tmp_path) -> None:
-    model = build_grey(text, initial=initial, tables=VALVE, substeps=1, solver=solver)
+def test_torch_export_writes_the_steps_out(text, solver, fields, inputs, tmp_path) -> None:
+    model = build_grey(text, tables=VALVE, substeps=1, solver=solver, **fields)
     check_files(Surrogate.of(model, RANGES), "torch-export", inputs, tmp_path)
 
 

@@ -40,15 +40,19 @@ EQUATIONS = {
     "a stiff one": "dx/dt = -1e4*(x - a*sin(u)) + z; dz/dt = -b*z*x + exp(-x)*v/c; y = x + z",
     "three in a ring": "dx/dt = a*(1 + z^2)^1.5 - x; dw/dt = -sqrt(w)*b + x/(1 + z^2); "
     "dz/dt = log(2 + w) - 30*z + u*v*c; y = z",
+    "moving inputs": "dx/dt = -a*x + b*u*v + c*u[k-1]*net(x, v; neurons=2); y = x + 0.1*u",
+    "one that moves": "dx/dt = z - sin(u)*x*b - a*v(t - 0.25)*x; z[k+1] = b*z + v + u[k-1]; y = x*z + c*x[k-1]",
+    "a moving stiff one": "dx/dt = -1e4*(x - a*sin(u)) + z; dz/dt = -b*z*x + exp(-x)*v/c; y = x + z*u",
     "a long sum": "y = " + " + ".join(f"a*u^{1 + i % 3}" for i in range(150)) + " + b*v + c",
 }
+MOVING = {"moving inputs": "foh", "one that moves": {"v": "foh"}, "a moving stiff one": "foh"}
 TABLES = {"bend": [[-1, -0.5], [0, 0.1], [0.4, 1.0], [2, 1.2]]}
 
 
 def a_model(name: str, **fields: Any) -> GreyBoxModel:
     text = EQUATIONS[name]
     tables = TABLES if "bend" in text else {}
-    grey = GreyBox(equations=text, parameters=PARAMETERS, tables=tables)
+    grey = GreyBox(equations=text, parameters=PARAMETERS, tables=tables, intersample=MOVING.get(name, "zoh"))
     mapping = Mapping.parse("u+v -> y")
     low = lowered(grey, mapping.inputs, mapping.outputs, 0.1)
     rng = np.random.default_rng(3)
@@ -77,7 +81,7 @@ def a_run(model: GreyBoxModel, n: int = 60) -> tuple[np.ndarray, dict[str, float
     }
 
 
-@pytest.mark.parametrize("name", [name for name in EQUATIONS if name != "a stiff one"])
+@pytest.mark.parametrize("name", [name for name in EQUATIONS if "stiff" not in name])
 def test_a_run_is_that_of_the_tree(name: str) -> None:
     model = a_model(name)
     inputs, begin = a_run(model)
@@ -100,7 +104,7 @@ def test_a_run_is_that_of_the_tree(name: str) -> None:
 
 IMPLICIT = {
     "two rates of each other", "both", "functions", "a relay", "a network", "definitions in any order", "a stiff one",
-    "three in a ring",
+    "three in a ring", "moving inputs", "one that moves", "a moving stiff one",
 }  # fmt: skip
 """Of these steps are made implicitly too: smooth ones, whose Jacobian a twin can take by differences."""
 
@@ -134,7 +138,7 @@ def complex_steps(model: GreyBoxModel, inputs: np.ndarray, begin: dict[str, floa
 
 
 STEP = 1e-30
-SMOOTH = [name for name in EQUATIONS if name not in {"a delayed expression", "a stiff one"}]
+SMOOTH = [name for name in EQUATIONS if name != "a delayed expression" and "stiff" not in name]
 
 
 @pytest.mark.parametrize("name", SMOOTH)
@@ -238,14 +242,16 @@ def test_the_jacobian_of_a_step_is_that_of_the_rates() -> None:
         terms=Terms(inputs=("u",), outputs=("y",), sample_time=0.1, free=(), fixed=(), tables=grey.points),
     )
     rates = [work.value(one.right) for one in grey.system.equations if one.name in grey.system.continuous]
-    rows = jacobian(work.graph, rates, 3, work._slope_of_table)
+    leaves = [work.state(name) for name in "abc"]
+    rows = jacobian(work.graph, rates, leaves, work._slope_of_table)
     found = work.programs(
-        [work.graph.constant(0.0)], [row.get(j, work.graph.constant(0.0)) for row in rows for j in range(3)], []
-    )
+        [work.graph.constant(0.0)], [row.get(j, work.graph.constant(0.0)) for row in rows for j in range(3)], [],
+        ahead=False,
+    )  # fmt: skip
     for b in (-0.5, 0.2, 1.2):
         x, u = np.array([0.7, b, 1.7]), np.array([0.4])
         y, r, J = np.empty((1, 9)), np.empty(3), np.empty((3, 3))
         none = np.zeros(len(low.switches)), found.places, found.table
-        machine.values(found.slopes.arrays, np.zeros(1), x[None], u[None], *none, y)
-        machine.derivatives(low.rates.arrays, np.zeros(1), 0, x, u, *none, r, J, np.empty((3, 0)))
+        machine.values(found.slopes.arrays, np.zeros(2), x[None], u[None], *none, y)
+        machine.derivatives(low.rates.arrays, np.zeros(2), 0, x, u, *none, r, J, np.empty((3, 0)))
         assert_allclose(y.reshape(3, 3), J, rtol=1e-12, atol=1e-12)

@@ -203,8 +203,12 @@ def test_moves_do_not_depend_on_the_units_of_time_and_output() -> None:
     for scale, gain, T_ in ((np.ones(3), 1.0, 0.1), (powers, 1e-9, 1e-7)):
         F = np.array([4.0, 1.0, 1.0]) * scale / scale[-1]
         B = gain * np.array([3.0, 2.0]) * scale[:2] / scale[-1]
-        model = Polynomials(numerators=[B], denominators=[F], constant=0.0, delays=(0,), sample_time=T_)
+        model = Polynomials(
+            numerators=[B], denominators=[F], constant=0.0, delays=(0,), sample_time=T_, moving=(False,)
+        )
         found.append(model.moves(np.diag(model.vector)[:, :4], u, known=False) / gain)
     np.testing.assert_allclose(found[1], found[0], rtol=1e-6, atol=1e-9)
-    nothing = Polynomials(numerators=[np.zeros(2)], denominators=[F], constant=0.0, delays=(0,), sample_time=T_)
+    nothing = Polynomials(
+        numerators=[np.zeros(2)], denominators=[F], constant=0.0, delays=(0,), sample_time=T_, moving=(False,)
+    )
     assert not nothing.moves(np.diag(nothing.vector), u, known=False)[:, 2:].any()

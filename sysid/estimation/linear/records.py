@@ -15,6 +15,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +129,7 @@ class TimeRecord(AbstractRecord):
         domain: Of the bases.
         sample_time: Seconds; used for continuous bases.
         free_start: Whether the state before the first row is fitted, rather than the equilibrium at ``past``.
+        moving: By input, whether it goes straight from sample to sample, for continuous bases; otherwise it is held.
     """
 
     inputs: NDArray[np.float64]
@@ -137,12 +139,13 @@ class TimeRecord(AbstractRecord):
     domain: Domain
     sample_time: float
     free_start: bool
+    moving: tuple[bool, ...]
 
     def predictor(self, bases: Bases) -> MirroredPredictor | None:
         """From a fitted initial state alone; see the base class."""
         if not self.free_start:
             return None
-        return _predictor(bases, self.domain, self.sample_time, len(self.target))
+        return _predictor(bases, self.domain, self.sample_time, self.moving, len(self.target))
 
     def private(self, bases: Bases) -> int:
         """The initial state, if it is fitted; see the base class."""
@@ -154,11 +157,13 @@ class TimeRecord(AbstractRecord):
         if through is not None:
             found = [through.responses(j, self.inputs[:, j]) for j in range(len(bases))]
             return np.concatenate([*found, through.beginnings()], axis=1)
-        how = self.domain, self.sample_time
-        parts = [_pass(basis, *how, self.inputs[:, j], self.past[j]) for j, basis in enumerate(bases)]
+        parts = [_pass(basis, self._sampling(j), self.inputs[:, j], self.past[j]) for j, basis in enumerate(bases)]
         if self.free_start:
-            parts.append(_beginnings(bases, *how, len(self.target)))
+            parts.append(_beginnings(bases, self.domain, self.sample_time, len(self.target)))
         return np.concatenate(parts, axis=1)
+
+    def _sampling(self, j: int) -> _Sampling:
+        return _Sampling(self.domain, self.sample_time, self.moving[j])
 
     def tangents(self, bases: Bases, columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """One more pass through each section; see the base class."""
@@ -175,51 +180,69 @@ class TimeRecord(AbstractRecord):
                     y = y + columns[:, at] @ weights[at]
                 parts.append(_discrete_tangents(basis, y, past))
             else:
-                part = self._continuous_tangents(basis, self.inputs[:, j], self.past[j], weights[own[j]])
+                driven = self.inputs[:, j], self.past[j]
+                part = _continuous_tangents(basis, self._sampling(j), driven, weights[own[j]])
                 if free:
                     at = slice(shared + free[j].start, shared + free[j].stop)
                     pulse = _pulse(self.domain, len(self.target))
-                    begun = self._continuous_tangents(full(bases, self.domain)[j], pulse, 0.0, weights[at])
+                    held = _Sampling(self.domain, self.sample_time)
+                    begun = _continuous_tangents(full(bases, self.domain)[j], held, (pulse, 0.0), weights[at])
                     part = part + begun[-len(self.target) :]
                 parts.append(part)
         return np.concatenate(parts, axis=1)
 
-    def _continuous_tangents(
-        self, basis: tuple[BasisSection, ...], x: NDArray[np.float64], past: float, weights: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """The basis with every section once more behind its output, sampled as one system."""
-        main = realise(basis, self.domain)
-        again = [realise((_bare(section),), self.domain) for section in basis]
-        n = len(main.A)
-        A = linalg.block_diag(main.A, *(part.A for part in again))
-        B = np.concatenate([main.B, np.zeros(n)])
-        C = linalg.block_diag(*(part.C for part in again))
-        output = weights @ main.C
-        at = n
-        for part in again:
-            A[at : at + len(part.A), :n] = np.outer(part.B, output)
-            at += len(part.A)
-        C = np.concatenate([np.zeros((len(C), n)), C], axis=1)
-        whole = Realisation(A=A, B=B, C=-C, D=np.zeros(len(C)))
-        return _run_sampled(whole, self.sample_time, x, past)
+
+class _Sampling(NamedTuple):
+    """How the samples of a system come from one another."""
+
+    domain: Domain
+    sample_time: float
+    moving: bool = False
+
+
+def _continuous_tangents(
+    basis: tuple[BasisSection, ...],
+    how: _Sampling,
+    driven: tuple[NDArray[np.float64], float],
+    weights: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The basis with every section once more behind its output, sampled as one system: driven by samples and a past."""
+    main = realise(basis, how.domain)
+    again = [realise((_bare(section),), how.domain) for section in basis]
+    n = len(main.A)
+    A = linalg.block_diag(main.A, *(part.A for part in again))
+    B = np.concatenate([main.B, np.zeros(n)])
+    C = linalg.block_diag(*(part.C for part in again))
+    output = weights @ main.C
+    at = n
+    for part in again:
+        A[at : at + len(part.A), :n] = np.outer(part.B, output)
+        at += len(part.A)
+    C = np.concatenate([np.zeros((len(C), n)), C], axis=1)
+    whole = Realisation(A=A, B=B, C=-C, D=np.zeros(len(C)))
+    return _run_sampled(whole, how, *driven)
 
 
 @lru_cache(maxsize=32)
-def _predictor(bases: Bases, domain: Domain, sample_time: float, n_rows: int) -> MirroredPredictor | None:
+def _predictor(
+    bases: Bases, domain: Domain, sample_time: float, moving: tuple[bool, ...], n_rows: int
+) -> MirroredPredictor | None:
     """The predictor over so many rows, made once for all records that are as long."""
-    systems = _sampled(bases, domain, sample_time)
+    systems = _sampled(bases, domain, sample_time, moving)
     return None if systems is None else MirroredPredictor.of(systems, n_rows)
 
 
 @lru_cache(maxsize=32)
-def _sampled(bases: Bases, domain: Domain, sample_time: float) -> tuple[Realisation, ...] | None:
+def _sampled(
+    bases: Bases, domain: Domain, sample_time: float, moving: tuple[bool, ...]
+) -> tuple[Realisation, ...] | None:
     """What each input passes from sample to sample; ``None`` where it cannot be computed with."""
     systems = tuple(realise(basis, domain) for basis in bases)
     if domain is Domain.CONTINUOUS:
         fastest = max((float(np.abs(system.A).max(initial=0.0)) for system in systems), default=0.0)
         if not fastest * sample_time <= _FASTEST:
             return None
-        systems = tuple(system.sampled(sample_time) for system in systems)
+        systems = tuple(system.sampled(sample_time, moving=own) for system, own in zip(systems, moving, strict=True))
     return systems if all(np.isfinite(system.A).all() for system in systems) else None
 
 
@@ -234,7 +257,7 @@ def _made_beginnings(bases: Bases, domain: Domain, sample_time: float, n_rows: i
     while True:
         pulse = _pulse(domain, m)
         made = np.concatenate(
-            [_pass(basis, domain, sample_time, pulse, 0.0)[-m:] for basis in full(bases, domain)], axis=1
+            [_pass(basis, _Sampling(domain, sample_time), pulse, 0.0)[-m:] for basis in full(bases, domain)], axis=1
         )
         if m == n_rows or not np.abs(made[-_FIRST // 2 :]).max() >= GONE:
             break
@@ -257,12 +280,10 @@ def _pulse(domain: Domain, n_rows: int) -> NDArray[np.float64]:
     return np.eye(n_rows + (domain is Domain.CONTINUOUS), 1)[:, 0]
 
 
-def _pass(
-    basis: tuple[BasisSection, ...], domain: Domain, sample_time: float, x: NDArray[np.float64], past: float
-) -> NDArray[np.float64]:
-    if domain is Domain.DISCRETE:
+def _pass(basis: tuple[BasisSection, ...], how: _Sampling, x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+    if how.domain is Domain.DISCRETE:
         return _discrete_columns(basis, x, past)
-    return _run_sampled(realise(basis, domain), sample_time, x, past)
+    return _run_sampled(realise(basis, how.domain), how, x, past)
 
 
 def _bare(section: BasisSection) -> BasisSection:
@@ -275,13 +296,13 @@ _FASTEST = 1e8
 """Rate times sample time above which a trial step has left what can be sampled."""
 
 
-def _run_sampled(system: Realisation, sample_time: float, x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+def _run_sampled(system: Realisation, how: _Sampling, x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
     """A continuous system's outputs at the samples; NaN where its rates cannot be computed with."""
     y = np.full((len(x), len(system.C)), np.nan)
-    rates = np.abs(system.A) * sample_time
+    rates = np.abs(system.A) * how.sample_time
     if not np.isfinite(rates).all() or rates.max() > _FASTEST:
         return y
-    system = system.sampled(sample_time)
+    system = system.sampled(how.sample_time, moving=how.moving)
     if not np.isfinite(system.A).all():
         return y
     state = system.equilibrium(past) if past != 0.0 else np.zeros(len(system.A))

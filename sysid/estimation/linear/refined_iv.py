@@ -17,6 +17,7 @@ Limits: of a multiple-input system only a neighbourhood of the minimum is reache
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,25 +92,12 @@ def _states(
     """The basis's state driven by a sampled signal that begins at zero."""
     n = sum(len(d) - 1 for d in sections)
     system = realise(basis_of(sections, n - 1, record.domain), record.domain)
-    A, B, D = system.A, system.B, np.zeros(n)
+    system = replace(system, C=np.eye(n), D=np.zeros(n))
     if record.domain is Domain.CONTINUOUS:
-        A, B, D = _linear_between(A, B, record.sample_time)
-    y = np.empty((len(signal), n))
-    kernel.state_space(A, B[:, np.newaxis], np.eye(n), D[:, np.newaxis], signal[:, np.newaxis], np.zeros(n), y)
+        system = system.sampled(record.sample_time, moving=True)
+    B, D, y = system.B[:, np.newaxis], system.D[:, np.newaxis], np.empty((len(signal), n))
+    kernel.state_space(system.A, B, system.C, D, signal[:, np.newaxis], np.zeros(n), y)
     return y
-
-
-def _linear_between(
-    A: NDArray[np.float64], B: NDArray[np.float64], sample_time: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Exact sampling of a system whose input is linear between samples (Van Loan 1978)."""
-    n = len(A)
-    block = np.zeros((n + 2, n + 2))
-    block[:n, :n], block[:n, n], block[n, n + 1] = A * sample_time, B * sample_time, 1.0
-    exponential = linalg.expm(block)
-    held, ramp = exponential[:n, n], exponential[:n, n + 1]
-    Ad = exponential[:n, :n]
-    return Ad, held - ramp + Ad @ ramp, ramp
 
 
 def _noise_free(record: TimeRecord, sections: tuple[NDArray[np.float64], ...], n_zeros: int) -> TimeRecord:
@@ -118,19 +106,7 @@ def _noise_free(record: TimeRecord, sections: tuple[NDArray[np.float64], ...], n
     taps = np.column_stack([record.columns((basis,))[:, : n_zeros + 1], np.ones(len(record.target))])
     root = record.root_weights
     weights = linalg.lstsq(taps * root[:, np.newaxis], record.target * root, cond=1e-12)[0]
-    return _with_target(record, taps @ weights)
-
-
-def _with_target(record: TimeRecord, target: NDArray[np.float64]) -> TimeRecord:
-    return TimeRecord(
-        inputs=record.inputs,
-        past=record.past,
-        target=target,
-        root_weights=record.root_weights,
-        domain=record.domain,
-        sample_time=record.sample_time,
-        free_start=False,
-    )
+    return replace(record, target=taps @ weights, free_start=False)
 
 
 def refined_sections(
@@ -165,13 +141,11 @@ def _left_for(record: TimeRecord, j: int, sections: Sections, n_zeros: tuple[int
     table = np.column_stack([columns, np.ones(len(columns))]) * record.root_weights[:, np.newaxis]
     weights = linalg.lstsq(table, record.target * record.root_weights, cond=1e-12)[0][:-1]
     weights[ends[j] - n_zeros[j] - 1 : ends[j]] = 0.0
-    alone = _with_target(record, record.target - columns @ weights)
-    return TimeRecord(
-        inputs=alone.inputs[:, j : j + 1],
-        past=alone.past[j : j + 1],
-        target=alone.target,
-        root_weights=alone.root_weights,
-        domain=alone.domain,
-        sample_time=alone.sample_time,
+    return replace(
+        record,
+        inputs=record.inputs[:, j : j + 1],
+        past=record.past[j : j + 1],
+        moving=record.moving[j : j + 1],
+        target=record.target - columns @ weights,
         free_start=False,
     )

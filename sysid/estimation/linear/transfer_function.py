@@ -261,6 +261,7 @@ class _Problem(AbstractProblem):
             domain=self.orders.domain,
             sample_time=self.terms.sample_time,
             free_start=experiment.free,
+            moving=self.orders.moving(self.terms.mapping.inputs),
         )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import sysid
 from sysid.errors import ConfigError, TraceError
@@ -228,3 +229,25 @@ def test_a_bent_power_has_a_value_at_0_whatever_its_exponent(written: str) -> No
     fit = fitted([record], f"y = {written}", parameters={"g": 1, "n": {"start": 1.2, "low": 0.3}}, start=Start())
     assert isinstance(fit.model, GreyBoxModel)
     assert fit.model.parameters == pytest.approx({"g": 2.0, "n": 0.7}, abs=1e-6)
+
+
+@pytest.mark.parametrize("solver", ["runge-kutta", "rosenbrock"])
+def test_an_input_that_moves_between_samples_leaves_no_error_where_that_is_said(solver: str) -> None:
+    """A forced Duffing oscillator beside SciPy's solver, whose force goes straight from sample to sample."""
+    n, rng = 150, np.random.default_rng(0)
+    t, u = 0.1 * np.arange(n), np.concatenate([[0.0], np.cumsum(0.3 * rng.normal(size=n - 1))])
+
+    def rates(time: float, x: np.ndarray) -> list[float]:
+        return [x[1], -2.0 * x[1] - 9.0 * x[0] - 3.0 * x[0] ** 3 + 5.0 * np.interp(time, t, u)]
+
+    y = solve_ivp(rates, (0.0, t[-1]), [0.0, 0.0], t_eval=t, rtol=1e-9, atol=1e-11, max_step=0.1).y[0]
+    true = {"d": 2.0, "k": 9.0, "c": 3.0, "b": 5.0}
+    duffing = "dx/dt = v; dv/dt = b*u - d*v - k*x - c*x^3; y = x"
+    starts = {"d": 1.5, "k": 8.0, "c": 2.0, "b": 4.0}
+    fit = fitted([a_trace(u, y, sample_time=0.1)], duffing, parameters=starts, intersample="foh", solver=solver)
+    assert isinstance(fit.model, GreyBoxModel)
+    assert fit.model.parameters == pytest.approx(true, rel=1e-4)
+    if solver == "runge-kutta":
+        held = sysid.fit(a_trace(u, y, sample_time=0.1), "u -> y", GreyBox(equations=duffing, parameters=starts))
+        assert held.model.parameters != pytest.approx(true, rel=0.05)
+        assert any("it moves between samples (intersample: foh)" in note for note in held.notes)

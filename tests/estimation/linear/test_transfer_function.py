@@ -184,3 +184,23 @@ def test_an_input_that_acts_within_the_sample_is_found_to(first: float, found: i
     fit = fit_transfer_function([trace_of(u, y)], Mapping.parse("u1 -> y"), TransferFunction(poles=(2,), zeros=(1,)))
     assert fit.model.structure.delays == (found,)
     assert any("answers within the sample" in told for told in fit.warnings) is (found == 0)
+
+
+@pytest.mark.parametrize("between", ["foh", {"u1": "foh"}])
+def test_an_input_that_moves_between_samples_is_one_where_that_is_said(between) -> None:
+    """Beside SciPy's exact samples: the first input goes straight from sample to sample, the second may be held."""
+    rng = np.random.default_rng(0)
+    u = np.convolve(rng.normal(size=420), np.ones(6) / 3.0)[:400] if between == "foh" else rng.normal(size=400)
+    u, t = np.column_stack([u - u[0], steps(400, 1, rng, held=7)[:, 0]]), T * np.arange(400)
+    u[0] = 0.0
+    y = signal.lsim(([2.0, 3.0], [1.0, 1.0, 4.0]), u[:, 0], t, interp=True)[1]
+    y = y + signal.lsim(([1.0], [1.0, 0.5]), u[:, 1], t, interp=between == "foh")[1]
+    structure = TransferFunction(
+        poles=(2, 1), zeros=(1, 0), delays=(0, 0), domain=Domain.CONTINUOUS, intersample=between
+    )
+    trace = trace_of(u, y + 1e-4 * rng.normal(size=400), sample_time=T)
+    fit = fit_transfer_function([trace], TWO, structure, QUICK, rest_output=0.0)
+    np.testing.assert_allclose(fit.model.numerator(0), [3.0, 2.0], rtol=2e-3)
+    np.testing.assert_allclose(fit.model.denominator(0), [4.0, 1.0, 1.0], rtol=2e-3)
+    np.testing.assert_allclose(fit.model.denominator(1), [0.5, 1.0], rtol=5e-3)
+    assert not any("moves with" in note for note in fit.notes)

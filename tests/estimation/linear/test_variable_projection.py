@@ -29,6 +29,7 @@ def time_record(domain: Domain, m: int, *, free_start: bool, n: int = 300) -> Ti
         domain=domain,
         sample_time=0.5,
         free_start=free_start,
+        moving=tuple(j % 2 == 0 for j in range(m)),
     )
 
 
