@@ -271,9 +271,13 @@ TANKS = {
         y = x2
     """,
 }
+TANKS["the same, its level read with play"] = TANKS["Bernoulli with losses, an edge and a pump that are found"].replace(
+    "y = x2", "y = min(max(kept, x2 - width), x2 + width)\n        kept[k+1] = y"
+)
 NETWORKS = {
     "alone": ("", ""),
     "with two networks of 2 neurons": ("+ net(x1, u; neurons=2)", "+ net(x1, x2; neurons=2)"),
+    "with a network of 3 neurons": ("", "+ net(x2; neurons=3)"),
 }
 START = {name: {"start": 0.05, "low": 0.0} for name in ("k1", "k2", "k3", "k4")} | {
     "k5": {"start": 0.3, "low": 0.0, "high": 5.0},
@@ -281,8 +285,9 @@ START = {name: {"start": 0.05, "low": 0.0} for name in ("k1", "k2", "k3", "k4")}
     "c2": {"start": 0.001, "low": -1.0, "high": 1.0},
     "u0": {"start": 0.0, "low": -2.0, "high": 2.0},
     "top": {"start": 10.0, "low": 3.0, "high": 20.0},
+    "width": {"start": 0.1, "low": 0.0, "high": 0.5},
 }
-TRIED, SEEN = 700, 200
+TRIED, SEEN = 768, 200
 """Samples of the estimation record that equations are tried on, the rest choosing between them; and how many before the
 rest give its state."""
 
@@ -292,7 +297,8 @@ def tank_structure(name: str, networks: tuple[str, str]) -> GreyBox:
     parameters = {key: value for key, value in START.items() if re.search(rf"\b{key}\b", text)}
     if "k2*out" in text:
         parameters["k2"] = {"start": 1.0, "low": 0.0}
-    levels = {one: {"start": 5.0, "low": 0.0, "high": 15.0} for one in ("x1", "x2")}
+    levels: dict[str, Any] = {one: {"start": 5.0, "low": 0.0, "high": 15.0} for one in ("x1", "x2")}
+    levels |= {"kept": 5.0} if "kept" in text else {}
     return GreyBox(equations=text, parameters=parameters, initial=levels)
 
 
