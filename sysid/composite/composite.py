@@ -17,7 +17,7 @@ from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation import StabilityOptions, Training, estimators
 from sysid.models import NARX, AbstractStructure, Limit, Mapping
 from sysid.models.cascade_run import Level
-from sysid.models.grey_box import Parameter
+from sysid.models.declared import Parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,7 +35,7 @@ from sysid.equations.syntax import (
 from sysid.equations.system import written_name
 from sysid.errors import ConfigError, did_you_mean
 from sysid.models import Mapping
-from sysid.models.grey_box import Parameter
+from sysid.models.declared import Parameter
 
 _SWITCH = (0.0, 1.0)
 """Bounds of a switch: off, on and how far between."""

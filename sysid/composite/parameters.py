@@ -12,7 +12,7 @@ from sysid.composite.fixed_member import FixedMember, Standing
 from sysid.errors import ConfigError
 from sysid.estimation.named import check_alike
 from sysid.models import Cascade, GreyBoxModel
-from sysid.models.grey_box import Parameter
+from sysid.models.declared import Parameter
 
 
 def declared(fixed: Sequence[FixedMember], more: Iterable[Parameter] = ()) -> dict[str, Parameter]:

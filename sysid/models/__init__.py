@@ -9,10 +9,11 @@ from sysid.models.cascade import Cascade
 from sysid.models.cascade_batch import simulate_family
 from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import Activity, CascadeRun
+from sysid.models.declared import InitialState, Parameter
 from sysid.models.ends import Ends
 from sysid.models.equation_form import EquationForm
 from sysid.models.form import AbstractForm
-from sysid.models.grey_box import GreyBox, InitialState, Parameter, VectorGreyBox
+from sysid.models.grey_box import GreyBox, VectorGreyBox
 from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 from sysid.models.history import History, Start, StartKind, StartLike
 from sysid.models.innovations import Innovations

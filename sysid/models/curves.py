@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.grey_box import Parameter, Table
+from sysid.models.declared import Parameter
+from sysid.models.grey_box import Table
 
 NONE = "none"
 SIZES = {"polynomial": (2, 9), "piecewise": (1, 50), "rounded": (1, 50), "network": (1, 100)}

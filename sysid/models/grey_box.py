@@ -13,133 +13,19 @@ from typing import Any
 from sysid.equations import RUNGE_KUTTA, SOLVERS, Lowered, System, Terms, lower
 from sysid.errors import ConfigError, did_you_mean, shortened
 from sysid.models.case_values import case_of, cases_among, cases_of, unknown_case
+from sysid.models.declared import CASE, InitialState, Parameter, entries, parameters_from, real
 from sysid.models.history import Start, StartKind
 from sysid.models.intersample import HELD, InterSample, intersample_of, moving, to_fields
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.structure import AbstractStructure
 
-MOST_PARAMETERS = 500
 MOST_SUBSTEPS = 1_000
 MOST_POINTS = 10_000
 """Points of all tables together."""
 WALD, PROFILE = "wald", "profile"
 INTERVALS = (WALD, PROFILE)
 """How intervals of parameters are found."""
-CASE = "case"
-"""What a parameter may have a value per."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parameter:
-    """A parameter of the equations, in its own unit.
-
-    Args:
-        name: Its name in the equations.
-        start: Where its estimation starts; its value, where it is fixed.
-        low: Least value.
-        high: Greatest value.
-        prior: Standard deviation of what is known of it before the data, around the start; ``None`` where nothing is.
-        fixed: Whether it is known, and not estimated.
-        unit: Its unit, for people.
-        per: ``case`` where each case has a value of its own; ``None`` where all share one.
-
-    Raises:
-        ConfigError: If the numbers do not go together.
-    """
-
-    name: str
-    start: float
-    low: float = -math.inf
-    high: float = math.inf
-    prior: float | None = None
-    fixed: bool = False
-    unit: str = ""
-    per: str | None = None
-
-    def __post_init__(self) -> None:
-        where = f"parameters, {self.name}"
-        if self.per not in {None, CASE}:
-            raise ConfigError(
-                "no such thing to have a value per", where=where, expected=CASE, got=shortened(self.per),
-                remedy=f"write per: {CASE} where each record has its own value, and cases: for records that share one",
-            )  # fmt: skip
-        if self.per and self.fixed:
-            raise ConfigError(
-                f"{self.name} is known, and each case is to have its own", where=where,
-                expected=f"fixed: true, or per: {CASE}", got="both",
-                remedy=f"what is known of each record is an input: give the data a channel {self.name}",
-            )  # fmt: skip
-        for name in ("start", "low", "high", "prior"):
-            _number(self, name, where, least_finite=name in {"start", "prior"})
-        if not self.low <= self.start <= self.high or not self.low < self.high:
-            raise ConfigError(
-                f"{self.name} starts outside its bounds",
-                where=where,
-                expected=f"low < high, and a start from {self.low:g} to {self.high:g}",
-                got=f"{self.start:g}",
-                remedy="correct the start or the bounds",
-            )
-        if self.prior is not None and not self.prior > 0.0:
-            raise ConfigError(
-                "a prior is a standard deviation", where=where, expected="above 0", got=self.prior,
-                remedy=f"write fixed: true where {self.name} is known",
-            )  # fmt: skip
-
-    @property
-    def scale(self) -> float:
-        """What is a large change of it."""
-        if self.prior is not None:
-            return self.prior
-        if self.start != 0.0:
-            return abs(self.start)
-        finite = [abs(bound) for bound in (self.low, self.high) if math.isfinite(bound) and bound != 0.0]
-        return min(finite, default=1.0)
-
-    def to_dict(self) -> float | dict[str, Any]:
-        """As it is written: a number where only the start is given."""
-        return _written(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class InitialState:
-    """What is known of a state before the first sample.
-
-    Args:
-        name: The state.
-        start: Its value there; where the record's own is estimated, where that starts.
-        low: Least value.
-        high: Greatest value.
-        fixed: Whether every record begins at that value, and none is estimated.
-        unit: Its unit, for people.
-
-    Raises:
-        ConfigError: If the numbers do not go together.
-    """
-
-    name: str
-    start: float
-    low: float = -math.inf
-    high: float = math.inf
-    fixed: bool = False
-    unit: str = ""
-
-    def __post_init__(self) -> None:
-        where = f"initial, {self.name}"
-        for name in ("start", "low", "high"):
-            _number(self, name, where, least_finite=name == "start")
-        if not self.low <= self.start <= self.high or not self.low < self.high:
-            raise ConfigError(
-                f"{self.name} begins outside its bounds",
-                where=where,
-                expected=f"low < high, and a start from {self.low:g} to {self.high:g}",
-                got=f"{self.start:g}",
-                remedy="correct the start or the bounds",
-            )
-
-    def to_dict(self) -> float | dict[str, Any]:
-        """As it is written: a number where only the start is given."""
-        return _written(self)
 
 
 Table = tuple[str, tuple[tuple[float, float], ...]]
@@ -198,7 +84,7 @@ class GreyBox(AbstractStructure):
                 got=shortened(text), remedy="write equations: | and the equations below it, indented",
             )  # fmt: skip
         object.__setattr__(self, "parameters", parameters_from(self.parameters))
-        object.__setattr__(self, "initial", _entries(self.initial, InitialState, "initial"))
+        object.__setattr__(self, "initial", entries(self.initial, InitialState, "initial"))
         object.__setattr__(self, "tables", _tables(self.tables))
         object.__setattr__(self, "cases", cases_of(self.cases))
         object.__setattr__(self, "intersample", intersample_of(self.intersample))
@@ -388,53 +274,6 @@ def lowered(
     return lower(structure.system, terms)
 
 
-def parameters_from(given: Any) -> tuple[Parameter, ...]:
-    """Parameters from what people write.
-
-    Args:
-        given: By name a start, or the fields of :class:`Parameter`.
-
-    Returns:
-        Them.
-
-    Raises:
-        ConfigError: If they cannot be.
-    """
-    return _entries(given, Parameter, "parameters")
-
-
-def _entries(given: Any, kind: Any, where: str) -> tuple[Any, ...]:
-    """Parameters, or initial states, from what people write."""
-    if isinstance(given, tuple) and all(isinstance(one, kind) for one in given):
-        return given
-    if not isinstance(given, Dict) or len(given) > MOST_PARAMETERS:
-        raise ConfigError(
-            f"{where} are no entries by name", where=where, expected=f"up to {MOST_PARAMETERS}, as in {{k: 0.5}}",
-            got=shortened(given), remedy=f"write {where}: {{NAME: {{start: 0.5, low: 0}}}}",
-        )  # fmt: skip
-    known = [one.name for one in fields(kind) if one.name != "name"]
-    found = []
-    for name, entry in given.items():
-        if not isinstance(name, str) or not name.strip():
-            raise ConfigError(
-                "not a name", where=where, expected="text", got=shortened(name), remedy="put it in quotes"
-            )
-        written = entry if isinstance(entry, Dict) else {"start": entry}
-        for key in written:
-            if key not in known:
-                raise ConfigError(
-                    f"unknown field {key!r}", where=f"{where}, {name}", expected=f"one of {', '.join(known)}",
-                    got=shortened(key), remedy=did_you_mean(key, known, "remove it"),
-                )  # fmt: skip
-        if "start" not in written:
-            raise ConfigError(
-                f"{name} has no start", where=f"{where}, {name}", expected="a start, as in {start: 0.5}",
-                got=", ".join(map(str, written)) or "nothing", remedy="add start: and a value of the right size",
-            )  # fmt: skip
-        found.append(kind(name=name, **written))
-    return tuple(found)
-
-
 def _tables(given: Any) -> tuple[Table, ...]:
     """Tables from what people write."""
     pairs = given.items() if isinstance(given, Dict) else given
@@ -445,7 +284,7 @@ def _tables(given: Any) -> tuple[Table, ...]:
             if isinstance(points, list | tuple)
             else []
         )
-        numbers = [tuple(_real(value) for value in row) for row in rows]
+        numbers = [tuple(real(value) for value in row) for row in rows]
         rising = all(a[0] < b[0] for a, b in pairwise(numbers))
         if len(numbers) < 2 or len(numbers) != len(points) or not rising or not all(map(_finite, numbers)):
             raise ConfigError(
@@ -460,32 +299,5 @@ def _tables(given: Any) -> tuple[Table, ...]:
     return tuple(found)
 
 
-def _real(value: object) -> float:
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
-
-
 def _finite(values: Sequence[float]) -> bool:
     return all(math.isfinite(value) for value in values)
-
-
-def _number(entry: Any, name: str, where: str, *, least_finite: bool) -> None:
-    """Bring a field into its form, or refuse what is no number."""
-    given = getattr(entry, name)
-    if given is None and name == "prior":
-        return
-    value = _real(given)
-    if math.isnan(value) or (least_finite and not math.isfinite(value)):
-        raise ConfigError(
-            f"{name} is no number", where=where, expected="a number", got=shortened(given),
-            remedy="write for example {start: 0.5, low: 0, high: 2}",
-        )  # fmt: skip
-    object.__setattr__(entry, name, value)
-
-
-def _written(entry: Any) -> float | dict[str, Any]:
-    given = {
-        one.name: getattr(entry, one.name)
-        for one in fields(entry)
-        if one.name != "name" and (one.name == "start" or getattr(entry, one.name) != one.default)
-    }
-    return float(given["start"]) if len(given) == 1 else given

@@ -15,7 +15,7 @@ from sysid.estimation.networks.equation_layout import EquationLayout
 from sysid.estimation.networks.member_layout import MemberLayout, basis_of
 from sysid.models import Member
 from sysid.models.column_recursion import ColumnRecursion
-from sysid.models.grey_box import Parameter
+from sysid.models.declared import Parameter
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
