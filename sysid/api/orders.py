@@ -288,9 +288,13 @@ def search_orders(
     first = int(not isinstance(feedback, str) and feedback.at_once)
     samples = sum(len(trace) for trace in estimation), max(len(trace) for trace in estimation)
     grid = _grid(samples, len(chosen.inputs), (max_na, max_nb, max_nk), first)
-    if max_nk is None:
-        grid = _as_late(grid, estimation, chosen)
     losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
+    late = _as_late(grid, estimation, chosen) if max_nk is None else grid
+    if late != grid:
+        later = order_search.search_orders(estimation, chosen, late, start=start, workers=workers)
+        if _least(later) < _least(losses):
+            grid = replace(late, min_nk=grid.min_nk)
+            losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
     selection = traces.with_role(Role.SELECTION) if selection is None else tuple(selection)
     found = run_finalists(
         losses, estimation, chosen, selection or estimation, count=FINALISTS, start=start, workers=workers
@@ -341,22 +345,33 @@ def _grid(
 
 
 def _as_late(grid: OrderGrid, traces: Sequence[Trace], mapping: Mapping) -> OrderGrid:
-    """The grid with dead times as long as one that plainly explains the output better than those in it."""
+    """The grid at dead times that seem to explain the output plainly better than those in it; itself where none do.
+
+    Of inputs that are all late it begins near the least of their dead times: where an output is slow, or its input
+    periodic, a late correlation is none of a dead time, and all lags until there would take minutes to be told so.
+    """
     most = longest_dead_time([len(trace) for trace in traces])
     usable = [trace.usable_samples for trace in traces]
     targets = [
         np.where(ok, t[mapping.output] - t[mapping.output][ok].mean(), 0.0) if ok.any() else np.zeros(len(t))
         for t, ok in zip(traces, usable, strict=True)
     ]
-    latest = grid.max_nk
+    latest, lows = grid.max_nk, list[int]()
     for name in mapping.inputs:
         found = shares([trace[name] for trace in traces], targets, most, 1)
         peak, within = int(np.argmax(found)), float(found[: grid.max_nk + 1].max())
-        latest = max(latest, peak + 3) if found[peak] > max(LATE_SHARE, LATE_GAIN * within) else latest
-    wider, n = replace(grid, max_nk=latest), len(mapping.inputs)
+        late = bool(found[peak] > max(LATE_SHARE, LATE_GAIN * within))
+        latest = max(latest, peak + 3) if late else latest
+        lows.append(max(grid.min_nk, peak - grid.max_nk) if late else grid.min_nk)
+    wider, n = replace(grid, min_nk=min(lows, default=grid.min_nk), max_nk=latest), len(mapping.inputs)
     parameters = grid.max_na + n * (grid.max_nb + latest) + 1
-    fits = wider.size(n) <= LARGEST and 4 * parameters <= sum(len(t) for t in traces)
+    fits = replace(wider, min_nk=grid.min_nk).size(n) <= LARGEST and 4 * parameters <= sum(len(t) for t in traces)
     return wider if fits else grid
+
+
+def _least(losses: OrderLosses) -> float:
+    """The least BIC a sample: grids that begin late have fewer of these."""
+    return float(losses.score(Criterion.BIC).min()) / max(losses.n_samples, 1)
 
 
 def _orders(finalist: Finalist) -> ARX:

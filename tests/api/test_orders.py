@@ -161,3 +161,19 @@ def test_structures_are_named_in_a_text_too_and_an_order_is_a_number_above_0() -
     for most in (0, True, 1.5):
         with pytest.raises(ConfigError, match="not a largest order"):
             sysid.search_orders(traces, "u -> y", structures="OE", most=most, **small)
+
+
+def test_a_late_correlation_that_is_no_dead_time_costs_no_grid_of_all_lags() -> None:
+    """An integrator under feedback answers a periodic reference a quarter of a period late, and at once."""
+    rng, n = np.random.default_rng(0), 3000
+    reference, y, u = np.sin(np.arange(n) / 60.0), np.zeros(n), np.zeros(n)
+    for k in range(1, n):
+        y[k] = y[k - 1] + 0.05 * u[k - 1]
+        u[k] = 2.0 * (reference[k] - y[k]) + 1e-3 * rng.standard_normal()
+    found = sysid.search_orders(sysid.data((u, y), sample_time=1.0), "u -> y")
+    assert found.best().nk[0] <= 1
+    assert found.grid.max_nk == 10
+    # One that is late is found among all lags, also where the correlation is largest later still.
+    delayed = np.concatenate([np.zeros(400), y[:-400]])
+    late = sysid.search_orders(sysid.data((u, delayed), sample_time=1.0), "u -> y")
+    assert late.best().nk[0] in {400, 401}

@@ -31,6 +31,12 @@ UNKNOWN = 0.5
 """Share of its limit that a trial is taken to last where no other of its kind has told."""
 LINEAR = 0.5
 """Share of the time of all trials by whose end linear structures beyond the first of each kind have to be done."""
+LARGER = 0.35
+"""The same for those of more states than are tried unasked."""
+SPILL = 0.05
+"""Share of the time by which scores, export and report may end after it."""
+MOST_KEPT = 0.5
+"""Share of the time that is kept for them at most: a search of a minute on a busy machine has to try something."""
 FINAL = 0.15
 """Share of either that is kept for trying the best once more."""
 
@@ -68,6 +74,7 @@ class Budget:
         trial: Share that one trial may take.
         kept: Share that is not spent yet.
         most: Share of the time of all trials that may be spent by the end of this round.
+        finishing_s: Processor seconds of scores, export and report, which follow the last fit.
         unlimited: Points of the next round that are tried even so, as long as the time of the last fit is not reached.
     """
 
@@ -82,8 +89,10 @@ class Budget:
     trial: float = TRIAL
     kept: float = FINAL
     most: float = 1.0
+    finishing_s: float = 0.0
     unlimited: int = 0
     _worked: list[tuple[float, float]] = field(default_factory=list)
+    _at_first: float = math.nan
     _rates: dict[str, float] = field(default_factory=dict)
     _open: list[Point] = field(default_factory=list)
 
@@ -127,10 +136,22 @@ class Budget:
     @property
     def slowed(self) -> float:
         """Seconds by the clock that a second of work takes, as trials have shown lately; at first, as is seen now."""
-        if not self._worked:
-            self._worked.append((slowness() * TELLING_S, TELLING_S))
-        wall, worked = np.sum(self._worked[-LATELY:], axis=0)
+        if not self._worked and not math.isfinite(self._at_first):
+            self._at_first = slowness()
+        wall, worked = np.sum(self._worked[-LATELY:] or [(self._at_first, 1.0)], axis=0)
         return float(np.clip(wall / worked, 1.0, SLOWEST))
+
+    @property
+    def ends_s(self) -> float:
+        """Seconds by the clock by which the last fit has to be over, so that the command ends within its time."""
+        if self.wall_s is None:
+            return math.inf
+        kept = self.slowed * self.finishing_s - SPILL * self.wall_s
+        return self.wall_s - min(max(kept, 0.0), MOST_KEPT * self.wall_s)
+
+    def is_late(self) -> bool:
+        """Whether trials have taken half of what was left to the last fit: no more is waited for."""
+        return self.wall_s is not None and self.clock() > self.ends_s - 0.5 * self.refit * self.wall_s
 
     def has_room(self, seconds: float) -> bool:
         """Whether trials that train for so long, all together, still end in time.
@@ -173,11 +194,12 @@ class Budget:
         return paid or self.wall_s is None or self.clock() + seconds <= self._until()
 
     def _before_the_last_fit(self) -> bool:
-        return self.wall_s is not None and self.clock() < (1.0 - self.refit) * self.wall_s
+        return self.wall_s is not None and self.clock() < self.ends_s - self.refit * self.wall_s
 
     def _until(self) -> float:
         """Seconds by which a round of trials has to be over."""
-        return min(self.most * (1.0 - self.refit), 1.0 - self.refit - self.kept) * (self.wall_s or 0.0)
+        wall_s = self.wall_s or 0.0
+        return min(self.most * (self.ends_s - self.refit * wall_s), self.ends_s - (self.refit + self.kept) * wall_s)
 
     def _seconds(self, point: Point) -> float:
         """How long a trial will take; of a kind that was not tried yet, a part of its limit, or at least something."""
@@ -186,7 +208,8 @@ class Budget:
         limit = self.slowed * self.trial * self.wall_s if point.training else self.wall_s
         rate = self._rates.get(point.structure.kind)
         if rate is None:
-            return UNKNOWN * limit if "max_time_s" in point.training else 1e-3
+            known = "max_time_s" in point.training and not estimator_of(point.structure).linear
+            return UNKNOWN * limit if known else 1e-3
         return min(limit, max(1e-3, rate * price(point, self.folds) * size_of(point.structure)))
 
 

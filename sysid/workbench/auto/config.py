@@ -32,7 +32,7 @@ class AutoConfig(BaseModel):
         start: How each free run begins.
         rest: Value at rest of the output, by channel name, in its unit.
         seed: Seed of everything random.
-        minutes: Wall time of the search, the last fit included; loading, export and report come on top.
+        minutes: Wall time of all but loading: a look at the data, search, last fits, scores, export and report.
         iterations: In place of minutes: iterations of training, all starts together. The same search then comes to the
             same result on every machine.
         workers: Processes that train, one thread each; 1 trains in this process.

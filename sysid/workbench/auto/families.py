@@ -17,6 +17,7 @@ from sysid.models import (
     PolynomialNARX,
     TransferFunction,
     VectorNARX,
+    WienerHammerstein,
 )
 from sysid.models.curves import NONE
 from sysid.models.output_limits import FOUND
@@ -25,6 +26,16 @@ from sysid.workbench.auto.look import Looked
 CURVE = "piecewise 6"
 """A learnt curve that can be any."""
 LINEAR_ORDERS = range(1, 7)
+FURTHER_ORDERS = ((8, 10), (12, 14), (16, 18), (20,))
+"""States of linear models beyond those, round by round: tried as long as the last round gained."""
+BLOCK_STATES = 6
+"""Of a block at most; a linear model has more."""
+MANY_STATES = 4
+"""Of a linear model, from which on two blocks are tried before networks."""
+BLOCK_LATE = 3
+"""Samples of dead time that a filter of few states may look like."""
+CORNERS = (4, 8, 12)
+"""Of a curve between two blocks whose corners are round, the least first."""
 ONE_STEP = {"pretraining": 2000, "pretraining_iterations": 100}
 """Training that begins one step ahead, at a small part of its price."""
 REGULARISATIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
@@ -52,7 +63,9 @@ class Family:
         kind: As results name it.
         linear: Whether it is tried in the first round.
         first: What of it is tried unasked.
+        leads: Whether it is tried before other kinds, where there may not be time for all.
         around: What stands next to one of it, the most promising first; nothing for what is tried in full at once.
+        larger: Rounds of it that are tried as long as the one before gained.
         in_motion: What of it is tried before all else where runs do not begin at rest: what learns where it begins, or
             remembers one sample alone.
         at_ends: What of it is tried before all else where outputs stand at ends: what is held there.
@@ -62,7 +75,9 @@ class Family:
     kind: str
     linear: bool
     first: Callable[[Looked], Sequence[Try]]
+    leads: Callable[[Looked], bool] = lambda _: False
     around: Callable[[Try, Looked], Sequence[Try]] = lambda _, __: ()
+    larger: Callable[[Looked], Sequence[Sequence[Try]]] = lambda _: ()
     in_motion: Callable[[Looked], Sequence[Try]] = lambda _: ()
     at_ends: Callable[[Looked], Sequence[Try]] = lambda _: ()
     adds_up: Callable[[Looked], Sequence[Try]] = lambda _: ()
@@ -78,8 +93,16 @@ def _shortest_arx(looked: Looked) -> list[Try]:
     return [Try(structure=ARX(na=1, nb=(1,) * m, nk=(looked.delay,) * m))]
 
 
-def _state_spaces(_: Looked) -> list[Try]:
-    return [Try(structure=LinearStateSpace(states=n, noise=False)) for n in LINEAR_ORDERS]
+def _state_space(states: int, looked: Looked) -> Try:
+    return Try(structure=LinearStateSpace(states=states, noise=False, feedthrough=looked.delay == 0))
+
+
+def _state_spaces(looked: Looked) -> list[Try]:
+    return [_state_space(n, looked) for n in LINEAR_ORDERS]
+
+
+def _larger_state_spaces(looked: Looked) -> list[list[Try]]:
+    return [[_state_space(n, looked) for n in some] for some in FURTHER_ORDERS]
 
 
 def _transfer_functions(looked: Looked) -> list[Try]:
@@ -98,6 +121,8 @@ def _neural(looked: Looked) -> list[Try]:
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
         for n, k, r in sizes
     ]
+    if looked.states > LINEAR_ORDERS[-1]:
+        found.insert(0, Try(structure=NeuralStateSpace(states=looked.states, neurons=8)))
     if looked.never_negative:
         signless = NeuralStateSpace(states=3, neurons=4, output="absolute")
         found.append(Try(structure=signless, training={"regularisation": 1e-2}))
@@ -208,6 +233,36 @@ def _around_blocks(one: Try, _: Looked) -> list[Try]:
     return _changed(one, [*sizes[:1], other, *sizes[1:]])
 
 
+def _two_blocks(looked: Looked) -> list[Try]:
+    """A curve between two blocks; what looks like a dead time of few samples is left to the first of them."""
+    delays, sizes = max(looked.delay - BLOCK_LATE, 0), (3,) if _has_many_states(looked) else (2, 3)
+    return [
+        Try(structure=WienerHammerstein(first=n, second=n, curve=f"rounded {CORNERS[0]}", delays=delays))
+        for n in sizes
+        if looked.n_inputs
+    ]
+
+
+def _has_many_states(looked: Looked) -> bool:
+    """Whether a linear model has more states than small networks: these then say little, and blocks have them."""
+    return looked.states > MANY_STATES
+
+
+def _around_two_blocks(one: Try, _: Looked) -> list[Try]:
+    """What is bent between the samples, too; more corners; blocks of more states and of fewer."""
+    blocks = cast("WienerHammerstein", one.structure)
+    corners = blocks.curve.size
+    more, fewer = ([n for n in CORNERS if n > corners], [n for n in CORNERS if n < corners][::-1])
+    moves: list[dict[str, Any]] = [{"between": 1 - blocks.between}] if blocks.between <= 1 else []
+    moves += [{"curve": f"rounded {n}"} for n in more[:1]]
+    for by in (1, -1):
+        sizes = [(blocks.first + by, blocks.second + by), (blocks.first + by, blocks.second)]
+        sizes += [(blocks.first, blocks.second + by)]
+        moves += [{"first": a, "second": b} for a, b in sizes if min(a, b) >= 1 and max(a, b) <= BLOCK_STATES]
+    moves += [{"curve": f"rounded {n}"} for n in fewer[:1]]
+    return _changed(one, moves)
+
+
 def _polynomials(looked: Looked) -> list[Try]:
     lags = min(looked.lags, 4)
     delays = f"{looked.delay}:{looked.delay + lags - 1}" if looked.n_inputs else []
@@ -255,7 +310,7 @@ def suggested(looked: Looked, *, linear: bool) -> list[Try]:
 FAMILIES = (
     Family(kind=ARX.kind, linear=True, first=_arx, in_motion=_shortest_arx),
     Family(kind=TransferFunction.kind, linear=True, first=_transfer_functions),
-    Family(kind=LinearStateSpace.kind, linear=True, first=_state_spaces),
+    Family(kind=LinearStateSpace.kind, linear=True, first=_state_spaces, larger=_larger_state_spaces),
     Family(
         kind=NeuralStateSpace.kind,
         linear=False,
@@ -273,6 +328,13 @@ FAMILIES = (
         at_ends=_narx_at_ends,
     ),
     Family(kind=VectorNARX.kind, linear=False, first=lambda _: [], at_ends=_vector_at_ends),
+    Family(
+        kind=WienerHammerstein.kind,
+        linear=False,
+        first=_two_blocks,
+        around=_around_two_blocks,
+        leads=_has_many_states,
+    ),
     Family(kind=HammersteinWiener.kind, linear=False, first=_blocks, around=_around_blocks),
     Family(kind=PolynomialNARX.kind, linear=False, first=_polynomials),
 )

@@ -44,6 +44,7 @@ class Looked:
         integrators: Outputs that add up what inputs bring: neural state spaces then have as many integrators.
         in_motion: Whether outputs move before any input does though each run begins as if they had stood: then what
             remembers one sample, or learns where it begins, is tried first.
+        states: Of the best linear state space, once linear models were tried; 0 before.
     """
 
     n_inputs: int
@@ -56,6 +57,7 @@ class Looked:
     ends: bool = False
     all_end: bool = False
     integrators: int = 0
+    states: int = 0
 
     @property
     def lags(self) -> int:

@@ -30,6 +30,8 @@ A_SECOND, LEAST_SEARCHED = 200, 8_000
 network would come to a few iterations on all of them, which tell nothing of it."""
 FEW = 4
 """Whole traces from which on trials see some of them, and not the beginning of all."""
+LITTLE_BEYOND = 0.1
+"""Part of the fitted range by which what chooses may go beyond it."""
 END = 0.25
 """Share of each trace that an order search chooses on."""
 SEARCH = {"max_iterations": 200, "starts": 4}
@@ -173,7 +175,18 @@ def _held_out(traces: Sequence[Trace], start: Start, *, in_turn: bool) -> tuple[
     rule = f"No selection traces are declared, so that {what} chose"
     if in_turn or sum(map(len, traces)) <= SHORT:
         return pairs, f"{rule}, all of them in turn, and was not fitted meanwhile."
-    return pairs[-1:], f"{rule} and was not fitted meanwhile."
+    return [min(reversed(pairs), key=_beyond)], f"{rule} and was not fitted meanwhile."
+
+
+def _beyond(pair: tuple[list[Trace], list[Trace]]) -> float:
+    """By how much what chooses goes beyond what is fitted, in ranges of that; 0 where it is little.
+
+    A model that is chosen where it cannot know better, as on the record of the largest amplitude, is chosen by chance.
+    """
+    fitted, chooses = (np.concatenate([one.values[one.usable_samples] for one in some]) for some in pair)
+    low, high = fitted.min(axis=0), fitted.max(axis=0)
+    over = np.maximum(low - chooses.min(axis=0), chooses.max(axis=0) - high) / np.maximum(high - low, 1e-300)
+    return float(over.max()) if over.max() > LITTLE_BEYOND else 0.0
 
 
 def _masked(traces: Sequence[Trace], fold: int, start: Start) -> tuple[list[Trace], list[Trace]]:

@@ -9,10 +9,11 @@ from statistics import median_high
 from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.estimation import JointTraining, Training
+from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
+from sysid.models import LinearStateSpace
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.budget import LINEAR, Budget, size_of
+from sysid.workbench.auto.budget import LARGER, LINEAR, Budget, size_of
 from sysid.workbench.auto.families import FAMILIES, Family, Try, suggested
 from sysid.workbench.auto.look import Looked
 from sysid.workbench.auto.parts import ENSEMBLE
@@ -229,6 +230,8 @@ class Plan:
             yield from self._rounds_of([one for one in rivals if one.structure.kind not in kinds])
             yield from self._near_the_best()
         yield from self._unasked(linear=True)
+        yield from self._larger()
+        self.looked = replace(self.looked, states=self._best_states())
         self.budget.unlimited = 1  # on a slow machine linear models alone would have taken all
         yield from self._unasked(linear=False)
         yield from self._near_the_best()
@@ -258,6 +261,32 @@ class Plan:
         yield from self._rounds_of(self._first(linear=linear))
         self.budget.most = 1.0
 
+    def _larger(self) -> Iterator[list[Try]]:
+        """Linear models of more states, round by round, as long as more states gain."""
+        self.budget.most = LARGER
+        for family in self.families:
+            small, large = self._halves(family.kind)
+            for tries in family.larger(self.looked):
+                if not math.sqrt(large) < (1.0 - GAIN) * math.sqrt(small):
+                    break
+                small = min(small, large)
+                yield from self._rounds_of(tries)
+                large = min(self.error(one) for one in self.trials if one.structure["kind"] == family.kind)
+        self.budget.most = 1.0
+
+    def _halves(self, kind: str) -> tuple[float, float]:
+        """The least errors of the smaller and of the larger half of what was tried of a kind."""
+        tried = [one for one in zip(self._tries, self.trials, strict=True) if one[0].structure.kind == kind]
+        errors = [self.error(trial) for _, trial in sorted(tried, key=lambda one: size_of(one[0].structure))]
+        middle = (len(errors) + 1) // 2
+        return min(errors[:middle], default=math.inf), min(errors[middle:], default=math.inf)
+
+    def _best_states(self) -> int:
+        """States of the best linear state space; 0 where there is none."""
+        found = [one for one in self.trials if one.structure["kind"] == LinearStateSpace.kind]
+        best = min(found, key=self._rank, default=None)
+        return 0 if best is None or not math.isfinite(self.error(best)) else int(best.structure["states"])
+
     def _least(self, *, linear: bool) -> list[Try]:
         """The least of each kind."""
         wanted, least = self._first(linear=linear), dict[str, Try]()
@@ -267,10 +296,10 @@ class Plan:
 
     def _first(self, *, linear: bool) -> list[Try]:
         """What is tried unasked."""
-        wanted = suggested(self.looked, linear=linear)
-        return wanted + [
-            one for family in self.families if family.linear is linear for one in family.first(self.looked)
-        ]
+        some = [family for family in self.families if family.linear is linear]
+        first = [one for family in some if family.leads(self.looked) for one in family.first(self.looked)]
+        rest = [one for family in some if not family.leads(self.looked) for one in family.first(self.looked)]
+        return [*first, *suggested(self.looked, linear=linear), *rest]
 
     def _rounds_of(self, wanted: Sequence[Try]) -> Iterator[list[Try]]:
         new = self._new(wanted, len(wanted))
@@ -320,7 +349,7 @@ class Plan:
         self._asked += 1
         row = estimator_of(one.structure)
         training = {**self.training, **one.training} if row.training is Training else dict(one.training)
-        if row.training is JointTraining and "max_time_s" in self.training:
+        if row.training is not Training and hasattr(row.training, "max_time_s") and "max_time_s" in self.training:
             training["max_time_s"] = self.training["max_time_s"]
         n = self.looked.n_outputs
         if "max_time_s" in training and not one.structure.for_outputs(n).several_outputs:

@@ -61,6 +61,7 @@ class Race:
         workers: Who train side by side.
         clock: Seconds that the search has taken, over all its sessions.
         kept: Share of the time by whose beginning a look at more than two has to be over.
+        ends_s: Seconds by the clock by which the last fit has to be over.
         slowed: Seconds by the clock that a second of training takes.
         in_it: Numbers of those that were trained on.
     """
@@ -74,6 +75,7 @@ class Race:
     workers: int
     clock: Callable[[], float]
     kept: float
+    ends_s: float = math.inf
     slowed: float = 1.0
     in_it: set[int] = field(default_factory=set)
 
@@ -128,7 +130,10 @@ class Race:
 
     def _in_time(self, points: Sequence[Point], share: float) -> bool:
         """Whether there is time for a look at all; what was done by an earlier session takes none."""
-        if self.wall_s is None or self.clock() + self.slowed * share * self.wall_s <= (1.0 - self.kept) * self.wall_s:
+        if self.wall_s is None:
+            return True
+        until = min(self.ends_s, self.wall_s) - self.kept * self.wall_s
+        if self.clock() + self.slowed * share * self.wall_s <= until:
             return True
         return self.driver.is_stored_on(points, partial(self._options, share, len(points)))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -41,6 +42,10 @@ from sysid.yaml_files import read_yaml
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
+
+
+NO_TIME = "No time was left to fit {}, {}, once more to all that is fitted: it is as its trial had it."
+"""What is said where the last fit was left out."""
 
 
 def hire(bench: Bench, workers: int) -> AbstractWorkers:
@@ -233,12 +238,15 @@ class _AutoSteps:
         loaded = run.do(self._loading())
         found = run.do(self._searching(run, loaded)).value
         spent_s = TrialStore(path=run.store.path / TRIALS).seconds
-        fits = [self._fit(name, found, spent_s) for name in found.shown]
-        pipeline, given, parts = self._pipeline(fits), dict[str, GivenFit](), found.parts
+        seconds = found.last_fits_s(spent_s, sum(map(len, loaded.value.estimation)))
+        fits = [self._fit(name, found, seconds[name]) for name in found.shown]
+        pipeline, given, parts, told = self._pipeline(fits), dict[str, GivenFit](), found.parts, list(found.told)
         for fit in fits:
             for model, made in zip(models_of(fit, pipeline.config), found.fits[fit.name], strict=True):
                 further = parts.trained_on and trains_on(model.fit.structure)
-                last = parts.partial or further
+                last = (parts.partial or further) and seconds[fit.name] > 0.0
+                if (parts.partial or further) and not last:
+                    told.append(NO_TIME.format(fit.name, model.fit.structure.label))
                 given[model.fit.name] = self._again(model, made, loaded.value, further=further) if last else made
         choice = Choice(name=FOUND, chosen_by=found.record.chosen_by)
         work = FitSteps(
@@ -250,7 +258,7 @@ class _AutoSteps:
             seed=self.config.seed,
         )  # fmt: skip
         run.then(lambda: run.tell(ready))
-        return Searched(record=found.record, results=results, told=found.told)
+        return Searched(record=found.record, results=results, told=tuple(dict.fromkeys(told)))
 
     @property
     def _estimate(self) -> Estimate:
@@ -290,21 +298,18 @@ class _AutoSteps:
         if run.fresh:
             shutil.rmtree(run.store.path / TRIALS, ignore_errors=True)
         work.say("looking at the traces")
-        search = Search.of(self.config, data, run)
-        workers = self.find_workers(search.bench, self.config.workers)
-        try:
-            with search.store.clock() as clock:
+        with TrialStore(path=run.store.path / TRIALS).clock() as clock:  # a look takes time, too
+            search = Search.of(self.config, data, run)
+            workers = self.find_workers(search.bench, self.config.workers)
+            try:
                 found = search.go(workers, clock)
-        finally:
-            workers.close()
+            finally:
+                workers.close()
         write_sweep(run.store.path, found.record)
         return found
 
-    def _fit(self, name: str, found: Found, spent_s: float) -> FitConfig:
-        """A trial as a fit of a pipeline; one that is fitted once more has more starts, and what time the trials left.
-
-        Where that is no fit of the chosen one, it has the share that was kept, as it is not made again.
-        """
+    def _fit(self, name: str, found: Found, seconds: float) -> FitConfig:
+        """A trial as a fit of a pipeline; one that is fitted once more has more starts, and the time that is left."""
         options, share = dict[str, Any](found.training[name]), found.kept
         structure: Mapping[str, Any] = found.shown[name].structure
         if found.parts.trained_on and trains_on(structure_from_dict(structure)):
@@ -315,9 +320,8 @@ class _AutoSteps:
                 )
         elif found.parts.partial and "starts" in options:
             options |= LAST
-        if "max_time_s" in options and self.config.wall_s is not None:
-            left = max(share, 1.0 - spent_s / self.config.wall_s) if name == FOUND else share
-            options["max_time_s"] = round(left * self.config.wall_s / len(found.fits[name]), 3)
+        if "max_time_s" in options and 0.0 < seconds < math.inf:
+            options["max_time_s"] = round(seconds / len(found.fits[name]), 3)
         return FitConfig.model_validate({"name": name, "structure": dict(structure), "training": options or None})
 
     def _again(self, model: FitModel, made: GivenFit, data: Data, *, further: bool) -> GivenFit:

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sysid.errors import ConfigError
+from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, AbstractStructure
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import SweepRecord, Trial
 from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
+from sysid.workbench.auto.finish import finish_s
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
 from sysid.workbench.auto.plan import AGAIN, Plan, Rank, ranked_by
@@ -36,6 +38,9 @@ FOUND, LINEAR = "best found", "best linear"
 TITLE = "Searching for a model"
 BUSY = 1.5
 """Seconds by the clock that a second of training takes from which on it is said."""
+LAST_FITS, LINEAR_LAST, RIPENING = 0.9, 0.25, 3
+"""Share of the time that is left which the last fits may train, as they do more than that; of it, that of the best
+linear model; and iterations of a network below which it is not begun."""
 CHECKED = 50
 """Sequences over which a trial's free run is checked, or one for each second of the search where that is more: all of
 them took longer than the training of a short search. The last fit is checked over all."""
@@ -77,6 +82,8 @@ class Found:
         training: Their options.
         parts: What was fitted and what chose.
         kept: Share of the budget that is left to the last fit, at least.
+        ends_s: Seconds by the clock by which the last fit has to be over; infinite where iterations are counted.
+        slowed: Seconds by the clock that a second of training takes.
         told: What a reader has to know.
         done_now: Trials that this session has done itself.
     """
@@ -87,8 +94,36 @@ class Found:
     training: Mapping[str, Mapping[str, Any]]
     parts: Parts
     kept: float
+    ends_s: float
+    slowed: float
     told: tuple[str, ...]
     done_now: int
+
+    def last_fits_s(self, spent_s: float, samples: int) -> dict[str, float]:
+        """How long each of the last fits may take, so that they end in time.
+
+        A linear fit is not cut short everywhere: it is done again only where what its trial took, over all samples,
+        leaves time enough. What was chosen has the rest.
+
+        Args:
+            spent_s: Seconds of the search so far.
+            samples: Of all that is fitted.
+
+        Returns:
+            By name seconds by the clock; 0 for what is kept as its trial has it.
+        """
+        if not math.isfinite(self.ends_s):
+            return dict.fromkeys(self.shown, math.inf)
+        left, found = LAST_FITS * (self.ends_s - spent_s), dict[str, float]()
+        more = samples / sum(len(trace) for trace in self.parts.folds[0].fitted) / len(self.parts.folds)
+        for name, trial in reversed(list(self.shown.items())):  # the linear one first, which is short
+            need = self.slowed * trial.cpu_s * more
+            share = left if name == FOUND else LINEAR_LAST * left
+            linear = estimator_of(structure_from_dict(trial.structure)).linear
+            enough = need <= share if linear else not share <= RIPENING * trial.iteration_s * more * self.slowed
+            found[name] = max(share, 0.0) if enough else 0.0
+            left -= min(need, found[name]) if linear else 0.0
+        return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -172,6 +207,7 @@ class Search:
             clock=clock,
             step=TITLE,
             tell=lambda event: self.run.tell(_progress(event, plan)),
+            late=lambda: budget.is_late() and math.isfinite(plan.least()),
         )
         trials = Trials.of(driver)
         again = 0 if self.parts.trained_on else AGAIN
@@ -185,6 +221,7 @@ class Search:
             refit=refit_share(self.parts),
             trial=TRIAL_OF_MANY if self.parts.trained_on else TRIAL,
             kept=FINAL if again else 0.0,
+            finishing_s=finish_s(len(self.data.traces), self._n_outputs, slowed=1.0),
         )
         training = {**self.parts.training, **budget.limits(budget.trial / len(self.parts.folds))}
         if self.parts.trained_on and self.config.tolerance is not None:
@@ -214,7 +251,8 @@ class Search:
             race = Race(
                 driver=first, points=plan.points, rank=self._rank, n_outputs=self._n_outputs, wall_s=self.config.wall_s,
                 iterations=self.config.iterations, workers=self.config.workers, clock=lambda: clock.total,
-                kept=kept - sum(RACE), slowed=1.0 if self.config.wall_s is None else plan.budget.slowed,
+                kept=kept - sum(RACE), ends_s=plan.budget.ends_s,
+                slowed=1.0 if self.config.wall_s is None else plan.budget.slowed,
             )  # fmt: skip
             plan.trials[:], spent = race.run(plan.trials)
             kept, raced = kept - spent, len(race.in_it)
@@ -233,6 +271,8 @@ class Search:
             training={name: first.last[trial.number].training for name, trial in shown.items()},
             parts=self.parts,
             kept=kept,
+            ends_s=plan.budget.ends_s,
+            slowed=1.0 if self.config.wall_s is None else plan.budget.slowed,
             told=(
                 *self.parts.told,
                 *_busy(plan),

@@ -46,9 +46,7 @@ def auto_command(source: str, *, given: Mapping[str, Any], fresh: bool, out: Pat
     data = data_of(traces, config.mapping)
     if config.wall_s is not None:
         finish = finish_s(len(data.traces), len(config.mapping.outputs))
-        said = (
-            f"Time: {span(config.wall_s)} for a model at most, then about {span(finish)} for scores, export and report."
-        )
+        said = f"Time: {span(config.wall_s)} at most, about {span(finish)} of it for scores, export and report."
         console().print(said, soft_wrap=True, markup=False)
     words = [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
     request = RunRequest(path=Path(source), typed=source, options=tuple(words), fresh=fresh, out=out, tracking=tracking)

@@ -89,10 +89,15 @@ class DaskWorkers(AbstractWorkers):
                 self.submit(job, before)
         return results
 
-    def close(self) -> None:
-        """Take back what is not done, and leave the cluster as it is."""
+    def give_up(self) -> None:
+        """Take back what is not done."""
         for future in self._jobs:
             future.cancel()
+        self._jobs.clear()
+
+    def close(self) -> None:
+        """Take back what is not done, and leave the cluster as it is."""
+        self.give_up()
         self._client.close()
 
     def _count_death(self, job: Job, error: Exception) -> None:

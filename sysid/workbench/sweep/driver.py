@@ -25,7 +25,7 @@ from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.store import Clock, TrialStore
-from sysid.workbench.sweep.trial import FAILED, Bench, Job, forget_checkpoint, run_job
+from sysid.workbench.sweep.trial import FAILED, Bench, Job, forget_checkpoint, gave_up, run_job
 from sysid.workbench.sweep.workers import AbstractWorkers
 
 FORMAT = 2
@@ -68,6 +68,7 @@ class Driver:
         tell: Told how it goes.
         last: The last job of each point that was tried, by its number.
         fold: Which of the bench's folds its jobs are of.
+        late: Whether there is no time for what is not done: it is given up, and told so.
     """
 
     config: SweepConfig
@@ -81,6 +82,7 @@ class Driver:
     _progress: _Progress = field(init=False)
     last: dict[int, Job] = field(default_factory=dict)
     fold: int = 0
+    late: Callable[[], bool] = lambda: False
     _smaller: dict[int, Point] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -300,21 +302,27 @@ class Driver:
                 heapq.heappush(ready, (job.key not in waited_for, -job.cost, next(turn), job))
         busy = 0
         while ready or busy:
+            if self.late():
+                self.workers.give_up()
+                return done | {key: self._kept(job, gave_up(job)) for key, job in missing.items() if key not in done}
             while ready and self.workers.free > 0:
                 job = heapq.heappop(ready)[3]
                 self.workers.submit(job, None if job.after is None else self.store.read(job.after))
                 busy += 1
             for job, outcome in self.workers.finished():
                 busy -= 1
-                # On disk before anybody hears of it.
-                self.store.write(outcome)
-                forget_checkpoint(self.bench, job.key)
-                self.clock.keep()
-                done[job.key] = self._note(job, outcome, fresh=True)
+                done[job.key] = self._kept(job, outcome)
                 for follower in followers.pop(job.key, []):
                     heapq.heappush(ready, (follower.key not in waited_for, -follower.cost, next(turn), follower))
             self._progress.show()
         return done
+
+    def _kept(self, job: Job, outcome: dict[str, Any]) -> Trial:
+        """A new result, on disk before anybody hears of it."""
+        self.store.write(outcome)
+        forget_checkpoint(self.bench, job.key)
+        self.clock.keep()
+        return self._note(job, outcome, fresh=True)
 
     def _note(self, job: Job, outcome: Mapping[str, Any], *, fresh: bool) -> Trial:
         trial = as_trial(outcome)

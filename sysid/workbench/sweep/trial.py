@@ -134,12 +134,7 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     """
     began, cpu = time.perf_counter(), time.process_time()
     bench = bench.fold(job.fold)
-    outcome: dict[str, Any] = {
-        "key": job.key,
-        "number": job.number,
-        "structure": dict(job.structure),
-        "label": job.label,
-    }
+    outcome = _named(job)
     try:
         with threadpool_limits(1), processor_time() if bench.processor_time else nullcontext():
             watch = _watch(bench, job)
@@ -170,6 +165,23 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
         trained = time.perf_counter() - began
         outcome |= {"status": FAILED, "usable": False, "reason": str(error)}
     return outcome | {"seconds": trained, "cpu_s": time.process_time() - cpu}
+
+
+def gave_up(job: Job) -> dict[str, Any]:
+    """The result of a job that was not waited for any longer.
+
+    Args:
+        job: The job.
+
+    Returns:
+        JSON values.
+    """
+    reason = "it was not done when the time of the search was up"
+    return _named(job) | {"status": FAILED, "usable": False, "reason": reason, "seconds": 0.0, "cpu_s": 0.0}
+
+
+def _named(job: Job) -> dict[str, Any]:
+    return {"key": job.key, "number": job.number, "structure": dict(job.structure), "label": job.label}
 
 
 def _watch(bench: Bench, job: Job) -> Watch:

@@ -64,6 +64,10 @@ class AbstractWorkers(ABC):
         """
 
     @abstractmethod
+    def give_up(self) -> None:
+        """End what they are at, whoever can: other jobs are taken again."""
+
+    @abstractmethod
     def close(self) -> None:
         """Let go of the workers."""
 
@@ -93,6 +97,9 @@ class InThisProcess(AbstractWorkers):
         done, self._done = self._done, []
         return done
 
+    def give_up(self) -> None:
+        """Nothing is under way."""
+
     def close(self) -> None:
         """Nothing to let go of."""
 
@@ -116,6 +123,9 @@ class NoWorkers(AbstractWorkers):
     def finished(self) -> list[tuple[Job, dict[str, Any]]]:
         """Nothing."""
         return []
+
+    def give_up(self) -> None:
+        """Nothing is under way."""
 
     def close(self) -> None:
         """Nothing to let go of."""
@@ -179,14 +189,18 @@ class LocalWorkers(AbstractWorkers):
                 self._begin(worker, job, worker.before)
         return results
 
+    def give_up(self) -> None:
+        """End what the workers are at; others take their places."""
+        for worker in self._workers:
+            if worker.job is not None:
+                _end(worker)
+                worker.executor = self._hire()
+                worker.job = worker.before = worker.future = None
+
     def close(self) -> None:
         """End the workers, whatever they are at."""
         for worker in self._workers:
-            processes = list((getattr(worker.executor, "_processes", None) or {}).values())
-            worker.executor.shutdown(wait=False, cancel_futures=True)
-            if worker.future is not None and not worker.future.done():
-                for process in processes:
-                    process.terminate()
+            _end(worker)
 
     def _hire(self) -> ProcessPoolExecutor:
         context = multiprocessing.get_context("spawn")
@@ -206,6 +220,14 @@ class LocalWorkers(AbstractWorkers):
                 expected="a worker that lives until its trial is done",
                 remedy="see whether the machine runs out of memory, or take this point out of the ranges",
             )
+
+
+def _end(worker: _Worker) -> None:
+    processes = list((getattr(worker.executor, "_processes", None) or {}).values())
+    worker.executor.shutdown(wait=False, cancel_futures=True)
+    if worker.future is not None and not worker.future.done():
+        for process in processes:
+            process.terminate()
 
 
 _BENCH: list[Bench] = []

@@ -93,3 +93,20 @@ def test_limits_count_processor_time_and_a_slow_machine_has_room_for_fewer_trial
     found.tell([trial(one, 1.0).model_copy(update={"seconds": 4000.0, "cpu_s": 8.0}) for one in limited[1:3]])
     assert found.slowed == SLOWEST
     assert budget(None, iterations=10).has_room(1e9)
+
+
+def test_scores_export_and_report_are_over_in_time_too() -> None:
+    """On a busy machine they take longer: trials and the last fit end sooner."""
+    clock = [0.0]
+    found = budget(100.0, clock=clock, refit=0.2, finishing_s=10.0)
+    assert found.ends_s == 95.0  # a little may be spilt
+    (first,) = found.take([point(1, 4)])
+    found.tell([trial(first, 1.0).model_copy(update={"seconds": 24.0, "cpu_s": 8.0})])
+    assert found.ends_s == 75.0
+    clock[0] = 56.0  # the last fit has 20 s
+    assert found.take([LINEAR]) == []
+    assert [found.is_late()] == [False]
+    clock[0] = 66.0  # half of that is gone
+    assert found.is_late()
+    assert budget(100.0, finishing_s=1e6).ends_s == 50.0
+    assert not budget(None, iterations=10, finishing_s=1e6, clock=[1e9]).is_late()

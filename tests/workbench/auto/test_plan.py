@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from sysid.estimation.estimators import ESTIMATORS
-from sysid.models import ARX, HammersteinWiener, NeuralStateSpace
+from sysid.models import ARX, HammersteinWiener, LinearStateSpace, NeuralStateSpace, WienerHammerstein
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import Budget, price
 from sysid.workbench.auto.look import Looked
@@ -104,7 +104,8 @@ def test_a_slow_machine_tries_one_nonlinear_model_where_that_leaves_time_for_the
 def test_curves_and_polynomials_are_tried_beside_networks() -> None:
     _, rounds = searched(lambda _: 1.0)
     # The least of each kind tells what the others of it cost.
-    assert [point.structure.kind for point in rounds[2]] == ["NSS", "NARX", "HammersteinWiener", "PolynomialNARX"]
+    kinds = ["NSS", "NARX", "WienerHammerstein", "HammersteinWiener", "PolynomialNARX"]
+    assert [point.structure.kind for point in rounds[2]] == kinds
     labels = [point.structure.label for one in rounds[2:UNASKED] for point in one]
     assert {"HW 2, piecewise 6 before", "HW 2, piecewise 6 behind"} <= set(labels)
     assert "polynomial NARX 2/2, degree 3, up to 20 terms" in labels
@@ -254,3 +255,43 @@ def test_what_adds_up_has_first_what_adds_up_exactly() -> None:
         assert {one.output for one in spaces} <= {"plain", "absolute"} - ({"absolute"} if sums else set())
         assert linear(rounds[0][0]) is (sums == 0)
         assert min(one.states for one in spaces) > sums or not sums
+
+
+def test_linear_models_get_more_states_as_long_as_these_gain() -> None:
+    def worth(point: Point) -> float:
+        one = point.structure
+        return 1.0 / min(one.states, 14) if isinstance(one, LinearStateSpace) else 1.0
+
+    plan, rounds = searched(worth)
+    tried = [point.structure.states for one in rounds for point in one if point.structure.kind == "SS"]
+    assert tried == [1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18]
+    # Networks begin where linear models ended.
+    assert plan.looked.states == 14
+    assert any(point.structure.label.startswith("NSS 14/") for one in rounds for point in one)
+    # Small ones say little then: blocks, which have many states, come before them.
+    assert next(p for one in rounds for p in one if not linear(p)).structure.label == "WH 3/3, rounded 4"
+    assert max(t.structure["states"] for t in searched(lambda _: 1.0)[0].trials if t.structure["kind"] == "SS") == 6
+
+
+def test_what_answers_within_the_sample_has_linear_models_that_do() -> None:
+    _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, orders=(ARX(na=2, nb=(2,), nk=(0,)),)))
+    assert all(p.structure.feedthrough for one in rounds for p in one if isinstance(p.structure, LinearStateSpace))
+
+
+def test_two_blocks_are_followed_where_they_lead() -> None:
+    def worth(point: Point) -> float:
+        one = point.structure
+        size = isinstance(one, WienerHammerstein) and min(one.first, 3) + min(one.second, 4) + 3 * min(one.between, 1)
+        return 1.0 / (1.0 + size)
+
+    plan, _ = searched(worth)
+    best = min(plan.trials, key=error).structure
+    assert (best["second"], best["between"], best["delays"]) == (4, 1, 0)
+
+
+def test_only_what_can_be_cut_short_has_a_limit_and_that_has_it() -> None:
+    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: 0.0, is_stored=lambda _: False)
+    points = Plan(looked=LOOKED, budget=budget, error=error, training={"max_time_s": 10.0}).ask()
+    assert {p.structure.kind: p.training.get("max_time_s") for p in points} == {
+        "ARX": None, "TransferFunction": 10.0, "SS": 10.0,
+    }  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,11 @@ from sysid.workbench.auto.refit import ENOUGH, GONE_ON, _error
 from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto
 from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.cli import run_cli
+from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.events import Event, StepProgress
+from sysid.workbench.sweep.store import Clock, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
 from tests.workbench.auto.conftest import data, record, traces
@@ -146,6 +149,9 @@ class Refusing(AbstractWorkers):
     def finished(self) -> list[Any]:
         return []
 
+    def give_up(self) -> None:
+        """Nothing is under way."""
+
     def close(self) -> None:
         """Nothing to let go of."""
 
@@ -246,3 +252,29 @@ def test_a_data_set_without_estimation_traces_is_refused() -> None:
     known = traces(record("a", 150))
     with pytest.raises(ConfigError, match="no trace is for estimation"):
         sysid.auto(replace(known, roles={"a": Role.TEST}), "u -> y", iterations=10)
+
+
+@pytest.mark.parametrize(("a_look", "again"), [(0.3, True), (3.0, False)])
+def test_the_last_fits_end_in_time(
+    tmp_path: Path, known: Data, monkeypatch: pytest.MonkeyPatch, a_look: float, again: bool
+) -> None:
+    """By a clock that goes on at each look, as on a machine that does other things."""
+    looks, limits = [0], dict[str, float]()
+
+    def session(_: Clock) -> float:
+        looks[0] += 1
+        return a_look * looks[0]
+
+    def fitted(fit: FitConfig, *given: Any) -> Any:
+        limits[fit.name] = getattr(fit.training_options(0), "max_time_s", math.nan)
+        return whole(fit, *given)
+
+    whole = steps.fit_traces
+    monkeypatch.setattr(Clock, "session", property(session))
+    monkeypatch.setattr(steps, "fit_traces", fitted)
+    found = searched(tmp_path, known, iterations=None, minutes=1.0)
+    spent = TrialStore(path=tmp_path / "trials").seconds
+    assert found.record.trials
+    assert (FOUND in limits) is again
+    assert sum(limits.values()) <= max(60.0 - spent, 0.0)
+    assert any("No time was left" in one and FOUND in one for one in found.told) is not again

@@ -18,7 +18,7 @@ from sysid.workbench.runner.store import digest
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.driver import Driver, as_trial
 from sysid.workbench.sweep.store import TrialStore
-from sysid.workbench.sweep.trial import Bench, Job
+from sysid.workbench.sweep.trial import FAILED, Bench, Job, gave_up
 from sysid.workbench.sweep.workers import AbstractWorkers
 
 SWEEP = {
@@ -68,6 +68,9 @@ class Crew(AbstractWorkers):
         self.done.append(job)
         return [(job, result)]
 
+    def give_up(self) -> None:
+        """Nothing that it would go on with."""
+
     def close(self) -> None:
         """Nothing."""
 
@@ -92,6 +95,19 @@ def answer(job: Job, before: Mapping[str, Any] | None) -> dict[str, Any]:
     }
 
 
+class Stuck(Crew):
+    """Does two jobs and comes to no end with any other."""
+
+    gave_up = 0
+
+    def finished(self) -> list[tuple[Job, dict[str, Any]]]:
+        return super().finished() if len(self.done) < 2 else []
+
+    def give_up(self) -> None:
+        self.gave_up += 1
+        self.held.clear()
+
+
 def sweep(folder: Path, crew: Crew, **change: Any) -> tuple[list[dict[str, Any]], Driver]:
     config = check(SweepConfig, SWEEP | change, where="s.yaml")
     store = TrialStore(path=folder)
@@ -101,6 +117,23 @@ def sweep(folder: Path, crew: Crew, **change: Any) -> tuple[list[dict[str, Any]]
         )
         trials = driver.run(config.space().points())
     return [trial.model_dump() for trial in trials], driver
+
+
+def test_what_is_not_done_in_time_is_given_up_and_found_so_again(tmp_path: Path) -> None:
+    config = check(SweepConfig, SWEEP, where="s.yaml")
+    store, looks = TrialStore(path=tmp_path), iter(range(100))
+    with store.clock() as clock:
+        driver = Driver(
+            config=config, bench=bench(), store=store, workers=Stuck(2, 0), clock=clock, step="s",
+            tell=lambda _: None, late=lambda: next(looks) > 20,
+        )  # fmt: skip
+        trials = driver.run(config.space().points())
+        again = dataclasses.replace(driver, workers=Crew(1, 0), late=lambda: False, last={})
+        assert [one.status for one in again.run(config.space().points())] == [one.status for one in trials]
+    assert isinstance(driver.workers, Stuck)
+    assert driver.workers.gave_up == 1
+    assert [one.status for one in trials].count(FAILED) == len(trials) - 2
+    assert {one.reason for one in trials if one.status == FAILED} == {gave_up(driver.last[1])["reason"]}
 
 
 WAYS = {

@@ -77,6 +77,15 @@ def collect(workers: Any, n: int) -> dict[int, dict[str, Any]]:
     return found
 
 
+def test_a_job_that_is_given_up_leaves_its_worker_free_for_another(crew: LocalWorkers) -> None:
+    crew.submit(job(20, training={"seed": 0, "max_iterations": 10**6}, iterations=10**6), None)
+    assert crew.free == 1
+    crew.give_up()
+    assert crew.free == 2
+    crew.submit(job(1), None)
+    assert collect(crew, 1)[1]["status"] != FAILED
+
+
 def test_a_killed_workers_job_is_done_again_with_the_same_result(crew: LocalWorkers) -> None:
     # Both workers stand, however long the machine takes to start them.
     crew.submit(job(2), None)
