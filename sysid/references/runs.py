@@ -19,8 +19,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from math import inf
@@ -290,6 +289,17 @@ class ReferenceRuns:
             TraceCache(folder=self.folder).note_time(self._timed_as, float(np.mean([one.wall_s for one in made])))
         return [found[k] for k in sorted(found)]
 
+    def again(self, case: Case) -> Outcome:
+        """Run an experiment whatever is kept, in a process that has run others where there is one; nothing is kept.
+
+        Args:
+            case: The experiment.
+
+        Returns:
+            What came of it.
+        """
+        return self._made(case)
+
     def _one(self, case: Case, until: float) -> Outcome | None:
         if time.monotonic() > until:
             return None
@@ -297,6 +307,11 @@ class ReferenceRuns:
         kept = None if self.fresh else self._kept(case, key)
         if kept is not None:
             return kept
+        outcome = self._made(case)
+        self._keep(key, outcome)
+        return outcome
+
+    def _made(self, case: Case) -> Outcome:
         process = self._worker()
         began = time.perf_counter()
         with _exchange() as (given, made):
@@ -317,12 +332,10 @@ class ReferenceRuns:
             values = np.load(made, allow_pickle=False) if answer["reason"] is None else None
         trace = None if values is None else self._trace(case, values[1:])
         before = {} if values is None else dict(zip(self.config.outputs, values[0].tolist(), strict=True))
-        outcome = Outcome(
+        return Outcome(
             case=case, trace=trace, before=before, reason=answer["reason"], cpu_s=answer.get("cpu_s", float("nan")),
             wall_s=wall,
         )  # fmt: skip
-        self._keep(key, outcome)
-        return outcome
 
     def _worker(self) -> _Process:
         """One that is idle, or a new one; between looking and taking another thread may have taken the last."""
@@ -391,21 +404,6 @@ class ReferenceRuns:
 
 def _number(value: float | None) -> float:
     return float("nan") if value is None else float(value)
-
-
-def reasons_of(outcomes: Iterable[Outcome], most: int = 3) -> str:
-    """Why some experiments gave no record, the most frequent reason first.
-
-    Args:
-        outcomes: What came of them; those that gave one say nothing.
-        most: Reasons that are told.
-
-    Returns:
-        In words; empty where all gave one.
-    """
-    counts = Counter(one.reason for one in outcomes if one.reason is not None).most_common()
-    told = [f"{reason} ({n})" for reason, n in counts[:most]]
-    return "; ".join([*told, *([f"and {len(counts) - most} other reasons"] if len(counts) > most else [])])
 
 
 def channels_of(config: ReferenceConfig) -> tuple[Channel, ...]:

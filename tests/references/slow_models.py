@@ -182,6 +182,12 @@ def hangs(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     return inputs[:, :1]
 
 
+def remembers(time: Array, inputs: Array, parameters: Mapping[str, float], runs: list[float] = []) -> Array:  # noqa: B006
+    """Gives more with each run."""
+    runs.append(1.0)
+    return inputs[:, :1] + len(runs)
+
+
 def crashes(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """Takes its process down where the input goes above 1."""
     if inputs.max() > 1.0:

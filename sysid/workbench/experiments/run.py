@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from sysid.ingest import load_dataset, write_csv
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import designed
 from sysid.references.runs import Case, Outcome, Progress, ReferenceRuns, channels_of
+from sysid.references.told import unlike
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import is_pressure
 from sysid.workbench.experiments.config import ExperimentConfig
@@ -167,14 +168,20 @@ class Experiments:
             return _by_role(cases, runs.run(flat))
 
     def _ran(self, run: Run, work: Work) -> dict[str, list[Outcome]]:
-        return self.made(lambda name, n, count: work.say(f"{name} ({n} of {count})", n / count), fresh=run.fresh)
+        return self.made(
+            lambda name, n, count: work.say(f"{name} ({n} of {count})", n / count), fresh=run.fresh,
+            warn=lambda text: run.tell(Warned(text=text)),
+        )  # fmt: skip
 
-    def made(self, progress: Progress | None, *, fresh: bool = False) -> dict[str, list[Outcome]]:
+    def made(
+        self, progress: Progress | None, *, fresh: bool = False, warn: Callable[[str], object] | None = None
+    ) -> dict[str, list[Outcome]]:
         """What comes of the experiments.
 
         Args:
             progress: Told of each that is done.
             fresh: Whether they are run again, whatever is kept.
+            warn: Told where the reference does not repeat itself; one is run twice to see.
 
         Returns:
             By role.
@@ -182,7 +189,10 @@ class Experiments:
         cases = self.cases()
         flat = [case for some in cases.values() for case in some]
         with ReferenceRuns(config=self.reference, workers=self.config.workers, fresh=fresh) as runs:
-            return _by_role(cases, runs.run(flat, progress))
+            done = runs.run(flat, progress)
+            if warn is not None and (said := unlike(runs, done)) is not None:
+                warn(said)
+            return _by_role(cases, done)
 
     def _loading(self, run: Run, outcomes: Mapping[str, Sequence[Outcome]]) -> Step[Experimented]:
         """Write the data set and load its traces, which shows that it can be used."""

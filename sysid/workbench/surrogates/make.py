@@ -22,7 +22,8 @@ from sysid.field_checks import check
 from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
-from sysid.references.runs import ReferenceRuns, reasons_of
+from sysid.references.runs import ReferenceRuns
+from sysid.references.told import reasons_of
 from sysid.reporting.growth import FILE
 from sysid.reporting.judging.results import FOLDER
 from sysid.reporting.records import write_record

@@ -17,7 +17,8 @@ from sysid.export.bundle import Bundle
 from sysid.extras import has
 from sysid.references.config import InputPort, ReferenceConfig
 from sysid.references.design import Design, drawn
-from sysid.references.runs import Case, Outcome, Progress, ReferenceRuns, reasons_of
+from sysid.references.runs import Case, Outcome, Progress, ReferenceRuns
+from sysid.references.told import reasons_of
 from sysid.reporting.judging.results import CurveRecord, JudgementRecord, QuantityRecord, SceneRecord
 from sysid.traces import TraceSet
 
