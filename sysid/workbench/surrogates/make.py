@@ -311,7 +311,7 @@ def first_look(experiments: Experiments, *, minutes: float) -> str | None:
     if left and each is None:
         with ReferenceRuns(config=experiments.reference, workers=1) as runs:
             (one,) = runs.run(cases[:1])
-        left, each = left - 1, one.wall_s
+        left, each = left - (not one.stored), one.wall_s if np.isfinite(one.wall_s) else None
         failed = "" if one.reason is None else f"; it gave no record: {one.reason}"
     each = each or 0.0
     seconds = left * each / config.workers
