@@ -24,6 +24,7 @@ class Sizes:
         outputs: ``o``.
         integrators: The last so many states are sums: :attr:`held` says which parameters that fixes.
         integrators_seen: Neurons read the sums all the same.
+        linear_inputs: Neurons do not read the inputs.
 
     Example:
         >>> Sizes(states=2, inputs=1, neurons=5, output_neurons=0).count
@@ -37,6 +38,7 @@ class Sizes:
     outputs: int = 1
     integrators: int = 0
     integrators_seen: bool = False
+    linear_inputs: bool = False
 
     @property
     def row(self) -> int:
@@ -101,17 +103,19 @@ class Sizes:
 
     @cached_property
     def held(self) -> NDArray[np.int64]:
-        """Places of the parameters that are none, as some states are sums.
+        """Places of the parameters that are none, as some states are sums or neurons do not read everything.
 
         A sum is added to itself and to sums after it, and nothing else reads it, but neurons where they see sums; no
         neuron feeds it (:attr:`unfed`).
         """
         n, places = self.states, np.arange(self.count)
         M, V = places[self.linear].reshape(n, self.row), places[self.readout].reshape(n, self.neurons)
-        blind = () if self.integrators_seen else (self.hidden, self.output_hidden)
-        neurons = [places[part].reshape(-1, self.row) for part in blind]
-        kept = [column for j in range(n)[self.sums] for column in (M[: j + 1, j], *(W[:, j] for W in neurons))]
-        return np.concatenate([places[:0], *kept, V[self.unfed].ravel()])
+        unread = np.zeros(self.row, dtype=bool)
+        unread[self.sums] = not self.integrators_seen
+        unread[n:-1] = self.linear_inputs
+        kept = [M[: j + 1, j] for j in range(n)[self.sums]]
+        kept += [places[part].reshape(-1, self.row)[:, unread].ravel() for part in (self.hidden, self.output_hidden)]
+        return np.concatenate([*kept, V[self.unfed].ravel()])
 
     def hold(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters of which those that are held have their values: 1 of a sum by itself, else 0.

@@ -45,6 +45,7 @@ class NeuralStateSpace(AbstractStructure):
             stands. Neurons feed the other states; where there are none, the first sum.
         integrators_seen: Neurons read the sums too: friction or a load that depends on the place. No linear term does,
             so that bounded neurons let nothing run away.
+        linear_inputs: Neurons do not read the inputs, which act in proportion however large: a force, a flow.
 
     Raises:
         ConfigError: If a number or a name cannot be used.
@@ -61,6 +62,7 @@ class NeuralStateSpace(AbstractStructure):
     output: str = "plain"
     integrators: int = 0
     integrators_seen: bool = False
+    linear_inputs: bool = False
 
     acts_at_once = True
     kind = "NSS"
@@ -110,9 +112,9 @@ class NeuralStateSpace(AbstractStructure):
         numbers = [self.states, self.neurons, *([self.output_neurons] if self.output_neurons else [])]
         words = [self.activation] * (self.activation != PLAIN) + [self.output] * (self.output != "plain")
         if self.integrators:
-            words.append(
-                f"{self.integrators} integrator{'s' * (self.integrators > 1)}{' seen' * self.integrators_seen}"
-            )
+            many, seen = "s" * (self.integrators > 1), " seen" * self.integrators_seen
+            words.append(f"{self.integrators} integrator{many}{seen}")
+        words += ["linear inputs"] * self.linear_inputs
         return " ".join([self.kind, "/".join(str(number) for number in numbers), *words])
 
     def for_outputs(self, n_outputs: int) -> NeuralStateSpace:
@@ -139,6 +141,7 @@ class NeuralStateSpace(AbstractStructure):
             outputs=n_outputs,
             integrators=self.integrators,
             integrators_seen=self.integrators_seen,
+            linear_inputs=self.linear_inputs,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -154,6 +157,7 @@ class NeuralStateSpace(AbstractStructure):
             **(
                 {"integrators": self.integrators, "integrators_seen": self.integrators_seen} if self.integrators else {}
             ),
+            **({"linear_inputs": True} if self.linear_inputs else {}),
         }
 
 

@@ -59,8 +59,8 @@ ROWS: dict[str, dict[str, tuple[str, float, str]]] = {
     "emps": {"test": ("mm", 1e3, "best 2.64 (dynoNet), continuous SUBNET 4.61, linear 5.53; n = 20")},
 }
 """By pipeline and case: the unit, what it is of ours, and published figures."""
-EQUATIONS = "-equations"
-"""What the name of a pipeline ends with that declares the equations of its record."""
+DECLARED = {"-equations": ("by equations", "its equations"), "-by-hand": ("by hand", "an integrator")}
+"""What the name of a pipeline ends with that declares something of its record: how it is named, and what that is."""
 
 
 def option(name: str, default: list[str]) -> list[str]:
@@ -85,10 +85,10 @@ def benchmark(file: Path, seeds: list[int]) -> None:
     data = read_description(find_dataset(str(read_yaml(file)["data"])))
     for name, digest in data.source.sha256.items():
         read(name, digest)
-    rows = ROWS[file.stem.removesuffix(EQUATIONS)]
-    by_equations = file.stem.endswith(EQUATIONS)
-    declared = "its equations" if by_equations else "nothing"
-    named = f"{data.name} by equations" if by_equations else data.name
+    suffix = next((one for one in DECLARED if file.stem.endswith(one)), "")
+    rows = ROWS[file.stem.removesuffix(suffix)]
+    by, declared = DECLARED.get(suffix, ("", "nothing"))
+    named = f"{data.name} {by}".strip()
     errors: dict[str, list[float]] = {case: [] for case in rows}
     print(f"{data.name}: {read_yaml(file)['description']}")
     with tempfile.TemporaryDirectory() as scratch:

@@ -122,10 +122,18 @@ def test_neurons_feed_what_is_no_sum(states: int, integrators: int, unfed: int) 
     assert np.count_nonzero(np.abs(np.linalg.eigvals(A) - 1.0) < 1e-6) >= integrators
 
 
-@pytest.mark.parametrize("seen", [False, True], ids=["", "seen"])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"integrators": 1},
+        {"integrators": 1, "integrators_seen": True, "linear_inputs": True},
+        {"linear_inputs": True},
+    ],
+    ids=", ".join,
+)
 @pytest.mark.parametrize("start", [ESTIMATED, MEASURED, Start()], ids=["estimated", "measured", "at rest"])
-def test_sensitivities_are_those_of_what_is_free(start: Start, seen: bool) -> None:
-    network = NeuralStateSpace(states=3, neurons=2, output_neurons=1, integrators=1, integrators_seen=seen)
+def test_sensitivities_are_those_of_what_is_free(start: Start, options: dict[str, Any]) -> None:
+    network = NeuralStateSpace(states=3, neurons=2, output_neurons=1, **options)
     rows = a_provider(network, carried(1, 80), start)
     sizes = rows.template.sizes
     theta = sizes.hold(0.3 * np.random.default_rng(0).standard_normal(rows.n_parameters))
@@ -187,6 +195,18 @@ def test_neurons_may_see_where_the_plant_stands_and_nothing_linear_does() -> Non
     assert set(more) == set(np.arange(plain.count)[plain.hidden].reshape(3, -1)[:, 1])
     with pytest.raises(ConfigError, match="no integrator to be seen"):
         NeuralStateSpace(states=2, neurons=3, integrators_seen=True)
+
+
+def test_inputs_act_in_proportion_where_neurons_do_not_read_them() -> None:
+    """Whatever the state: twice the input moves the next state twice as far."""
+    network = NeuralStateSpace(states=2, neurons=3, output_neurons=2, linear_inputs=True)
+    sizes = network.sizes(1)
+    theta = sizes.hold(np.random.default_rng(2).standard_normal(sizes.count))
+    form = NeuralForm(sizes=sizes, theta=theta, scaling=UNIT)
+    ends = [form.path(np.array([[u], [0.0]]), np.array([0.3, -0.2]))[1] for u in (0.0, 1.0, 2.0)]
+    np.testing.assert_allclose(ends[2] - ends[0], 2.0 * (ends[1] - ends[0]), atol=1e-12)
+    assert network.label == "NSS 2/3/2 linear inputs"
+    assert structure_from_dict(network.to_dict()) == network
 
 
 def test_it_is_named_and_stored() -> None:
