@@ -59,7 +59,7 @@ ROWS: dict[str, dict[str, tuple[str, float, str]]] = {
     "emps": {"test": ("mm", 1e3, "best 2.64 (dynoNet), continuous SUBNET 4.61, linear 5.53; n = 20")},
 }
 """By pipeline and case: the unit, what it is of ours, and published figures."""
-DECLARED = {"-equations": ("by equations", "its equations"), "-by-hand": ("by hand", "an integrator")}
+DECLARED = {"-equations": ("by equations", "its equations"), "-by-hand": ("by hand", "an integrator, a gain")}
 """What the name of a pipeline ends with that declares something of its record: how it is named, and what that is."""
 
 
@@ -80,12 +80,17 @@ def once(file: Path, seed: int, scratch: Path) -> tuple[Results, str]:
     return results, "" if results.best is None else results.best.chosen_by
 
 
+def suffix_of(file: Path) -> str:
+    """What the name of a pipeline ends with that says what it declares; nothing of a search."""
+    return next((one for one in DECLARED if file.stem.endswith(one)), "")
+
+
 def benchmark(file: Path, seeds: list[int]) -> None:
     """Run a pipeline for every seed, and say the median and the spread of each test case."""
     data = read_description(find_dataset(str(read_yaml(file)["data"])))
     for name, digest in data.source.sha256.items():
         read(name, digest)
-    suffix = next((one for one in DECLARED if file.stem.endswith(one)), "")
+    suffix = suffix_of(file)
     rows = ROWS[file.stem.removesuffix(suffix)]
     by, declared = DECLARED.get(suffix, ("", "nothing"))
     named = f"{data.name} {by}".strip()
@@ -111,7 +116,7 @@ def main() -> None:
     folder = next(one / "benchmarks" for one in content_folders("pipelines") if (one / "benchmarks").is_dir())
     seeds = [int(seed) for seed in option("seeds", ["0", "1", "2"])]
     for file in sorted(folder.glob("*.yaml")):
-        if file.stem.removesuffix(EQUATIONS) not in ROWS:
+        if file.stem.removesuffix(suffix_of(file)) not in ROWS:
             continue  # it compares ways of taking one record, and has no row
         if file.stem in option("only", [file.stem]):
             try:
