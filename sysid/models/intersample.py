@@ -60,6 +60,23 @@ def moving(given: InterSample, inputs: Sequence[str]) -> tuple[bool, ...]:
     return tuple(dict(given).get(name) == MOVING for name in inputs)
 
 
+def told(flags: Sequence[bool], inputs: Sequence[str]) -> str:
+    """What is told of the inputs between samples.
+
+    Args:
+        flags: From :func:`moving`.
+        inputs: Names of the inputs.
+
+    Returns:
+        A sentence behind a blank; empty where all are held.
+    """
+    names = [name for name, moves in zip(inputs, flags, strict=True) if moves]
+    if not names:
+        return ""
+    one = len(names) == 1
+    return f" Between samples {', '.join(names)} {'goes' if one else 'go'} straight to the next value ({MOVING})."
+
+
 def to_fields(given: InterSample) -> dict[str, Any]:
     """What is written of it: nothing where inputs are held, as they are by default.
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.equations import MOST_STATES_IMPLICIT, ROSENBROCK, RUNGE_KUTTA, Lowered
 from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.models import intersample
 from sysid.models.equation_form import EquationForm
 from sysid.models.grey_box_model import EquationModel
 
@@ -193,7 +194,9 @@ def step_note(model: EquationModel, stepping: Stepping) -> str:
         " They are stiff where they start: only to stay bounded, Runge-Kutta steps would be "
         f"{stepping.explicit:,.0f} from sample to sample."
     )
-    return told + stiff * (stepping.explicit > 0.0 and model.solver == ROSENBROCK)
+    inputs = model.mapping.inputs
+    between = intersample.told(model.grey.moving(inputs), inputs)
+    return told + between + stiff * (stepping.explicit > 0.0 and model.solver == ROSENBROCK)
 
 
 def step_warning(model: EquationModel, stepping: Stepping) -> str:

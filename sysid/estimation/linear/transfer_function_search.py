@@ -29,7 +29,7 @@ from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_speed, o
 from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
 from sysid.estimation.result import FitResult, Loop
 from sysid.estimation.uncertainty import Uncertainty
-from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel
+from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel, intersample
 from sysid.models.orthonormal_basis import Domain
 
 NEAR_BEST = 1.1
@@ -199,7 +199,8 @@ class AbstractProblem(ABC):
             uncertainty=uncertainty,
             notes=(
                 *reached.notes,
-                f"Dead times in samples: {', '.join(map(str, end.delays))}.",
+                f"Dead times in samples: {', '.join(map(str, end.delays))}."
+                + intersample.told(self.orders.moving(self.terms.mapping.inputs), self.terms.mapping.inputs),
                 *(told if reached.problem is self else ()),
                 *end.notes,
                 *self.told(end),

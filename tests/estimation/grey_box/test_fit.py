@@ -247,6 +247,7 @@ def test_an_input_that_moves_between_samples_leaves_no_error_where_that_is_said(
     fit = fitted([a_trace(u, y, sample_time=0.1)], duffing, parameters=starts, intersample="foh", solver=solver)
     assert isinstance(fit.model, GreyBoxModel)
     assert fit.model.parameters == pytest.approx(true, rel=1e-4)
+    assert any("Between samples u goes straight to the next value (foh)." in note for note in fit.notes)
     if solver == "runge-kutta":
         held = sysid.fit(a_trace(u, y, sample_time=0.1), "u -> y", GreyBox(equations=duffing, parameters=starts))
         assert held.model.parameters != pytest.approx(true, rel=0.05)

@@ -204,3 +204,5 @@ def test_an_input_that_moves_between_samples_is_one_where_that_is_said(between) 
     np.testing.assert_allclose(fit.model.denominator(0), [4.0, 1.0, 1.0], rtol=2e-3)
     np.testing.assert_allclose(fit.model.denominator(1), [0.5, 1.0], rtol=5e-3)
     assert not any("moves with" in note for note in fit.notes)
+    told = "u1, u2 go straight" if between == "foh" else "u1 goes straight"
+    assert any(told in note for note in fit.notes)
