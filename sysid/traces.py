@@ -10,8 +10,8 @@ from __future__ import annotations
 import enum
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +112,8 @@ class Trace:
             owns its memory is given away: it is kept as it is, since a long record would be in memory twice.
         start_time: Time of the first sample in seconds.
         usable: Shape ``(n_samples,)``, bool; ``False`` marks samples (gaps) that count in no loss and
-            in no figure of merit. ``None`` means that all count.
+            in no figure of merit. ``(n_samples, n_channels)`` marks them for each channel; kept as one column where all
+            are alike. ``None`` means that all count.
         provenance: What was done to the samples on their way here, one sentence each.
         weights: What each sample counts in the loss of a fit, from 0 on, shape ``(n_samples,)``; figures of merit do
             not know them. ``None`` means that all count alike.
@@ -147,6 +148,8 @@ class Trace:
         self._check()
         if self.usable is not None:
             usable = np.array(self.usable, dtype=np.bool_)
+            if usable.ndim == 2 and (usable == usable[:, :1]).all():
+                usable = usable[:, 0].copy()
             usable.setflags(write=False)
             object.__setattr__(self, "usable", usable)
         if self.weights is not None:
@@ -206,13 +209,13 @@ class Trace:
                 got=self.values[row, column],
                 remedy="ask for a repair at ingest, or mark the samples as not usable",
             )
-        if self.usable is not None and np.shape(self.usable) != (len(self.values),):
+        if self.usable is not None and np.shape(self.usable) not in {(len(self.values),), self.values.shape}:
             raise TraceError(
                 "the usable mask does not match the samples",
                 where=f"trace {self.name}",
-                expected=f"shape ({len(self.values)},)",
+                expected=f"shape ({len(self.values)},) or {self.values.shape}",
                 got=f"shape {np.shape(self.usable)}",
-                remedy="give one truth value per sample",
+                remedy="give one truth value per sample, or one per sample and channel",
             )
 
     def check_sizes(self, names: Sequence[str]) -> None:
@@ -270,8 +273,38 @@ class Trace:
 
     @property
     def usable_samples(self) -> NDArray[np.bool_]:
-        """The mask as an array, all true where none was given."""
-        return np.ones(len(self.values), dtype=np.bool_) if self.usable is None else self.usable
+        """The samples that count in all channels, shape ``(n_samples,)``; all where no mask was given."""
+        return self.usable_of(self.channel_names)
+
+    def usable_of(self, names: Iterable[str]) -> NDArray[np.bool_]:
+        """The samples that count in each of some channels.
+
+        Args:
+            names: Channel names, as the inputs and outputs of a mapping; those that are not there count everywhere.
+
+        Returns:
+            Shape ``(n_samples,)``.
+        """
+        if self.usable is None or self.usable.ndim == 1:
+            return np.ones(len(self.values), dtype=np.bool_) if self.usable is None else self.usable
+        return np.asarray(self.usable[:, [self.index(name) for name in names if name in self]].all(axis=1))
+
+    def seen_by(self, names: Iterable[str], *, each: bool = False) -> Trace:
+        """The trace as who knows some of its channels alone sees it: what others lack is nothing to it.
+
+        Args:
+            names: Channel names, as those of a mapping.
+            each: Whether the mask stays one of each channel; else a sample counts where it does in all of them.
+
+        Returns:
+            The trace; itself where its mask is of samples already.
+        """
+        if self.usable is None or self.usable.ndim == 1:
+            return self
+        known = {*names}
+        others = np.array([name not in known for name in self.channel_names])
+        usable = self.usable | others if each else self.usable_of(known)
+        return replace(self, usable=None if usable.all() else usable)
 
     @property
     def digest(self) -> str:
@@ -279,7 +312,8 @@ class Trace:
         head = [self.start_time, self.sample_time, [[c.name, c.unit, c.reference.value] for c in self.channels]]
         sha = hashlib.sha256(json.dumps(head).encode())
         sha.update(self.values.tobytes())
-        sha.update(np.packbits(self.usable_samples).tobytes())
+        mask = self.usable_samples if self.usable is None else self.usable  # of channels it has more bits
+        sha.update(np.packbits(mask).tobytes())
         if self.weights is not None:
             sha.update(self.weights.tobytes())
         return sha.hexdigest()

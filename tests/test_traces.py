@@ -79,3 +79,21 @@ def test_a_case_that_has_samples_of_a_fitted_one_is_known(start: int, shares: bo
     roles = {"fitted": Role.ESTIMATION, "again": Role.SELECTION, "other": Role.TEST}
     traces = TraceSet(name="rig", traces=(cut("fitted", 0, 50), cut("again", start, 80), other), roles=roles)
     assert traces.shared == ((("again", "fitted"),) if shares else ())
+
+
+def test_a_mask_of_each_channel_hides_a_sample_from_who_knows_that_channel_alone() -> None:
+    mask = np.array([[True, True, True], [True, False, True], [False, True, True]])
+    channels = tuple(Channel(name=name, unit="1") for name in "uyz")
+    trace = Trace(name="a", sample_time=1.0, channels=channels, values=np.zeros((3, 3)), usable=mask)
+    assert trace.usable_samples.tolist() == [True, False, False]
+    assert trace.usable_of(["y"]).tolist() == [True, False, True]
+    assert trace.seen_by(["z"]).usable is None
+    seen = trace.seen_by(["u"]).usable
+    assert seen is not None
+    assert seen.tolist() == [True, True, False]
+    each = trace.seen_by(["y"], each=True).usable
+    assert each is not None
+    assert each.tolist() == [[True] * 3, [True, False, True], [True] * 3]
+    alike = Trace(name="a", sample_time=1.0, channels=channels, values=np.zeros((3, 3)), usable=mask[:, [1, 1, 1]])
+    plain = Trace(name="a", sample_time=1.0, channels=channels, values=np.zeros((3, 3)), usable=mask[:, 1])
+    assert alike.digest == plain.digest != trace.digest

@@ -49,7 +49,7 @@ def advise(traces: TraceSet, mapping: Mapping) -> Advice:
     chosen = traces.with_role(Role.ESTIMATION, Role.SELECTION) or traces.traces
     for trace in chosen:
         trace.check_sizes([*mapping.inputs, *mapping.outputs])
-    record = Record(traces=chosen, mapping=mapping)
+    record = Record(traces=tuple(trace.seen_by(mapping.channels) for trace in chosen), mapping=mapping)
     findings = tuple(finding for check in CHECKS for finding in check(record))
     impulse = record.slowed[0].impulse
     return Advice(

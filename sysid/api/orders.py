@@ -351,7 +351,7 @@ def _as_late(grid: OrderGrid, traces: Sequence[Trace], mapping: Mapping) -> Orde
     periodic, a late correlation is none of a dead time, and all lags until there would take minutes to be told so.
     """
     most = longest_dead_time([len(trace) for trace in traces])
-    usable = [trace.usable_samples for trace in traces]
+    usable = [trace.usable_of(mapping.channels) for trace in traces]
     targets = [
         np.where(ok, t[mapping.output] - t[mapping.output][ok].mean(), 0.0) if ok.any() else np.zeros(len(t))
         for t, ok in zip(traces, usable, strict=True)

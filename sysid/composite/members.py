@@ -264,7 +264,7 @@ def mean_squares(
     """
     return np.array(
         [
-            np.mean((run - trace.columns(outputs))[trace.usable_samples] ** 2, axis=0)
+            [np.mean((run[:, j] - trace[name])[trace.usable_of([name])] ** 2) for j, name in enumerate(outputs)]
             for run, trace in zip(runs, traces, strict=True)
         ]
     )

@@ -66,7 +66,7 @@ def _plain_models(traces: Sequence[Trace], model: AbstractModel) -> list[Abstrac
 
 def _of(model: AbstractModel, trace: Trace, start: Start) -> list[str]:
     inputs, output = trace.columns(model.mapping.inputs), model.measured(trace)
-    usable = trace.usable_samples
+    usable = trace.usable_of(model.mapping.channels)
     begun = beginning(model, inputs, output, ESTIMATED, usable, case=trace.name)
     n = begun.first
     if n == 0:

@@ -20,7 +20,15 @@ from sysid.estimation.linear_posteriors import LinearPosterior
 from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import Training
-from sysid.estimation.record_notes import between_levels, contradicted, held, outnumbered, underexcited, undetermined
+from sysid.estimation.record_notes import (
+    between_levels,
+    contradicted,
+    held,
+    hidden,
+    outnumbered,
+    underexcited,
+    undetermined,
+)
 from sysid.estimation.result import FitResult
 from sysid.estimation.stability.check import (
     AbstractStabilityCheck,
@@ -61,6 +69,7 @@ class Estimator:
         of_residuals: What a reader of its residuals should know; empty for nothing.
         starts: Starts of a network's fit that asks for none.
         unites: Whether an ensemble is of starts that are trained to their end.
+        each: Whether a sample counts for one output where another lacks it; else it counts for none.
     """
 
     structure: type[AbstractStructure]
@@ -77,6 +86,7 @@ class Estimator:
     of_residuals: str = ""
     starts: int = 1
     unites: bool = False
+    each: bool = False
 
     @cached_property
     def knows(self) -> frozenset[str]:
@@ -190,6 +200,10 @@ class Estimator:
         Returns:
             The fit.
         """
+        lost = () if self.each else hidden(traces, mapping)
+        traces = [trace.seen_by(mapping.channels, each=self.each) for trace in traces]
+        if given.get("selection"):
+            given["selection"] = [one.seen_by(mapping.channels, each=self.each) for one in given["selection"]]
         options = self.options(None, seed=0) if training is None else training
         checked = NoCheck() if stability is None else self.stability.of(stability, mapping, traces)
         chosen = () if self.training is None else (options,)
@@ -204,7 +218,14 @@ class Estimator:
             against = contradicted(found.model, traces, named["start"], options)
             few = (*outnumbered(found.model, traces), *underexcited(found.model, traces), *held(found.model, traces))
             switches, levels = between_levels(found.model, traces)
-            warned = (*undetermined(traces, mapping), *few, *against, *off, *levels)
+            warned = (
+                *undetermined(traces, mapping),
+                *lost,
+                *few,
+                *against,
+                *off,
+                *levels,
+            )
             told = (*told, *switches)
             return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
 

@@ -115,6 +115,7 @@ ESTIMATORS: dict[str, Estimator] = {
                 no_posterior=ENDED,
                 starts=STARTS,
                 unites=True,
+                each=True,
             )
             for structure, name, fit_by in (
                 (NeuralStateSpace, "a neural state space", fit_neural_state_space),
@@ -131,6 +132,7 @@ ESTIMATORS: dict[str, Estimator] = {
                 no_posterior=ENDED,
                 begins="a grey box begins at the starts of its parameters",
                 starts=GREY_STARTS,
+                each=True,
             )
             for structure, name, fit in (
                 (GreyBox, "a grey box", fit_grey_box),

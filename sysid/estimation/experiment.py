@@ -22,6 +22,7 @@ from sysid.models import (
     beginning,
 )
 from sysid.models.beginning import window
+from sysid.models.gaps import bridged
 from sysid.traces import Trace
 
 
@@ -40,6 +41,8 @@ class Experiment:
             came before them. ``None`` where the history is declared: the system had stood there for ever.
         n_first: Samples, those of a measured history included, on which the state before the record is estimated when
             a free run over it is scored; 0 where none is.
+        each: Weight of each squared residual of each output, shape ``(n_samples, n_outputs)``, where some outputs count
+            in samples in which others do not; who cannot tell them apart goes by ``weights``, where none does.
     """
 
     inputs: NDArray[np.float64]
@@ -49,6 +52,7 @@ class Experiment:
     usable: NDArray[np.bool_] | None = None
     past: NDArray[np.bool_] | None = None
     n_first: int = 0
+    each: NDArray[np.float64] | None = None
 
     @classmethod
     def from_trace(
@@ -74,13 +78,17 @@ class Experiment:
         if not isinstance(rest_output, np.ndarray):
             mapping.check_single()
             output = output[:, 0]
+        trace, each = trace.seen_by(mapping.channels), _each(trace, mapping)
         history = replace(start.history(inputs, output, rest_output, trace.usable_samples), case=trace.name)
         n = start.n_measured
         if start.kind is StartKind.ESTIMATED:
-            whole = cls._of(trace, inputs, output, Beginning(history=history, first=0), np.zeros(1, dtype=np.bool_))
+            begun = Beginning(history=history, first=0)
+            whole = cls._of(trace, inputs, output, begun, past=np.zeros(1, dtype=np.bool_), each=each)
             return replace(whole, n_first=window(1, trace.usable_samples, asked=n))
         past = trace.usable_samples[:n] if n else None
-        return replace(cls._of(trace, inputs, output, Beginning(history=history, first=n), past), n_first=n)
+        return replace(
+            cls._of(trace, inputs, output, Beginning(history=history, first=n), past=past, each=each), n_first=n
+        )
 
     @classmethod
     def for_model(cls, trace: Trace, model: AbstractModel, start: Start) -> Experiment:
@@ -99,8 +107,10 @@ class Experiment:
             TraceError: If the trace is not longer than a measured start.
         """
         inputs, output = trace.columns(model.mapping.inputs), model.measured(trace)
+        trace, each = trace.seen_by(model.mapping.channels), _each(trace, model.mapping)
         begun = beginning(model, inputs, output, start, trace.usable_samples, case=trace.name)
-        return cls._of(trace, inputs, output, begun, trace.usable_samples[: begun.first] if begun.first else None)
+        past = trace.usable_samples[: begun.first] if begun.first else None
+        return cls._of(trace, inputs, output, begun, past=past, each=each)
 
     @classmethod
     def _of(
@@ -109,20 +119,24 @@ class Experiment:
         inputs: NDArray[np.float64],
         output: NDArray[np.float64],
         begun: Beginning,
+        *,
         past: NDArray[np.bool_] | None,
+        each: NDArray[np.bool_] | None,
     ) -> Experiment:
-        n = begun.first
-        usable = trace.usable_samples[n:]
+        n, whole = begun.first, trace.usable_samples
+        usable = whole[n:]
         weights = None if usable.all() else usable.astype(np.float64)
         if trace.weights is not None:
             weights = usable * trace.weights[n:]
+        counts = np.ones(len(usable)) if trace.weights is None else trace.weights[n:]
         return cls(
             inputs=inputs[n:],
-            output=output[n:],
+            output=bridged(output, whole if each is None else each)[n:],
             history=begun.history,
             weights=weights,
             usable=None if usable.all() else usable,
             past=past,
+            each=None if each is None else each[n:] * counts[:, None],
         )
 
     @property
@@ -253,3 +267,9 @@ def unit_ranges(experiments: Sequence[Experiment]) -> VectorScaling:
     """
     each = [[replace(e, output=e.output[:, at]) for e in experiments] for at in range(experiments[0].output.shape[1])]
     return VectorScaling.of([unit_range(of_one) for of_one in each])
+
+
+def _each(trace: Trace, mapping: Mapping) -> NDArray[np.bool_] | None:
+    """Which samples count for each output, where outputs differ in that, shape ``(n_samples, n_outputs)``."""
+    counts = np.column_stack([trace.usable_of((*mapping.inputs, name)) for name in mapping.outputs])
+    return None if (counts == counts[:, :1]).all() else counts

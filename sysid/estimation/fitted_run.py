@@ -44,7 +44,11 @@ class FreeRun:
         Returns:
             The run.
         """
-        inputs, output, usable = trace.columns(model.mapping.inputs), model.measured(trace), trace.usable_samples
+        inputs, output, usable = (
+            trace.columns(model.mapping.inputs),
+            model.measured(trace),
+            trace.usable_of(model.mapping.channels),
+        )
         begun = beginning(model, inputs, output, start, usable, case=trace.name)
         window = slice(begun.first, begun.first + MOST_SAMPLES)
         shape = (-1, len(model.mapping.outputs))

@@ -30,6 +30,8 @@ LEAST_SAMPLES = 100
 NOTHING = 1e-6
 """Part of its largest direction that the smallest of an input's movements has where it is rounding."""
 MOST_TRACES = 20
+HIDDEN = 0.1
+"""Share of an output's samples whose loss to another one's gaps is told."""
 OF_CURVES, LEVELS = 4, 3
 """Order that an input must excite for a curve, which one sine does not; and levels that are too few for one."""
 HARDLY_OWN = 0.01
@@ -137,6 +139,30 @@ def outnumbered(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...
     )
 
 
+def hidden(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
+    """Which outputs lose samples, as others of the same model lack them there.
+
+    Args:
+        traces: The records that are fitted, with the masks that they have.
+        mapping: Which channels go in, which come out.
+
+    Returns:
+        One sentence for each output of which a tenth or more is lost.
+    """
+    together = sum(int(trace.usable_of(mapping.channels).sum()) for trace in traces)
+    told = []
+    for name in mapping.outputs:
+        alone = sum(int(trace.usable_of((*mapping.inputs, name)).sum()) for trace in traces)
+        if alone and together <= (1.0 - HIDDEN) * alone:
+            told.append(
+                f"{name} loses {100 * (1 - together / alone):.0f} % of its samples ({alone - together} of {alone}): "
+                "other outputs of the same model are missing there, and it fits samples that all of them have. Fit "
+                f"each output by itself ({'+'.join(mapping.inputs)} -> {name}), or a structure that counts them apart: "
+                "a neural state space, equations."
+            )
+    return tuple(told)
+
+
 def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ...]:
     """Whether an input moves in too few ways to tell all coefficients of its effect.
 
@@ -214,7 +240,7 @@ def between_levels(model: AbstractModel, traces: Sequence[Trace]) -> tuple[tuple
         return (), ()
     switches, others = list[str](), list[str]()
     for name in model.mapping.inputs:
-        levels = np.unique(np.concatenate([trace[name][trace.usable_samples] for trace in traces]))
+        levels = np.unique(np.concatenate([trace[name][trace.usable_of([name])] for trace in traces]))
         if 1 < len(levels) <= LEVELS:
             at = ", ".join(f"{value:.6g}" for value in levels)
             told = f"{name} is only ever {at} in these records: what the model makes of other values is a guess."

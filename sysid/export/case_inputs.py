@@ -45,7 +45,7 @@ def with_case_inputs(fit: FitResult, traces: TraceSet, start: Start) -> tuple[Fi
 
 def _with_channels(trace: Trace, model: AbstractModel, channels: Sequence[Channel], start: Start) -> Trace:
     inputs, output = trace.columns(model.mapping.inputs), model.measured(trace)
-    begun = beginning(model, inputs, output, start, trace.usable_samples, case=trace.name)
+    begun = beginning(model, inputs, output, start, trace.usable_of(model.mapping.channels), case=trace.name)
     constants = np.tile(begun.history.constants, (len(trace), 1))
     there = [i for i, one in enumerate(trace.channels) if one.name not in {more.name for more in channels}]
     return replace(

@@ -170,7 +170,7 @@ def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[
 
 def _from_history(surrogate: Surrogate, model: AbstractModel, trace: Trace, start: Start) -> ParityCase:
     inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-    begun = beginning(model, inputs, target, start, trace.usable_samples)
+    begun = beginning(model, inputs, target, start, trace.usable_of(model.mapping.channels))
     history, inputs = begun.history, inputs[begun.first :]
     output, change = model.simulate(inputs, history).reshape(len(inputs), -1), _disturbances(surrogate)
     moved = history.output + (change if model.structure.several_outputs else change[0])

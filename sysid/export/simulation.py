@@ -181,7 +181,7 @@ def _run(
         start_time=given.start_time,
         channels=(*channels, *outputs),
         values=np.column_stack([values, surrogate.chosen(computed)]),
-        usable=None if measured else given.usable,
+        usable=None if measured or given.usable is None else given.usable_of(names),
         provenance=(*given.provenance, f"{surrogate.mapping} simulated in free run by {bundle.folder}"),
     )
     return Simulation(
@@ -203,7 +203,7 @@ def _scored(given: Trace, trace: Trace, measured: list[str], firsts: Dict[str, i
     found = {}
     for name in measured:
         counted = slice(firsts.get(name, 0), None)
-        usable = given.usable_samples[counted]
+        usable = given.usable_of([*trace.channel_names])[counted]
         if usable.any():
             found[name] = figures(given[name][counted], trace[name][counted], trace.channel(name).unit, usable)
     return found

@@ -133,7 +133,7 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions, repairs: Repair
         stamps=stamps,
         names=tuple(channel.name for channel in wanted.channels),
         values=np.column_stack(columns),
-        marked=_marked(table),
+        marked=_marked(table, names),
         notes=tuple(notes),
     )
 
@@ -144,11 +144,13 @@ def _read_from(source: Path) -> str:
     return f"read from {source.name} (SHA-256 {digest[:16]})"
 
 
-def _marked(table: RawTable) -> NDArray[np.bool_]:
-    # A file that we wrote carries the mask of its trace as a column.
-    if "sysid" not in table.metadata or "usable" not in table.names:
-        return np.zeros(len(table), dtype=np.bool_)
-    marked: NDArray[np.bool_] = table.find("usable").values == 0.0
+def _marked(table: RawTable, names: Sequence[str]) -> NDArray[np.bool_]:
+    """What a file that we wrote says of its values: it carries the mask of its trace as columns."""
+    marked = np.zeros((len(table), len(names)), dtype=np.bool_)
+    for at, name in enumerate(names) if "sysid" in table.metadata else ():
+        for mask in ("usable", f"usable {name}"):
+            if mask in table.names:
+                marked[:, at] |= table.find(mask).values == 0.0
     return marked
 
 
@@ -312,7 +314,7 @@ def _close_gaps(
             raise _empty_error(gridded, source, sample_time)
         values = fill(gridded, "hold" if method == "hold" else "linear")
         if method == "mask":
-            usable = usable & ~gridded.empty
+            usable = usable & ~gridded.empty[:, None]
         notes.append(f"{count} missing samples {'masked' if method == 'mask' else f'filled ({method})'}")
     return values, None if usable.all() else usable, notes
 

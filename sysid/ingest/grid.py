@@ -20,7 +20,7 @@ class Gridded:
         start: Time of the first grid point in seconds.
         values: Shape ``(n_grid, n_channels)``; NaN where ``empty``.
         empty: Shape ``(n_grid,)``: grid points that lie in a gap.
-        tainted: Shape ``(n_grid,)``: grid points to which a marked sample contributed.
+        tainted: Shape ``(n_grid, n_channels)``: values to which a marked one contributed.
     """
 
     start: float
@@ -69,7 +69,7 @@ def place(
         stamps: Shape ``(n,)``, seconds.
         values: Shape ``(n, n_channels)``.
         places: Shape ``(n,)``: their places, from :func:`grid_places`.
-        marked: Shape ``(n,)``: samples that must not count.
+        marked: Shape ``(n, n_channels)``: values that must not count.
 
     Returns:
         The samples; places that no stamp has are empty.
@@ -83,7 +83,7 @@ def place(
     out[places] = values
     empty = np.ones(count, dtype=np.bool_)
     empty[places] = False
-    tainted = np.zeros(count, dtype=np.bool_)
+    tainted = np.zeros((count, values.shape[1]), dtype=np.bool_)
     tainted[places] = marked
     return Gridded(start=float(stamps[0]), values=out, empty=empty, tainted=tainted)
 
@@ -111,7 +111,7 @@ def resample(
         method: How.
         start: Time of the first grid point, at or after the first stamp.
         longest_step: Seconds above which a step is a gap.
-        marked: Shape ``(n,)``: samples that must not count.
+        marked: Shape ``(n, n_channels)``: values that must not count.
 
     Returns:
         The samples on the grid.
@@ -129,7 +129,7 @@ def resample(
         out, tainted = values[before], marked[before].copy()
     else:
         out = np.column_stack([np.interp(grid, stamps, column) for column in values.T])
-        tainted = marked[before] | (marked[after] & ~on_stamp)
+        tainted = marked[before] | (marked[after] & ~on_stamp[:, None])
     out = np.where(empty[:, None], np.nan, out)
     return Gridded(start=start, values=out, empty=empty, tainted=tainted)
 
@@ -149,11 +149,11 @@ def _average(
     interval = interval[inside]
     counts = np.bincount(interval, minlength=count)
     empty = counts == 0
-    out = np.full((count, values.shape[1]), np.nan)
+    out, tainted = np.full((count, values.shape[1]), np.nan), np.zeros((count, values.shape[1]), dtype=np.bool_)
     for column in range(values.shape[1]):
         sums = np.bincount(interval, weights=values[inside, column], minlength=count)
+        tainted[:, column] = np.bincount(interval, weights=marked[inside, column], minlength=count) > 0
         out[~empty, column] = sums[~empty] / counts[~empty]
-    tainted = np.bincount(interval, weights=marked[inside], minlength=count) > 0
     return Gridded(start=start, values=out, empty=empty, tainted=tainted)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import UnitError
 from sysid.ingest.assemble import Wanted, assemble
@@ -15,7 +16,7 @@ from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.options import FileOptions, GridOptions, RepairOptions
 from sysid.ingest.readers import READERS, choose_reader, read_with
 from sysid.ingest.readers.text_source import bare_stem
-from sysid.ingest.table import RawTable
+from sysid.ingest.table import RawColumn, RawTable
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
@@ -118,7 +119,7 @@ def _as_written(table: RawTable) -> Trace | None:
             start_time=head["start_time"],
             channels=channels,
             values=np.column_stack([column.values for column in table.columns[1 : len(channels) + 1]]),
-            usable=table.columns[-1].values != 0.0 if head["masked"] else None,
+            usable=_mask(table.columns[len(channels) + 1 :]) if head["masked"] else None,
             provenance=tuple(head["provenance"]),
         )
     except (ValueError, KeyError, TypeError):
@@ -126,9 +127,16 @@ def _as_written(table: RawTable) -> Trace | None:
     return trace if trace.digest == head["digest"] and np.array_equal(table.columns[0].values, trace.time) else None
 
 
+def _mask(columns: Sequence[RawColumn]) -> NDArray[np.bool_]:
+    """The mask of a trace from its columns: one of all channels, or one of each."""
+    masks = np.column_stack([column.values != 0.0 for column in columns])
+    return masks[:, 0] if len(columns) == 1 else masks
+
+
 def _all_channels(table: RawTable, files: FileOptions) -> tuple[Channel, ...]:
     time = None if files.time.step is not None else files.time.column or table.time
-    skip = {time, "usable"} if "sysid" in table.metadata else {time}
+    masks = {"usable", *(f"usable {name}" for name in table.names)} if "sysid" in table.metadata else set[str]()
+    skip = {time, *masks}
     channels = []
     for column in table.columns:
         if column.name in skip:

@@ -26,7 +26,7 @@ class Record:
         stamps: Shape ``(n,)``, seconds.
         names: Channel names.
         values: Shape ``(n, n_channels)``.
-        marked: Shape ``(n,)``: samples that must not count.
+        marked: Shape ``(n, n_channels)``: values that must not count.
         notes: What was done, one sentence each.
     """
 
@@ -271,11 +271,11 @@ def missing_values(record: Record, repairs: RepairOptions) -> Record:
         if repair == "hold":
             before = np.searchsorted(known, np.flatnonzero(missing), side="right") - 1
             values[missing, column] = values[known[np.maximum(before, 0)], column]
-            marked[: known[0]] = True
+            marked[: known[0], column] = True
         else:
             values[missing, column] = np.interp(record.stamps[missing], record.stamps[known], values[known, column])
         if repair == "mask":
-            marked |= missing
+            marked[:, column] |= missing
         first = int(np.flatnonzero(missing)[0])
         done = {"interpolate": "interpolated", "hold": "as before", "mask": "filled and masked"}[repair or "mask"]
         early = f", {known[0]} before the first value masked" if repair == "hold" and known[0] else ""
@@ -302,9 +302,10 @@ def repeated_values(record: Record, repairs: RepairOptions) -> Record:
     _check_names(record, repairs)
     marked = record.marked.copy()
     for name in repairs.repeats or {}:
-        column = record.values[:, record.names.index(name)]
+        at = record.names.index(name)
+        column = record.values[:, at]
         again = np.r_[False, column[1:] == column[:-1]]
-        marked |= again
+        marked[:, at] |= again
         record = record.noted(f"{name}: {int(again.sum())} values that repeat the one before masked")
     return replace(record, marked=marked)
 
@@ -326,7 +327,8 @@ def drifts(record: Record, repairs: RepairOptions) -> Record:
     _check_names(record, repairs)
     values = record.values.copy()
     for name in repairs.drift or {}:
-        column, seen = values[:, record.names.index(name)], ~record.marked
+        at = record.names.index(name)
+        column, seen = values[:, at], ~record.marked[:, at]
         if np.ptp(record.stamps[seen]) if seen.any() else False:
             away = record.stamps - record.stamps[seen].mean()
             slope = float(away[seen] @ (column[seen] - column[seen].mean()) / (away[seen] @ away[seen]))

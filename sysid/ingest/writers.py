@@ -101,8 +101,7 @@ def write_parquet(trace: Trace, path: str | Path) -> Path:
 
     described = [Channel(name="time", unit="s"), *trace.channels]
     arrays = [values for _, values in _columns(trace)]
-    if trace.usable is not None:
-        described.append(Channel(name="usable", unit="1"))
+    described += [Channel(name=name, unit="1") for name in _mask_names(trace)]
     fields = [
         pa.field(
             channel.name,
@@ -128,8 +127,16 @@ def _columns(trace: Trace) -> Sequence[tuple[str, NDArray[np.float64]]]:
     columns = [("time [s]", trace.time)]
     columns += [(channel.label, trace[channel.name]) for channel in trace.channels]
     if trace.usable is not None:
-        columns.append(("usable [1]", trace.usable.astype(np.float64)))
+        masks = trace.usable.reshape(len(trace), -1).T.astype(np.float64)
+        columns += [(f"{name} [1]", mask) for name, mask in zip(_mask_names(trace), masks, strict=True)]
     return columns
+
+
+def _mask_names(trace: Trace) -> list[str]:
+    """What the columns are called that say which samples count, of all channels or of each."""
+    if trace.usable is None:
+        return []
+    return ["usable"] if trace.usable.ndim == 1 else [f"usable {name}" for name in trace.channel_names]
 
 
 def _head(trace: Trace) -> str:

@@ -110,6 +110,11 @@ class Mapping:
         return self.outputs[0]
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """Inputs and outputs, each once."""
+        return tuple(dict.fromkeys((*self.inputs, *self.outputs)))
+
+    @property
     def each(self) -> tuple[Mapping, ...]:
         """One mapping an output, all of the same inputs."""
         return tuple(Mapping(inputs=self.inputs, output=output) for output in self.outputs)

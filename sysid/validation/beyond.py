@@ -30,12 +30,12 @@ def beyond(model: AbstractModel, fitted: Sequence[Trace], scored: Sequence[Trace
         return ()
     told = []
     for name in model.mapping.inputs:
-        known = np.unique(np.concatenate([trace[name][trace.usable_samples] for trace in fitted]))
+        known = np.unique(np.concatenate([trace[name][trace.usable_of([name])] for trace in fitted]))
         if not len(known):
             continue
         away, most = list[str](), 0.0
         for trace in scored:
-            values = trace[name][trace.usable_samples]
+            values = trace[name][trace.usable_of([name])]
             share = float(np.mean(_outside(values, known))) if len(values) else 0.0
             away += [trace.name] * (share > SHARE)
             most = max(most, share)

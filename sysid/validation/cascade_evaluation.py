@@ -120,7 +120,8 @@ def _timed(cascade: Cascade, trace: Trace, repeats: int) -> _Timed:
 
 def _case(cascade: Cascade, trace: Trace, role: Role, timed: _Timed, name: str) -> CaseResult:
     run = timed.run
-    target, counted, unit = trace.columns([name])[:, 0], trace.usable_samples, cascade.units[name]
+    target, unit = trace.columns([name])[:, 0], cascade.units[name]
+    counted = trace.usable_of([*cascade.inputs, name])
     predicted = one_step_ahead(cascade, trace, run, name)
     return CaseResult(
         case=trace.name,

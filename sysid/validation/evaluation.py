@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation import Posterior
 from sysid.estimation.experiment import Experiment
-from sysid.models import AbstractModel, Start, beginning
+from sysid.models import AbstractModel, Start, beginning, gaps
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.intervals import CaseIntervals, case_intervals
 from sysid.validation.metrics import Figures, figures, none
@@ -180,9 +180,11 @@ def case_results(
         ChannelError: If the trace lacks a channel of the mapping.
     """
     inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-    begun = beginning(model, inputs, target, start, trace.usable_samples, case=trace.name)
+    usable = trace.usable_of(model.mapping.channels)
+    begun = beginning(model, inputs, target, start, usable, case=trace.name)
     history, scored = begun.history, slice(begun.first, None)
-    inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
+    inputs, target = inputs[scored], target[scored]
+    counts = [trace.usable_of([*model.mapping.inputs, output])[scored] for output in model.mapping.outputs]
     simulated = model.simulate(inputs, history)
     seconds = []
     for _ in range(repeats):
@@ -190,12 +192,13 @@ def case_results(
         model.simulate(inputs, history)
         seconds.append(time.perf_counter() - began)
     predicts = model.recursion.predicts
-    predicted = model.predict(inputs, target, history) if predicts else np.full(target.shape, np.nan)
+    known = np.column_stack(counts) if target.ndim > 1 else counts[0]
+    ahead_of = gaps.predicted(model, inputs, target, history, known) if predicts else np.full(target.shape, np.nan)
     intervals: tuple[CaseIntervals | None, ...] = (None,) * len(model.mapping.outputs)
     if posterior is not None:
         experiment = Experiment.for_model(trace, model, start)
-        intervals = case_intervals(posterior, model, experiment, simulated, predicted)
-    columns = [array.reshape(len(target), -1).T for array in (target, simulated, predicted)]
+        intervals = case_intervals(posterior, model, experiment, simulated, ahead_of)
+    columns = [array.reshape(len(target), -1).T for array in (target, simulated, ahead_of)]
     return {
         output: CaseResult(
             case=trace.name,
@@ -212,7 +215,7 @@ def case_results(
             constants=dict(zip(model.recursion.constants, history.constants, strict=True)),
             errors=parts_of((run - measured)[counted]),
         )
-        for output, unit, measured, run, ahead, interval in zip(
-            model.mapping.outputs, model.ends.output_units, *columns, intervals, strict=True
+        for output, unit, measured, run, ahead, counted, interval in zip(
+            model.mapping.outputs, model.ends.output_units, *columns, counts, intervals, strict=True
         )
     }

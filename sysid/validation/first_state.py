@@ -45,7 +45,7 @@ def first_states(model: AbstractModel, scored: Sequence[Trace], start: Start) ->
 
 def _told(model: AbstractModel, trace: Trace, start: Start) -> str:
     inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-    usable = trace.usable_samples
+    usable = trace.usable_of(model.mapping.channels)
     first = beginning(model, inputs, target, start, usable, case=trace.name).first
     longer = min(LONGER * first, len(trace) // SHARE)
     if not 0 < first < longer:

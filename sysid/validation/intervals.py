@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Posterior
 from sysid.estimation.experiment import Experiment
-from sysid.models import AbstractModel, Start
+from sysid.models import AbstractModel, Start, gaps
 from sysid.traces import Trace
 
 LEVEL = 0.95
@@ -210,7 +210,11 @@ def predict_interval(
     model, inputs, history = fit.model, experiment.inputs, experiment.history
     if steps != 1:
         return _ahead((fit.posterior, model), experiment, level, _steps(model, steps, loop))
-    output = model.simulate(inputs, history) if closed else model.predict(inputs, experiment.output, history)
+    output = (
+        model.simulate(inputs, history)
+        if closed
+        else gaps.predicted(model, inputs, experiment.output, history, experiment.usable)
+    )
     return _interval((fit.posterior, model), experiment, output, loop, level)
 
 

@@ -148,10 +148,10 @@ def finalist_of(fit: FitResult, cases: Sequence[Trace], start: Start, one_step_m
     model, found, errors = fit.model, dict[str, Figures](), list[float]()
     for case in cases:
         inputs, target = case.columns(model.mapping.inputs), case.columns([model.mapping.output])[:, 0]
-        begun = beginning(model, inputs, target, start, case.usable_samples)
+        begun = beginning(model, inputs, target, start, case.usable_of(model.mapping.channels))
         scored = slice(begun.first, None)
         output: NDArray[np.float64] = model.simulate(inputs[scored], begun.history)
-        counted = case.usable_samples[scored]
+        counted = case.usable_of(model.mapping.channels)[scored]
         target = target[scored]
         found[case.name] = figures(target, output, model.output_unit, counted)
         spread = float(np.std(target[counted])) if counted.any() else 0.0

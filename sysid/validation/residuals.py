@@ -23,7 +23,7 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
-from sysid.models import AbstractModel, Start, beginning
+from sysid.models import AbstractModel, Start, beginning, gaps
 from sysid.traces import Trace
 
 REACH = 20
@@ -217,12 +217,13 @@ def analyse_residuals(
 
 def _record(model: AbstractModel, trace: Trace, start: Start, free_run: bool, column: int) -> _Record:
     inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-    begun = beginning(model, inputs, target, start, trace.usable_samples, case=trace.name)
+    usable = trace.usable_of(model.mapping.channels)
+    begun = beginning(model, inputs, target, start, usable, case=trace.name)
     history, scored = begun.history, slice(begun.first, None)
-    inputs, target, counted = inputs[scored], target[scored], trace.usable_samples[scored]
+    inputs, target, counted = inputs[scored], target[scored], usable[scored]
     # With noise added to the output alone the free run is the best prediction, any number of steps ahead.
     free_run = free_run or not model.recursion.predicts
-    output = model.simulate(inputs, history) if free_run else model.predict(inputs, target, history)
+    output = model.simulate(inputs, history) if free_run else gaps.predicted(model, inputs, target, history, counted)
     residual = (target - output).reshape(len(target), -1)[:, column]
     return _Record(np.where(counted, residual, 0.0), inputs, counted)
 

@@ -41,4 +41,4 @@ def still(mapping: Mapping, fitted: Sequence[Trace], scored: Sequence[Trace]) ->
 
 
 def _usable(trace: Trace, channel: str) -> np.ndarray:
-    return trace[channel][trace.usable_samples]
+    return trace[channel][trace.usable_of([channel])]

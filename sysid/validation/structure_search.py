@@ -13,7 +13,7 @@ from sysid.estimation.estimators import fit
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.order_search import Criterion, weighed
 from sysid.estimation.result import FitResult
-from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, TransferFunction
+from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, TransferFunction, gaps
 from sysid.traces import Trace
 from sysid.validation.order_finalists import Finalist, finalist_of
 
@@ -139,7 +139,9 @@ def one_step_mse(found: FitResult, traces: Sequence[Trace], start: Start) -> flo
     for trace in traces:
         e = Experiment.for_model(trace, model, start)
         run: NDArray[np.float64] = (
-            model.predict(e.inputs, e.output, e.history) if predicts else model.simulate(e.inputs, e.history)
+            gaps.predicted(model, e.inputs, e.output, e.history, e.usable)
+            if predicts
+            else model.simulate(e.inputs, e.history)
         )
         weights = np.ones(len(run)) if e.weights is None else e.weights
         total += float(np.sum(weights * np.where(weights > 0.0, run - e.output, 0.0) ** 2))

@@ -58,7 +58,7 @@ def test_resampling_jittered_stamps_agrees_with_doing_it_by_hand(
         method=method,
         start=float(stamps[0]),
         longest_step=1.0,
-        marked=np.zeros(count, dtype=bool),
+        marked=np.zeros(values.shape, dtype=bool),
     )
     grid = stamps[0] + sample_time * np.arange(len(gridded.values))
     expected = reference(stamps, values, grid, method, sample_time)
@@ -81,7 +81,7 @@ def test_averaging_a_fast_record_takes_whole_blocks(factor: int, blocks: int, se
         method="average",
         start=0.0,
         longest_step=1.0,
-        marked=np.zeros(len(values), dtype=bool),
+        marked=np.zeros(values.shape, dtype=bool),
     )
     expected = values[: factor * blocks].reshape(blocks, factor, 1).mean(axis=1)
     np.testing.assert_allclose(gridded.values, expected, atol=1e-12)
@@ -104,14 +104,17 @@ def test_stamps_off_the_grid_have_no_places(stamps: list[float]) -> None:
 
 
 def test_marked_samples_taint_what_they_contribute_to() -> None:
-    stamps, values = np.arange(6.0), np.arange(6.0)[:, None]
-    marked = np.array([False, False, True, False, False, False])
+    stamps, values = np.arange(6.0), np.column_stack([np.arange(6.0)] * 2)
+    marked = np.column_stack([np.arange(6) == 2, np.arange(6) == 4])  # of each channel
     common = {"sample_time": 0.5, "start": 0.0, "longest_step": 10.0, "marked": marked}
     linear = resample(stamps, values, method="linear", **common)  # type: ignore[arg-type]  # one dict for both calls
     hold = resample(stamps, values, method="hold", **common)  # type: ignore[arg-type]  # one dict for both calls
     # grid: 0, .5, 1, 1.5, 2, 2.5, 3 ...: sample 2 reaches from 1.5 to 2.5 by lines, from 2 to 2.5 by holding
-    assert np.flatnonzero(linear.tainted).tolist() == [3, 4, 5]
-    assert np.flatnonzero(hold.tainted).tolist() == [4, 5]
+    assert np.flatnonzero(linear.tainted[:, 0]).tolist() == [3, 4, 5]
+    assert np.flatnonzero(hold.tainted[:, 0]).tolist() == [4, 5]
+    assert np.flatnonzero(linear.tainted[:, 1]).tolist() == [7, 8, 9]
+    average = resample(stamps, values, method="average", **common | {"sample_time": 2.0})  # type: ignore[arg-type]
+    assert average.tainted.tolist() == [[False, False], [True, False], [False, True]]
 
 
 @pytest.mark.parametrize(
@@ -119,6 +122,6 @@ def test_marked_samples_taint_what_they_contribute_to() -> None:
 )
 def test_empty_places_are_filled(method: str, filled: list[float]) -> None:
     values = np.array([[0.0], [1.0], [4.0]])
-    gridded = place(np.array([0.0, 1.0, 4.0]), values, np.array([0, 1, 4]), np.zeros(3, dtype=bool))
+    gridded = place(np.array([0.0, 1.0, 4.0]), values, np.array([0, 1, 4]), np.zeros((3, 1), dtype=bool))
     assert np.flatnonzero(gridded.empty).tolist() == [2, 3]
     assert fill(gridded, method)[:, 0].tolist() == filled  # type: ignore[arg-type]  # one of two literals

@@ -94,7 +94,7 @@ def test_a_number_that_stands_for_none_is_masked(tmp_path: Path, mark: str) -> N
     y = [mark if k in {20, 21} else str(value) for k, value in enumerate(Y)]
     y[22] = "n/a"  # beside words that stand for none
     (trace,) = proposed(tmp_path, "t [s],u [V],y [m]\n" + rows([f"{0.1 * k:.1f}" for k in range(60)], y)).traces
-    assert np.flatnonzero(~trace.usable).tolist() == [20, 21, 22]
+    assert np.flatnonzero(~trace.usable_samples).tolist() == [20, 21, 22]
     assert np.abs(trace["y"]).max() < 5.0
 
 

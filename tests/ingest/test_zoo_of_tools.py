@@ -249,7 +249,7 @@ def test_what_a_tool_leaves_behind_is_read_right_by_what_is_proposed(tmp_path: P
     traces = load_dataset(tmp_path / "X.yaml")
     (trace,) = traces
     y = u.replace("u", "y")
-    usable = np.ones(N, dtype=bool) if trace.usable is None else trace.usable
+    usable = np.ones(N, dtype=bool) if trace.usable is None else trace.usable_samples
     assert traces.sample_time == pytest.approx(step, rel=1e-9)
     assert {u, y} <= {channel.name for channel in trace.channels} and int((~usable).sum()) == missing
     np.testing.assert_allclose(trace[u], expected, atol=1e-12)

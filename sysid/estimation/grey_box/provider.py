@@ -28,7 +28,7 @@ class Record:
     Args:
         u: What the programs read, shape ``(n_samples, n_lagged)``.
         output: In units, shape ``(n_samples, n_outputs)``.
-        roots: Roots of the weights, shape ``(n_samples,)``; ``None`` for all ones.
+        roots: Roots of the weights, shape ``(n_samples, 1)``, or one an output; ``None`` for all ones.
         rest: What the programs read and the outputs of a system that has stood before the record.
         free: Whether its initial state is estimated; otherwise it is at rest.
         name: Of the record.
@@ -65,7 +65,8 @@ class Record:
         before, roots = first.past_weights[:n_past], None
         if first.weights is not None or not before.all():
             weights = np.ones(len(first.output)) if first.weights is None else first.weights
-            roots = np.sqrt(np.concatenate([before, weights]))
+            each = weights[:, None] if first.each is None else first.each
+            roots = np.sqrt(np.concatenate([np.repeat(before[:, None], each.shape[1], axis=1), each]))
         return cls(
             u=form.given(inputs, history.inputs[:1] if n_past else history.inputs),
             output=np.ascontiguousarray(output.reshape(len(output), -1)),
@@ -81,21 +82,30 @@ class Record:
 
     def from_shown(self) -> Record:
         """The same record, begun at the state that its first samples show."""
-        roots = np.ones(len(self.output)) if self.roots is None else self.roots.copy()
+        roots = np.ones((len(self.output), 1)) if self.roots is None else self.roots.copy()
         roots[: self.n_first] = 0.0
         return replace(self, roots=roots, shows=self.known[: self.n_first])
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Which samples count."""
-        return np.ones(len(self.output), dtype=np.bool_) if self.roots is None else self.roots > 0.0
+        """Which samples count, in all outputs."""
+        if self.roots is None:
+            return np.ones(len(self.output), dtype=np.bool_)
+        return np.asarray((self.roots > 0.0).all(axis=1))
+
+    @property
+    def counted(self) -> int:
+        """How many residuals count, of all outputs."""
+        if self.roots is None:
+            return self.output.size
+        return int(np.count_nonzero(np.broadcast_to(self.roots, self.output.shape)))
 
     def errors(self, y: Array, scale: Array, rows: slice = slice(None)) -> Array:
         """Weighted errors of some rows over the outputs' scales; zero where nothing counts, whatever stands there."""
         away = (y - self.output[rows]) / scale
         if self.roots is None:
             return np.asarray(away)
-        roots = self.roots[rows, None]
+        roots = self.roots[rows]
         return np.where(roots > 0.0, away * roots, 0.0)
 
 
@@ -125,8 +135,8 @@ class EquationProvider(AbstractProvider):
     """Those of the model and of the records' initial states."""
 
     def __post_init__(self) -> None:
-        counted = sum(int(np.count_nonzero(record.known)) for record in self.records)
-        object.__setattr__(self, "n_samples", counted * self.form.n_outputs)
+        counted = sum(record.counted for record in self.records)
+        object.__setattr__(self, "n_samples", counted)
         object.__setattr__(self, "n_parameters", len(self.scale) + len(self.open_states) * len(self._free))
 
     @property
@@ -333,7 +343,7 @@ class EquationProvider(AbstractProvider):
             J *= scale
             J /= self.unit[:, None]
             if record.roots is not None:
-                J = np.where(record.roots[rows, None, None] > 0.0, J * record.roots[rows, None, None], 0.0)
+                J = np.where(record.roots[rows, :, None] > 0.0, J * record.roots[rows, :, None], 0.0)
             yield record.errors(y, self.unit, rows), J, places
 
     def _shown_moves(self, form: EquationForm, record: Record, known: NDArray[np.bool_]) -> tuple[Array, Array]:

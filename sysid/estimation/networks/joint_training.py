@@ -87,7 +87,7 @@ def unit_errors(
     errors = {}
     for name in names:
         differences = np.concatenate(
-            [(run[name] - t[name])[t.usable_samples] for run, t in zip(runs, traces, strict=True)]
+            [(run[name] - t[name])[t.usable_of([name])] for run, t in zip(runs, traces, strict=True)]
         )
         spread = float(np.std(np.concatenate([trace[name] for trace in traces])))
         errors[name] = max(float(np.sqrt(np.mean(differences**2))), SMALLEST_ERROR * spread, np.finfo(np.float64).tiny)
@@ -131,7 +131,7 @@ def with_upstream_outputs(traces: TraceSet, cascade: Cascade, output: str) -> Tr
                 channels=channels,
                 values=np.column_stack([columns[name] for name in names]),
                 start_time=trace.start_time,
-                usable=trace.usable,
+                usable=None if trace.usable is None else trace.usable_of(measured),
                 provenance=(*trace.provenance, f"Inputs of the model of {output} simulated by the members before it."),
             )
         )

@@ -35,7 +35,15 @@ from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.result import Loop, Status
 from sysid.estimation.tolerance import outside, spans_of
-from sysid.models import EquationModel, NARXModel, NeuralStateSpaceModel, Start, VectorNeuralStateSpaceModel, beginning
+from sysid.models import (
+    EquationModel,
+    NARXModel,
+    NeuralStateSpaceModel,
+    Start,
+    VectorNeuralStateSpaceModel,
+    beginning,
+    gaps,
+)
 from sysid.traces import Trace
 
 FEWEST = 5
@@ -454,7 +462,7 @@ def judged(multistart: Multistart, model: Network) -> tuple[float, int]:
         if multistart.training.loop is Loop.CLOSED:
             output = model.simulate(inputs[n:], history)
         else:
-            output = model.predict(inputs[n:], target[n:], history)
+            output = gaps.predicted(model, inputs[n:], target[n:], history, trace.usable_samples[n:])
         squared = np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2, axis=0)
         errors.append(squared * unit)
         shares.append(np.sqrt(squared) / spans)

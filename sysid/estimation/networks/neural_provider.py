@@ -100,14 +100,15 @@ class NeuralProvider(AbstractProvider):
         before = experiment.past_weights[:n_past]
         if experiment.weights is not None or not before.all():
             weights = np.ones(len(experiment.output)) if experiment.weights is None else experiment.weights
-            roots = np.sqrt(np.concatenate([before, weights]))[:, None]
+            each = weights[:, None] if experiment.each is None else experiment.each
+            roots = np.sqrt(np.concatenate([np.repeat(before[:, None], each.shape[1], axis=1), each]))
         if self.output_weights is not None:
             roots = np.sqrt(self.output_weights) * (np.ones((len(target), 1)) if roots is None else roots)
         scaled, outputs, n = self.template.scaled(u), self.template.scaled_outputs(target), 0
         if number in self.from_shown:
             n = experiment.n_first
             roots = np.ones((len(target), 1)) if roots is None else roots.copy()
-        seen = None if n == 0 or roots is None else Seen(scaled[:n], outputs[:n], roots[:n].max(axis=1) > 0.0)
+        seen = None if n == 0 or roots is None else Seen(scaled[:n], outputs[:n], roots[:n].min(axis=1) > 0.0)
         if roots is not None:
             roots[:n] = 0.0
         oldest = np.concatenate(
@@ -136,7 +137,7 @@ class NeuralProvider(AbstractProvider):
     def counted(self) -> tuple[NDArray[np.bool_], ...]:
         """Which samples of each record count, the history's included."""
         return tuple(
-            np.ones(len(r.u), dtype=np.bool_) if r.root_weights is None else r.root_weights.max(axis=1) > 0.0
+            np.ones(len(r.u), dtype=np.bool_) if r.root_weights is None else r.root_weights.min(axis=1) > 0.0
             for r in self._records
         )
 
@@ -145,7 +146,7 @@ class NeuralProvider(AbstractProvider):
         """The records as a linear estimator sees them."""
         scaling, found = self.template, []
         for record, experiment in zip(self._records, self.experiments, strict=True):
-            weights = np.ones(len(record.u)) if record.root_weights is None else record.root_weights.max(axis=1)
+            weights = np.ones(len(record.u)) if record.root_weights is None else record.root_weights.min(axis=1)
             history = experiment.history
             stood = (scaling.scaled(history.inputs[:1])[0], scaling.scaled_outputs(history.output[:1])[0])
             rest = None if record.free is not None else stood

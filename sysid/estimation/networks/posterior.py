@@ -57,7 +57,7 @@ from sysid.estimation.least_squares.levenberg_marquardt import State
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.nonparametric.noise import persistence
 from sysid.estimation.result import Evidence, Loop
-from sysid.models import AbstractModel, Recursion
+from sysid.models import AbstractModel, Recursion, gaps
 from sysid.models.innovation_moves import prediction_moves
 
 CALIBRATED_AT = 0.95
@@ -291,7 +291,7 @@ def remaining(model: AbstractModel, experiments: Sequence[Experiment]) -> Noise:
     for closed in (True, False):
         total = np.zeros(len(model.mapping.outputs))
         for e in experiments if closed or form.predicts else ():
-            run = model.simulate(e.inputs, e.history) if closed else model.predict(e.inputs, e.output, e.history)
+            run = _run(model, e, closed=closed)
             weights = np.ones(len(run)) if e.weights is None else e.weights
             total += [float(np.sum(column * weights)) for column in ((run - e.output) ** 2).reshape(len(run), -1).T]
         figures.append(total / max(counted, 1) if closed or form.predicts else np.full(len(total), np.nan))
@@ -338,7 +338,14 @@ def _standardised(posterior: Posterior, model: AbstractModel, e: Experiment, loo
     """Absolute errors over their standard deviations, where samples count; of each output."""
     variance = posterior.parameter_variance(model, e, loop)
     closed = loop is Loop.CLOSED
-    output = model.simulate(e.inputs, e.history) if closed else model.predict(e.inputs, e.output, e.history)
+    output = _run(model, e, closed=closed)
     counted = np.ones(len(output), dtype=bool) if e.weights is None else e.weights > 0.0
     deviation = np.sqrt(variance + posterior.noise.of(loop))
     return np.asarray(np.abs(output - e.output)[counted] / np.maximum(deviation[counted], np.finfo(np.float64).tiny))
+
+
+def _run(model: AbstractModel, e: Experiment, *, closed: bool) -> NDArray[np.float64]:
+    """The free run over a record, or the prediction one step ahead."""
+    if closed:
+        return model.simulate(e.inputs, e.history)
+    return gaps.predicted(model, e.inputs, e.output, e.history, e.usable)

@@ -176,4 +176,5 @@ def _cut(record: Experiment, first: int, last: int) -> Experiment:
         weights=None if record.weights is None else record.weights[first:last],
         usable=None if record.usable is None else record.usable[first:last],
         past=record.past if begins else np.zeros(1, dtype=np.bool_),
+        each=None if record.each is None else record.each[first:last],
     )

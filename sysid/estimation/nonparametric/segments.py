@@ -51,7 +51,7 @@ def segments_of(traces: Sequence[Trace], mapping: Mapping, *, shortest: int = 1)
     for trace in traces:
         trace.check_sizes([*mapping.inputs, mapping.output])
         inputs, output = trace.columns(mapping.inputs), trace.columns([mapping.output])[:, 0]
-        usable = trace.usable_samples
+        usable = trace.usable_of(mapping.channels)
         if trace.weights is not None:
             usable = usable & (trace.weights > 0.0)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(np.int8), [0]])))

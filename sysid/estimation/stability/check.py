@@ -332,7 +332,11 @@ class FreeRunCheck(AbstractStabilityCheck):
 
 def _follows(model: AbstractModel, trace: Trace, start: Start) -> bool:
     """Whether the free run of a model leaves no more than :data:`FOLLOWS` of a record's output."""
-    inputs, output, usable = trace.columns(model.mapping.inputs), trace[model.mapping.output], trace.usable_samples
+    inputs, output, usable = (
+        trace.columns(model.mapping.inputs),
+        trace[model.mapping.output],
+        trace.usable_of(model.mapping.channels),
+    )
     begun = beginning(model, inputs, output, start, usable)
     run, counted = model.simulate(inputs[begun.first :], begun.history), usable[begun.first :]
     if not counted.any():

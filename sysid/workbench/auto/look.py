@@ -130,7 +130,7 @@ def at_ends(traces: Sequence[Trace], mapping: Mapping) -> dict[str, bool]:
     Returns:
         The verdicts, by name.
     """
-    parts = [(trace.columns(mapping.inputs), trace, trace.usable_samples) for trace in traces]
+    parts = [(trace.columns(mapping.inputs), trace, trace.usable_of(mapping.channels)) for trace in traces]
     return {
         name: found_ends([(u[usable], trace[name][usable]) for u, trace, usable in parts]) != (None, None)
         for name in mapping.outputs

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.models import Start, StartKind
@@ -199,11 +200,13 @@ def _masked(traces: Sequence[Trace], fold: int, start: Start) -> tuple[list[Trac
         n, first = len(trace), _first(len(trace), start)
         block = np.maximum(np.arange(n) - first, 0) * _blocks(trace, start) // max(n - first, 1)
         held, begins = block % FOLDS == fold, np.arange(n) < first
-        fitted.append(replace(trace, usable=trace.usable_samples & (~held | begins)))
-        chooses.append(
-            replace(trace, name=f"{trace.name}, held out {fold + 1}", usable=trace.usable_samples & (held | begins))
-        )
+        fitted.append(replace(trace, usable=_also(trace, ~held | begins)))
+        chooses.append(replace(trace, name=f"{trace.name}, held out {fold + 1}", usable=_also(trace, held | begins)))
     return fitted, chooses
+
+
+def _also(trace: Trace, counts: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return counts if trace.usable is None else (trace.usable.T & counts).T
 
 
 def _blocks(trace: Trace, start: Start) -> int:

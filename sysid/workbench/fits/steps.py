@@ -247,7 +247,7 @@ def output_sizes(data: Data, outputs: Sequence[str]) -> tuple[float, ...]:
     if len(outputs) == 1:
         return (1.0,)
     traces = data.selection or data.estimation
-    found = [np.concatenate([trace[name][trace.usable_samples] for trace in traces]).var() for name in outputs]
+    found = [np.concatenate([trace[name][trace.usable_of([name])] for trace in traces]).var() for name in outputs]
     return tuple(float(size) if size > 0.0 else 1.0 for size in found)
 
 

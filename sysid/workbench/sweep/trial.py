@@ -21,7 +21,7 @@ from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, part_of
 from sysid.estimation.tolerance import spans_of
-from sysid.models import AbstractModel, Start, beginning
+from sysid.models import AbstractModel, Start, beginning, gaps
 from sysid.models.store import structure_from_dict
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.resolution import parts_of
@@ -362,12 +362,13 @@ def _case(
     seconds, n_samples = 0.0, 0
     for model in models:
         inputs, target = trace.columns(model.mapping.inputs), model.measured(trace)
-        begun = beginning(model, inputs, target, start, trace.usable_samples, case=trace.name)
+        usable = trace.usable_of(model.mapping.channels)
+        begun = beginning(model, inputs, target, start, usable, case=trace.name)
         history, n = begun.history, begun.first
-        inputs, target, counted = inputs[n:], target[n:], trace.usable_samples[n:]
+        inputs, target, counted = inputs[n:], target[n:], usable[n:]
         runs = {"free_run_mse": model.simulate(inputs, history), "one_step_mse": np.full(target.shape, np.nan)}
         if model.recursion.predicts:
-            runs["one_step_mse"] = model.predict(inputs, target, history)
+            runs["one_step_mse"] = gaps.predicted(model, inputs, target, history, counted)
         size = np.array([sizes[output] for output in model.mapping.outputs])
         n_samples += int(np.count_nonzero(counted)) * len(size)
         for name, run in runs.items():

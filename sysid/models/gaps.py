@@ -1,0 +1,70 @@
+"""Samples of an output that are masked: what stands there is a filling, and nothing may depend on it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.models.base import AbstractModel
+from sysid.models.history import History
+
+MOST_ROUNDS, SETTLED = 500, 1e-9
+"""Predictions over a record, each of which finds a sample more of every gap; and the change, over the output's range,
+that is none."""
+
+Array = NDArray[np.float64]
+
+
+def bridged(output: Array, usable: NDArray[np.bool_]) -> Array:
+    """An output with straight lines over its masked samples.
+
+    Args:
+        output: Shape ``(n_samples,)`` or ``(n_samples, n_outputs)``.
+        usable: Which samples are not masked, shape ``(n_samples,)`` or as the output.
+
+    Returns:
+        The output; itself where nothing, or all of it, is masked.
+    """
+    if usable.all() or not usable.any():
+        return output
+    found = output.copy()
+    columns = found.reshape(len(found), -1)
+    masks = usable.reshape(len(found), -1)
+    for j in range(columns.shape[1]):
+        known = np.flatnonzero(masks[:, min(j, masks.shape[1] - 1)])
+        if 0 < len(known) < len(columns):
+            columns[:, j] = np.interp(np.arange(len(columns)), known, columns[known, j])
+    return found
+
+
+def predicted(
+    model: AbstractModel, inputs: Array, output: Array, history: History, usable: NDArray[np.bool_] | None
+) -> Array:
+    """One-step prediction over a record, in which masked samples are what the model itself predicts of them.
+
+    Behind a gap it thus knows what the model can know there, and is as many steps ahead as the gap is long.
+
+    Args:
+        model: One that predicts.
+        inputs: Shape ``(n_samples, n_inputs)``.
+        output: Measured output, shape ``(n_samples,)``, or ``(n_samples, n_outputs)``.
+        history: The samples before the first.
+        usable: Which samples are not masked, shape ``(n_samples,)`` or as the output; ``None`` for all.
+
+    Returns:
+        As the output.
+    """
+    if usable is None or usable.all() or not usable.any():
+        return model.predict(inputs, output, history)
+    known = bridged(output, usable)
+    gaps = np.broadcast_to(~usable.reshape(len(usable), -1), output.reshape(len(output), -1).shape).reshape(
+        output.shape
+    )
+    span = float(np.ptp(output[~gaps]))
+    for _ in range(MOST_ROUNDS):
+        ahead = model.predict(inputs, known, history)
+        change = float(np.abs(ahead[gaps] - known[gaps]).max())
+        if not np.isfinite(change) or change <= SETTLED * span:
+            break
+        known[gaps] = ahead[gaps]
+    return ahead
