@@ -301,7 +301,9 @@ def _needs(known: NDArray[np.float64], timing: Timing) -> tuple[float, dict[str,
         return 1.0, {"duplicates": "drop" if len(clean.duplicates) else None}
     rising = np.delete(known, clean.duplicates) if len(clean.duplicates) else known
     even = even_step(rising, clean if rising is known else survey(rising), tolerance=GridOptions().tolerance)
-    step = round_step(clean.step) if even is None else even
+    usual = float(np.mean(np.abs(np.diff(rising) - clean.median_step) <= 0.01 * clean.median_step))
+    # A stamp or two that are wrong say nothing of the others' distance.
+    step = even or round_step(clean.median_step if usual >= _EVEN_SHARE else clean.step)
     return step, {
         "backward": "sort" if len(timing.backward) else None,
         "duplicates": "drop" if len(clean.duplicates) else None,

@@ -12,7 +12,7 @@ from sysid.ingest.grid import grid_places
 
 _MOST_SLOTS = 1e18  # of one gap: a stamp that is nonsense shall not overflow
 _PIECE = 1 << 16
-_FEW = 0.05  # of the samples, that may be missing for stamps to be asked whether they are uneven instead
+_FEW = 0.25  # of the samples, that may be missing for stamps to be asked whether they are uneven instead
 _GAP_FACTOR = 1.5  # a step this many times the usual one means that a sample is missing
 
 

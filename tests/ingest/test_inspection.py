@@ -303,3 +303,12 @@ def test_a_column_that_says_the_rate_is_no_guess_and_no_channel(write: Write) ->
     assert (found.sample_time, found.time_guessed, [c.name for c in found.channels]) == (0.05, False, ["u", "y"])
     assert "sample time 0.05 s, from column fs" in found.problems
     assert "time: {step: 0.05}\n" in propose_dataset(found)
+
+
+def test_stamps_that_are_uneven_by_a_third_or_wrong_once_leave_the_sample_time(write: Write) -> None:
+    uneven = [0.1 * k + 0.03 * np.sin(3.0 * k) for k in range(60)]
+    found = inspect_file(write("a.csv", "t [s],u [V]\n" + rows(60, lambda k: f"{uneven[k]:.4f},{k % 7}")))
+    assert (found.sample_time, found.needed.gaps) == (0.1, None)
+    once = [0.1 * k - (0.25 if k == 20 else 0.0) for k in range(60)]
+    found = inspect_file(write("b.csv", "t [s],u [V]\n" + rows(60, lambda k: f"{once[k]:.2f},{k % 7}")))
+    assert (found.sample_time, found.needed.backward) == (0.1, "sort")

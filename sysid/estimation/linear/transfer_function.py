@@ -37,6 +37,11 @@ def _ignore(_: Iteration) -> None:
     """The callback of those who do not watch."""
 
 
+STANDS, NOISE, ROUNDING = 3, 1.5, 1e-6
+"""Samples that tell whether an output stands, and the most that it moves then: over what it does from sample to sample,
+and over its standard deviation."""
+
+
 def fit_transfer_function(
     traces: Sequence[Trace],
     mapping: Mapping,
@@ -76,7 +81,7 @@ def fit_transfer_function(
     began = now()
     start = start or Start()
     rest = first_output(traces, mapping) if rest_output is None else rest_output
-    whole = tuple(_bridged(experiment) for experiment in experiments_of(traces, mapping, start, rest))
+    whole = experiments_of(traces, mapping, start, rest)
     _check(orders, mapping, whole)
     determined = Determined.of(whole)
     experiments, own = tuple(determined.only(e) for e in whole), determined.narrowed(orders)
@@ -119,15 +124,19 @@ def _third(experiment: Experiment) -> int:
     return int(places[len(places) // 3])
 
 
-def _bridged(experiment: Experiment) -> Experiment:
-    """The record with straight lines under the mask, for filters that run through it; what is there does not count."""
-    usable = experiment.usable
-    if usable is None or not usable.any():
-        return experiment
-    known, places = np.flatnonzero(usable), np.arange(len(usable))
-    return replace(
-        experiment, output=np.where(usable, experiment.output, np.interp(places, known, experiment.output[known]))
-    )
+def _at_rest(experiment: Experiment) -> int:
+    """First samples of a record in which all inputs and the output stand: what came before it was no different.
+
+    A record of a step begins so, and the samples that a long dead time would leave out may be all that it tells.
+    """
+    moved = (experiment.inputs != experiment.inputs[0]).any(axis=1)
+    first = int(np.argmax(moved)) if moved.any() else 0
+    known = slice(0, first) if experiment.usable is None else np.flatnonzero(experiment.usable[:first])
+    y = experiment.output[known]
+    if len(y) < STANDS:
+        return 0
+    noise = float(np.std(np.diff(y))) / np.sqrt(2.0)
+    return first if float(np.std(y)) <= NOISE * noise + ROUNDING * float(np.std(experiment.output)) else 0
 
 
 def _mean_mse(model: AbstractModel, traces: Sequence[Trace], start: Start) -> float:
@@ -251,7 +260,7 @@ class _Problem(AbstractProblem):
             output = np.concatenate([experiment.history.output, output])
             weights = np.concatenate([experiment.past_weights, weights])
         scaled, held = self.scaling.scale_inputs(inputs), self.scaling.scale_inputs(past[np.newaxis])[0]
-        rows = slice(unknown if experiment.free else 0, None)
+        rows = slice(max(unknown - _at_rest(experiment), 0) if experiment.free else 0, None)
         return TimeRecord(
             inputs=np.asfortranarray(delayed_inputs(scaled, held, delays)[rows]),
             # From a state that is fitted any past can be reached, and zero is one that every system has.

@@ -287,7 +287,10 @@ class AbstractProblem(ABC):
         domain, sample_time, provider = self.orders.domain, self.terms.sample_time, free.provider(delays)
         edge = 1.0 - 1.0 / max(len(record.target) for record in provider.records)
         slowest = slowness(end.sections, domain, sample_time)
-        if max(slowest, slowness(free.free_starts(provider)[0].sections, domain, sample_time)) < edge:
+        # A search among stable poles may put a dead time in place of an integrator: the shortest is asked, too.
+        asked = {delays} if self.orders.delays is not None else {delays, (self.delay_range()[0],) * len(delays)}
+        suggested = [free.free_starts(free.provider(one))[0].sections for one in sorted(asked)]
+        if max(slowest, *(slowness(sections, domain, sample_time) for sections in suggested)) < edge:
             return self, end
         at_end = replace(end, notes=(*end.notes, AT_EDGE)) if slowest >= edge else end
         told: tuple[str, ...] = ()

@@ -206,3 +206,37 @@ def test_an_input_that_moves_between_samples_is_one_where_that_is_said(between) 
     assert not any("moves with" in note for note in fit.notes)
     told = "u1, u2 go straight" if between == "foh" else "u1 goes straight"
     assert any(told in note for note in fit.notes)
+
+
+@pytest.mark.parametrize("width", [1, 180], ids=["impulse", "step"])
+def test_a_record_that_begins_at_rest_tells_its_dead_time_by_a_single_response(width: int) -> None:
+    """Samples that a long dead time would leave out are all that it has."""
+    u = np.zeros((200, 1))
+    u[20 : 20 + width] = 1.0
+    y = signal.lfilter([0.0, 0.0, 0.0, 0.2], [1.0, -0.8], u[:, 0]) + 0.002 * np.random.default_rng(0).standard_normal(
+        200
+    )
+    fit = fit_transfer_function(
+        [trace_of(u, y, sample_time=T)],
+        ONE,
+        TransferFunction(poles=(1,), zeros=(0,)),
+        QUICK,
+        start=Start(kind=StartKind.ESTIMATED),
+    )
+    ratio = fit.model.ratios[(0, 0)]
+    assert ratio.delay == 3
+    np.testing.assert_allclose([ratio.B[0], -ratio.F[1]], [0.2, 0.8], atol=0.01)
+
+
+def test_a_double_integrator_is_no_long_dead_time() -> None:
+    u = np.repeat(np.random.default_rng(0).integers(0, 2, 61), 5)[:300, np.newaxis] * 2.0 - 1.0
+    y = signal.lfilter([0.0, 0.05, 0.05], [1.0, -2.0, 1.0], u[:, 0])
+    fit = fit_transfer_function(
+        [trace_of(u, y, sample_time=T)],
+        ONE,
+        TransferFunction(poles=(2,), zeros=(1,)),
+        QUICK,
+        start=Start(kind=StartKind.ESTIMATED),
+    )
+    np.testing.assert_allclose(fit.model.ratios[(0, 0)].F, [1.0, -2.0, 1.0], atol=1e-6)
+    assert "Dead times in samples: 1." in fit.notes
