@@ -444,8 +444,13 @@ class _Problem:
         """What makes the errors of one sample independent and of size 1."""
         p = system.n_outputs
         covariance = self.errors(self.linear(system), np.eye(p)).covariance(system)
-        floor = 1e-20 * max(float(np.trace(covariance)), 1e-20) * np.eye(p)
-        return np.asarray(linalg.inv(linalg.cholesky(covariance + floor, lower=True)))
+        size = max(float(np.trace(covariance)), 1e-20)
+        for share in (1e-20, 1e-15, 1e-12):  # outputs that are made of each other leave errors of fewer dimensions
+            try:
+                return np.asarray(linalg.inv(linalg.cholesky(covariance + share * size * np.eye(p), lower=True)))
+            except linalg.LinAlgError:
+                continue
+        return np.eye(p) / np.sqrt(size)
 
 
 def _size(covariance: Array) -> float:
