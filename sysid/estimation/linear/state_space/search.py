@@ -450,7 +450,7 @@ class _Problem:
                 return np.asarray(linalg.inv(linalg.cholesky(covariance + share * size * np.eye(p), lower=True)))
             except linalg.LinAlgError:
                 continue
-        return np.eye(p) / np.sqrt(size)
+        return np.asarray(np.eye(p) / np.sqrt(size), dtype=np.float64)
 
 
 def _size(covariance: Array) -> float:
