@@ -51,13 +51,18 @@ def _told(model: AbstractModel, trace: Trace, start: Start) -> str:
     if not 0 < first < longer:
         return ""
 
-    def left(samples: int) -> NDArray[np.float64]:
+    def run_from(samples: int) -> tuple[int, NDArray[np.float64]]:
         begun = beginning(model, inputs, target, replace(start, n_measured=samples), usable, case=trace.name)
-        run = model.simulate(inputs[begun.first :], begun.history)[longer - begun.first :]
-        return np.asarray(run.reshape(len(run), -1))
+        run = model.simulate(inputs[begun.first :], begun.history)
+        return begun.first, np.asarray(run.reshape(len(run), -1))
 
-    runs = [left(samples) for samples in (first, longer)]
-    counted, aims = usable[longer:], target.reshape(len(target), -1)[longer:]
+    # Where samples are masked, so many that count reach further than as many samples.
+    begun = [run_from(samples) for samples in (first, longer)]
+    last = max(at for at, _ in begun)
+    runs = [run[last - at :] for at, run in begun]
+    counted, aims = usable[last:], target.reshape(len(target), -1)[last:]
+    if not counted.any():
+        return ""
     for k, output in enumerate(model.mapping.outputs):
         errors = [(run[:, k] - aims[:, k])[counted] for run in runs]
         if not np.isfinite(errors).all() or not np.mean(errors[0] ** 2) > COSTS * np.mean(errors[1] ** 2):

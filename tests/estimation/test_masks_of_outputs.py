@@ -61,3 +61,12 @@ def test_a_mask_of_each_channel_is_kept_by_whatever_writes_a_trace(tmp_path: Pat
     changed.write_text(written[0].read_text().replace("fast", "quick"))
     assert np.array_equal(read_trace(changed).usable_of(["slow"]), trace.usable_of(["slow"]))
     assert read_trace(changed).usable_of(["quick"]).all()
+
+
+def test_an_output_at_every_tenth_sample_is_scored_behind_its_own_beginning() -> None:
+    """Samples that say how a run begins are counted among those that count, which reach ten times as far."""
+    columns = {"u": U, "slow": SPARSE}
+    parts = sysid.data(columns, inputs="u", outputs="slow", sample_time=0.1, repairs={"nan": "mask"}, split=(0.7, 0.3))
+    structure = sysid.TransferFunction(poles=(1,), zeros=(0,), delays=(1,))
+    fit = sysid.fit(parts, "u -> slow", structure)
+    assert "100.00" in str(sysid.compare(parts, fit))
