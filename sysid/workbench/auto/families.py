@@ -320,6 +320,13 @@ FAMILIES = (
         adds_up=_neural_sums,
     ),
     Family(
+        kind=WienerHammerstein.kind,
+        linear=False,
+        first=_two_blocks,
+        around=_around_two_blocks,
+        leads=_has_many_states,
+    ),
+    Family(
         kind=NARX.kind,
         linear=False,
         first=_narx,
@@ -328,13 +335,6 @@ FAMILIES = (
         at_ends=_narx_at_ends,
     ),
     Family(kind=VectorNARX.kind, linear=False, first=lambda _: [], at_ends=_vector_at_ends),
-    Family(
-        kind=WienerHammerstein.kind,
-        linear=False,
-        first=_two_blocks,
-        around=_around_two_blocks,
-        leads=_has_many_states,
-    ),
     Family(kind=HammersteinWiener.kind, linear=False, first=_blocks, around=_around_blocks),
     Family(kind=PolynomialNARX.kind, linear=False, first=_polynomials),
 )

@@ -89,22 +89,24 @@ def test_linear_structures_leave_time_for_networks() -> None:
     assert any(not linear(point) for point in tried)
 
 
-@pytest.mark.parametrize(("after", "some"), [(70.0, True), (90.0, False)])
-def test_a_slow_machine_tries_one_nonlinear_model_where_that_leaves_time_for_the_last_fit(
-    after: float, some: bool
+@pytest.mark.parametrize(("after", "workers", "some"), [(70.0, 1, 1), (70.0, 2, 2), (90.0, 2, 0)])
+def test_a_slow_machine_tries_a_nonlinear_model_a_worker_where_that_leaves_time_for_the_last_fit(
+    after: float, workers: int, some: int
 ) -> None:
     clock = [0.0]
-    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
+    budget = Budget(
+        wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False, side_by_side=workers
+    )
     plan = Plan(looked=LOOKED, budget=budget, error=error)
     plan.tell([trial(point, 1.0) for point in plan.ask()])
     clock[0] = after
-    assert [linear(point) for point in plan.ask()] == ([False] if some else [])
+    assert [linear(point) for point in plan.ask()] == [False] * some
 
 
 def test_curves_and_polynomials_are_tried_beside_networks() -> None:
     _, rounds = searched(lambda _: 1.0)
     # The least of each kind tells what the others of it cost.
-    kinds = ["NSS", "NARX", "WienerHammerstein", "HammersteinWiener", "PolynomialNARX"]
+    kinds = ["NSS", "WienerHammerstein", "NARX", "HammersteinWiener", "PolynomialNARX"]
     assert [point.structure.kind for point in rounds[2]] == kinds
     labels = [point.structure.label for one in rounds[2:UNASKED] for point in one]
     assert {"HW 2, piecewise 6 before", "HW 2, piecewise 6 behind"} <= set(labels)
