@@ -22,7 +22,7 @@ from sysid.models import (
     beginning,
 )
 from sysid.models.beginning import window
-from sysid.models.gaps import bridged
+from sysid.models.history import bridged
 from sysid.traces import Trace
 
 

@@ -6,35 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models.base import AbstractModel
-from sysid.models.history import History
+from sysid.models.history import History, bridged
 
 MOST_ROUNDS, SETTLED = 500, 1e-9
 """Predictions over a record, each of which finds a sample more of every gap; and the change, over the output's range,
 that is none."""
 
 Array = NDArray[np.float64]
-
-
-def bridged(output: Array, usable: NDArray[np.bool_]) -> Array:
-    """An output with straight lines over its masked samples.
-
-    Args:
-        output: Shape ``(n_samples,)`` or ``(n_samples, n_outputs)``.
-        usable: Which samples are not masked, shape ``(n_samples,)`` or as the output.
-
-    Returns:
-        The output; itself where nothing, or all of it, is masked.
-    """
-    if usable.all() or not usable.any():
-        return output
-    found = output.copy()
-    columns = found.reshape(len(found), -1)
-    masks = usable.reshape(len(found), -1)
-    for j in range(columns.shape[1]):
-        known = np.flatnonzero(masks[:, min(j, masks.shape[1] - 1)])
-        if 0 < len(known) < len(columns):
-            columns[:, j] = np.interp(np.arange(len(columns)), known, columns[known, j])
-    return found
 
 
 def predicted(

@@ -232,8 +232,31 @@ class Start:
                 got=f"{len(output)} samples",
                 remedy="use fewer measured samples, or a longer record",
             )
-        return History(inputs=inputs[: self.n_measured], output=output[: self.n_measured])
+        known = output if usable is None else bridged(output, usable)  # what stands under a mask is a filling
+        return History(inputs=inputs[: self.n_measured], output=known[: self.n_measured])
 
 
 StartLike = Start | str | Mapping[str, int]
 """What :meth:`Start.of` takes."""
+
+
+def bridged(output: NDArray[np.float64], usable: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """An output with straight lines over its masked samples.
+
+    Args:
+        output: Shape ``(n_samples,)`` or ``(n_samples, n_outputs)``.
+        usable: Which samples are not masked, shape ``(n_samples,)`` or as the output.
+
+    Returns:
+        The output; itself where nothing, or all of it, is masked.
+    """
+    if usable.all() or not usable.any():
+        return output
+    found = output.copy()
+    columns = found.reshape(len(found), -1)
+    masks = usable.reshape(len(found), -1)
+    for j in range(columns.shape[1]):
+        known = np.flatnonzero(masks[:, min(j, masks.shape[1] - 1)])
+        if 0 < len(known) < len(columns):
+            columns[:, j] = np.interp(np.arange(len(columns)), known, columns[known, j])
+    return found

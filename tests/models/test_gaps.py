@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sysid
-from sysid.models import Start
-from sysid.models.gaps import bridged
+from sysid.models import Start, StartKind
+from sysid.models.history import bridged
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.validation.evaluation import evaluate
 from sysid.validation.residuals import analyse_residuals
@@ -24,10 +24,10 @@ for _first, _last in ((90, 93), (150, 170), (300, 301)):
     GAPS[_first:_last] = True
 
 
-def _record(filling: float) -> TraceSet:
+def _record(filling: float, masked: np.ndarray = GAPS) -> TraceSet:
     channels = tuple(Channel(name=name, unit="1") for name in "uy")
-    values = np.column_stack([U, np.where(GAPS, filling, Y)])
-    trace = Trace(name="r", sample_time=0.1, channels=channels, values=values, usable=~GAPS)
+    values = np.column_stack([U, np.where(masked, filling, Y)])
+    trace = Trace(name="r", sample_time=0.1, channels=channels, values=values, usable=~masked)
     return TraceSet(name="s", traces=(trace,), roles={"r": Role.ESTIMATION})
 
 
@@ -68,3 +68,13 @@ def test_a_gap_is_bridged_by_a_line_in_each_column() -> None:
     usable = np.array([[True, True], [False, False], [True, False], [True, True]])
     assert bridged(output, usable).tolist() == [[0.0, 5.0], [1.0, 6.0], [2.0, 7.0], [3.0, 8.0]]
     assert bridged(output, np.zeros((4, 2), dtype=bool)) is output
+
+
+def test_nor_on_what_stands_in_a_gap_of_a_measured_beginning() -> None:
+    start, masked, found = Start(kind=StartKind.MEASURED, n_measured=5), np.arange(N) // 2 == 2, []
+    for filling in (0.0, 99.0):
+        record = _record(filling, masked)
+        fit = sysid.fit(record, "u -> y", sysid.ARX(na=1, nb=(1,), nk=(1,)), start=start)
+        case = evaluate(fit.model, record, start, repeats=0).cases["r"]
+        found.append([case.free_run.mse, case.one_step.mse])
+    assert_array_equal(found[0], found[1])
