@@ -14,6 +14,7 @@ from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
 from sysid.ingest import load_dataset, read_trace
 from sysid.ingest.in_python import remedies_of_a_file
+from sysid.ingest.readers.text_source import bare_stem
 from sysid.ingest.reading import is_file_of_traces
 from sysid.models import AbstractStructure, Mapping, Start, StartLike
 from sysid.traces import Role, TraceSet
@@ -43,7 +44,7 @@ def load(source: str | Path) -> TraceSet:
         return load_dataset(source)
     with remedies_of_a_file(path):
         trace = read_trace(path)
-    return TraceSet(name=trace.name, traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
+    return TraceSet(name=bare_stem(path), traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
 
 
 def fit(

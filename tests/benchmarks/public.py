@@ -59,7 +59,10 @@ ROWS: dict[str, dict[str, tuple[str, float, str]]] = {
     "emps": {"test": ("mm", 1e3, "best 2.64 (dynoNet), continuous SUBNET 4.61, linear 5.53; n = 20")},
 }
 """By pipeline and case: the unit, what it is of ours, and published figures."""
-DECLARED = {"-equations": ("by equations", "its equations"), "-by-hand": ("by hand", "an integrator, a gain")}
+DECLARED = {
+    "-equations": ("by equations", "its equations"),
+    "-by-hand": ("by hand", "an integrator that neurons see, inputs in proportion"),
+}
 """What the name of a pipeline ends with that declares something of its record: how it is named, and what that is."""
 
 
