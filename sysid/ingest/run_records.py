@@ -99,11 +99,14 @@ def record_of(values: Any, inputs: Sequence[Channel], outputs: Sequence[Channel]
         units={keys[one.name]: one.unit for one in there if parse_header(keys[one.name]).unit is None},
         repairs={"nan": "mask"},
     ).traces[0]
+    mask = measured.usable
+    if mask is not None and mask.ndim == 2:
+        mask = np.column_stack([np.ones(found.shape, dtype=np.bool_), mask])
     return Trace(
         name="record",
         sample_time=sample_time,
         start_time=measured.start_time,
         channels=(*inputs, *measured.channels),
         values=np.column_stack([found, measured.values]),
-        usable=measured.usable,
+        usable=mask,
     )
