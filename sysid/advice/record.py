@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from sysid.advice.integrators import SAMPLES, integrates
 from sysid.errors import UserError
 from sysid.estimation.nonparametric.feedback import Feedback, find_feedback
-from sysid.estimation.nonparametric.impulse import estimate_impulse_response
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
+from sysid.estimation.nonparametric.remembered import remembered_response
 from sysid.estimation.nonparametric.response import FrequencyResponse, estimate_frequency_response
 from sysid.estimation.nonparametric.segments import Segment, segments_of
 from sysid.models import Mapping
@@ -94,7 +94,7 @@ class Record:
             return self.some.impulse
         longest = min(LONGEST_RESPONSE, max(LEAST_LAGS, LAGS_IN_ALL // len(self.moving)))
         try:
-            return estimate_impulse_response(self.traces, self.mapping, longest=longest)
+            return remembered_response(self.traces, self.mapping, longest=longest)
         except UserError as error:
             return error.what
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import UserError
 from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.nonparametric.impulse import estimate_impulse_response
+from sysid.estimation.nonparametric.remembered import remembered_response
 from sysid.models import AbstractModel, Mapping
 from sysid.traces import Trace
 
@@ -136,7 +136,7 @@ def _may_drift(run: FreeRun, i: int, spread: float, *, slow: bool) -> bool:
 def _drifts(traces: Sequence[Trace], mapping: Mapping, spread: float) -> list[float]:
     """How far each record that drifts does, beside a response to its inputs that has settled."""
     try:
-        response = estimate_impulse_response(traces, mapping, longest=LAGS)
+        response = remembered_response(traces, mapping, longest=LAGS)
     except UserError:
         return []
     if not response.settled:

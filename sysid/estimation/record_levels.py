@@ -8,7 +8,7 @@ import numpy as np
 
 from sysid.errors import UserError
 from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.nonparametric.impulse import estimate_impulse_response
+from sysid.estimation.nonparametric.remembered import remembered_response
 from sysid.models import AbstractModel
 from sysid.traces import Trace
 
@@ -44,7 +44,7 @@ def levels_told(model: AbstractModel, traces: Sequence[Trace], runs: Sequence[Fr
         if not error > WORTH * spread:
             continue
         try:
-            response = estimate_impulse_response(traces, mapping, longest=LAGS)
+            response = remembered_response(traces, mapping, longest=LAGS)
         except UserError:
             continue
         if response.explained < EXPLAINED or not response.settled:

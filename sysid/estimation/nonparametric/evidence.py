@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
+from scipy.linalg.blas import dtrmm
 
 CHUNK = 2048
 """Rows that are taken into the factor at a time: memory does not grow with the record."""
@@ -59,6 +60,8 @@ class Triangle:
         Returns:
             The regression.
         """
+        if kept.all():
+            return self
         some = Triangle(R=self.R[:, kept], z=self.z, samples=self.samples)
         both, target, size = self.gram
         some.__dict__["gram"] = (both[np.ix_(kept, kept)], target[kept], size)
@@ -135,7 +138,8 @@ def factored(data: Triangle, L: NDArray[np.float64]) -> Factored:
 
     Args:
         data: The regression.
-        L: Factor of the prior's covariance in units of the noise variance, shape ``(n_columns, n_columns)``.
+        L: Lower triangular factor of the prior's covariance in units of the noise variance, shape
+            ``(n_columns, n_columns)``.
 
     Returns:
         The factor.
@@ -155,7 +159,7 @@ def factored(data: Triangle, L: NDArray[np.float64]) -> Factored:
 def _from_products(data: Triangle, L: NDArray[np.float64]) -> Factored | None:
     """The same from products, at a third of the price; ``None`` where rounding would show in them."""
     both, target, size = data.gram
-    M = L.T @ both @ L
+    M = dtrmm(1.0, L.T, from_the_left(L, both), side=1, lower=0, trans_a=1, overwrite_b=1)
     if not np.diag(M).max(initial=0.0) < WELL_SCALED:
         return None
     M[np.diag_indices_from(M)] += 1.0
@@ -163,6 +167,11 @@ def _from_products(data: Triangle, L: NDArray[np.float64]) -> Factored | None:
     z = linalg.solve_triangular(R, L.T @ target, trans="T", check_finite=False)
     rest = size - float(z @ z)
     return Factored(R=R, z=z, rest=rest, samples=data.samples) if rest > LEFT * size else None
+
+
+def from_the_left(L: NDArray[np.float64], both: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The product ``L.T @ both``, at half the price since ``L`` is lower triangular."""
+    return np.asarray(dtrmm(1.0, L.T, both, side=0, lower=0))
 
 
 def posterior(data: Triangle, L: NDArray[np.float64]) -> Posterior:

@@ -64,10 +64,12 @@ class Hyperparameters:
             True
         """
         k = np.arange(n)
-        # rho ** (i - j), lower triangle; the exponent of the upper one would overflow.
-        powers = np.tril(self.correlation ** np.maximum(k[:, None] - k[None, :], 0).astype(np.float64))
-        powers[:, 1:] *= np.sqrt(max(1.0 - self.correlation**2, 0.0))
-        return np.asarray(np.sqrt(self.scale) * self.decay ** (0.5 * k)[:, None] * powers)
+        # rho ** (i - j) in the lower triangle: every row is a stretch of the same powers, after nothing.
+        powers = np.append(self.correlation ** k[::-1].astype(np.float64), np.zeros(n))
+        rows = np.lib.stride_tricks.sliding_window_view(powers, n)[n - 1 :: -1] if n else np.zeros((0, 0))
+        L = np.sqrt(self.scale) * self.decay ** (0.5 * k)[:, None] * rows
+        L[:, 1:] *= np.sqrt(max(1.0 - self.correlation**2, 0.0))
+        return np.asarray(L)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON values."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.estimation.nonparametric.evidence import Posterior, Triangle, factored, posterior
+from sysid.estimation.nonparametric.evidence import Posterior, Triangle, factored, from_the_left, posterior
 from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
 
 SCALES = (0.0, 4.0, 8.0)
@@ -71,7 +71,11 @@ class Prior:
     def factor(self) -> NDArray[np.float64]:
         """The Cholesky factor of the covariance of the lags that are kept."""
         parts = [h.factor(self.length - int(k)) for h, k in zip(self.hyperparameters, self.dead, strict=True)]
-        return np.asarray(linalg.block_diag(*parts))
+        ends = np.cumsum([0, *map(len, parts)])
+        L = np.zeros((ends[-1], ends[-1]))
+        for part, a, b in zip(parts, ends[:-1], ends[1:], strict=True):
+            L[a:b, a:b] = part
+        return L
 
 
 def tuned(
@@ -290,7 +294,7 @@ class _Search:
         mean = L @ linalg.solve_triangular(whole.R, whole.z, check_finite=False)
         w = data.R.T @ (data.z - data.R @ mean)
         both = data.gram[0]
-        half = linalg.solve_triangular(whole.R, L.T @ both, trans="T", check_finite=False)
+        half = linalg.solve_triangular(whole.R, from_the_left(L, both), trans="T", check_finite=False)
         S = both - half.T @ half
         G = 0.5 * (S - np.outer(w, w) * (data.samples / whole.rest))
         return -whole.log_evidence, self._gradient(prior, L, G)
