@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Annotated, Any
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Self
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.curves import NONE, Curve
@@ -49,6 +50,11 @@ class BlockStructure(AbstractStructure):
     delays: int | tuple[int, ...]
 
     learns_curves = True
+
+    @property
+    @abstractmethod
+    def smaller(self) -> Self | None:
+        """The structure with one state less in its largest blocks, which it contains; ``None`` where there is none."""
 
     def lags(self, n_inputs: int) -> tuple[int, ...]:
         """The dead time of each input, in samples."""
@@ -117,6 +123,11 @@ class HammersteinWiener(BlockStructure):
     def curves(self, n_inputs: int) -> tuple[Curve, ...]:
         """The curve of each input."""
         return self.input * n_inputs if len(self.input) == 1 else self.input  # type: ignore[no-any-return]
+
+    @property
+    def smaller(self) -> HammersteinWiener | None:
+        """With one state less."""
+        return replace(self, states=self.states - 1) if self.states > 1 else None
 
     def check_mapping(self, mapping: Mapping) -> None:
         """Refuse curves that are not one for each input."""
@@ -194,6 +205,13 @@ class WienerHammerstein(BlockStructure):
             )  # fmt: skip
         object.__setattr__(self, "curve", curve)
         object.__setattr__(self, "delays", _delays(self.delays))
+
+    @property
+    def smaller(self) -> WienerHammerstein | None:
+        """With one state less in the larger block, in both of two that are as large."""
+        most = max(self.first, self.second)
+        first, second = (n - (n == most) for n in (self.first, self.second))
+        return replace(self, first=first, second=second) if most > 1 else None
 
     @property
     def label(self) -> str:

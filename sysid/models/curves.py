@@ -25,6 +25,8 @@ STEEP = 0.02
 """Part of its largest bend that the slope of a curve has to be, if it is to begin as that of some values."""
 SMALL = 1e-3
 """Part of others below which a start is 0."""
+RIDGE = 1e-2
+"""Weight of a neuron's share in where a network begins, over that of a sample's error."""
 WIDTH, SHARPEST = 0.1, 0.003
 """How wide a rounded breakpoint starts and how sharp it may get, as shares of the range of what the curve sees."""
 REACH = 0.9
@@ -112,8 +114,8 @@ class Curve:
             y: Shape ``(n,)``.
 
         Returns:
-            The scale, and where parameters begin, by the ends of their names; ``None`` for a curve that is not linear
-            in what it learns, or that has no slope where it is straight.
+            The scale, and where parameters begin, by the ends of their names (a network's weights are given by
+            :meth:`weights`); ``None`` for a curve with limits, or that has no slope where it is straight.
         """
         if self.kind == "polynomial":
             bends = [x**n for n in range(2, self.size + 1)]
@@ -121,15 +123,37 @@ class Curve:
             bends = [np.maximum(x - place, 0.0) for place in _places(self.size)]
         elif self.kind == "rounded":
             bends = [WIDTH * np.logaddexp(0.0, (x - place) / WIDTH) for place in _places(self.size)]
+        elif self.kind == "network":
+            bends = []
         else:
             return None
         scale, *weights = np.linalg.lstsq(np.column_stack([x, *bends, np.ones(len(x))]), y, rcond=None)[0][:-1]
-        steepest = float(np.abs(weights).max(initial=abs(scale)))
+        steepest = float(np.abs(weights).max(initial=y.std() / x.std() if self.kind == "network" else abs(scale)))
         if not STEEP * steepest < abs(scale):
             return None
         word, first = ("c", 2) if self.kind == "polynomial" else ("slope", 1)
         found = {f"{word}{n}": sizeable(one / scale, 1.0) for n, one in enumerate(weights, start=first)}
         return float(scale), found
+
+    def weights(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weights of a network that comes close to some values with the identity beside it.
+
+        Args:
+            x: As for :meth:`like`.
+            y: Likewise, with a slope of 1 on the whole.
+
+        Returns:
+            As ``net`` has them, of what ranges from -1 to 1; empty for other curves.
+        """
+        if self.kind != "network":
+            return np.zeros(0)
+        k = self.size
+        slopes, biases = np.full(k, 0.7 * k), 0.7 * k * np.linspace(-1.0, 1.0, k) if k > 1 else np.zeros(1)
+        columns = np.column_stack([np.tanh(np.outer(x, slopes) + biases), x, np.ones(len(x))])
+        # Held small: neurons that are alike would take large parts of each other away.
+        held = RIDGE * len(x) ** 0.5 * np.eye(k + 2)[:k]
+        found = np.linalg.lstsq(np.concatenate([columns, held]), np.concatenate([y - x, np.zeros(k)]), rcond=None)[0]
+        return np.concatenate([np.column_stack([slopes, biases]).ravel(), found[:-1], [0.0]])
 
     def to_value(self) -> Any:
         """As it is written."""

@@ -15,7 +15,7 @@ from sysid.errors import ConfigError, did_you_mean, shortened
 from sysid.models.case_values import case_of, cases_among, cases_of, unknown_case
 from sysid.models.declared import CASE, InitialState, Parameter, entries, parameters_from, real
 from sysid.models.history import Start, StartKind
-from sysid.models.intersample import HELD, InterSample, intersample_of, moving, to_fields
+from sysid.models.intersample import HELD, InterSample, intersample_of, marked, moving, to_fields
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.structure import AbstractStructure
@@ -184,9 +184,10 @@ class GreyBox(AbstractStructure):
 
     @property
     def label(self) -> str:
-        """States and estimated parameters, and the weights of networks, as ``GreyBox 2/5+41``."""
+        """States and estimated parameters, weights of networks, and ``foh``: ``GreyBox 2/5+41 foh``."""
         weights = lowered(self, self.system.others, (), None).n_weights
-        return f"{self.kind} {len(self.system.states)}/{len(self.free)}{f'+{weights}' if weights else ''}"
+        size = f"{len(self.system.states)}/{len(self.free)}{f'+{weights}' if weights else ''}"
+        return f"{self.kind} {size}{marked(self.intersample)}"
 
     def for_outputs(self, n_outputs: int) -> GreyBox:
         """The same equations of several outputs, where there are several: they share states and parameters."""

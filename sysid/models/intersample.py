@@ -36,6 +36,11 @@ def intersample_of(given: Any) -> InterSample:
     return tuple((str(name), _one(one)) for name, one in pairs)
 
 
+def marked(given: InterSample) -> str:
+    """What labels say of it: nothing of inputs that are held."""
+    return f" {MOVING}" if given == MOVING or (not isinstance(given, str) and MOVING in dict(given).values()) else ""
+
+
 def moving(given: InterSample, inputs: Sequence[str]) -> tuple[bool, ...]:
     """By input, whether it goes straight to its next sample.
 

@@ -117,6 +117,11 @@ class Sizes:
         kept += [places[part].reshape(-1, self.row)[:, unread].ravel() for part in (self.hidden, self.output_hidden)]
         return np.concatenate([*kept, V[self.unfed].ravel()])
 
+    @property
+    def free(self) -> int:
+        """Number of parameters without those that are held."""
+        return self.count - len(self.held)
+
     def hold(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Parameters of which those that are held have their values: 1 of a sum by itself, else 0.
 

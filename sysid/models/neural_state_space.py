@@ -204,13 +204,13 @@ class _NeuralModel(AbstractModel):
 
     @property
     def n_parameters(self) -> int:
-        """Length of ``theta``."""
-        return len(self.theta)
+        """Those that are fitted: what integrators hold is not among them."""
+        return self.n_together * len(self.shares)
 
     @property
     def n_together(self) -> int:
         """Parameters of one member."""
-        return len(self.theta) // len(self.shares)
+        return self.network.sizes(len(self.mapping.inputs), len(self.mapping.outputs)).free
 
     @property
     def label(self) -> str:

@@ -16,7 +16,7 @@ from sysid.errors import ConfigError, shortened
 from sysid.models import orthonormal_basis as bases
 from sysid.models.continuous import ContinuousStateSpace
 from sysid.models.history import History
-from sysid.models.intersample import HELD, InterSample, intersample_of, moving, to_fields
+from sysid.models.intersample import HELD, InterSample, intersample_of, marked, moving, to_fields
 from sysid.models.lags import MOST, per_input, whole
 from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
@@ -102,7 +102,7 @@ class TransferFunction(AbstractStructure):
     def label(self) -> str:
         """Poles, zeros and dead times; ``?`` where they are to be searched."""
         rows = [self.poles, self.zeros, ("?",) if self.delays is None else self.delays]
-        prefix = "TF" if self.domain is Domain.DISCRETE else "continuous TF" + " foh" * (self.intersample != HELD)
+        prefix = "TF" if self.domain is Domain.DISCRETE else f"continuous TF{marked(self.intersample)}"  # type: ignore[arg-type]  # brought into this form
         return f"{prefix} [{'; '.join(' '.join(map(str, row)) for row in rows)}]"
 
     def moving(self, inputs: Sequence[str]) -> tuple[bool, ...]:

@@ -1,10 +1,11 @@
 """Block-oriented models: of how many simulated systems whose blocks and curve are drawn the fit finds the system.
 
-    python -m tests.benchmarks blocks [--seeds=20] [--only=Wiener]
+    python -m tests.benchmarks blocks [--seeds=20] [--only=Wiener] [--more=1]
 
 Blocks of two poles (radius up to 0.95) and curves as below, over 800 samples of steps with 1 % of white noise.
 A system is found where the free run over another record is off by less than 1 % of the spread of its true output.
-Plain fits, nothing declared but the structure: default starts and iterations.
+Plain fits, nothing declared but the structure: default starts and iterations. With --more the structure has so many
+states more in each block than the system.
 """
 
 from __future__ import annotations
@@ -32,10 +33,10 @@ CURVES: dict[str, tuple[Curve, str]] = {
     "a cubic without slope": (lambda z: np.asarray(z**3), "polynomial 3"),
     "a saturation": (lambda z: np.asarray(np.clip(z, -0.4, 0.5)), "saturation"),
 }
-KINDS: dict[str, Callable[[str], AbstractStructure]] = {
-    "Hammerstein": lambda curve: HammersteinWiener(states=2, input=curve),
-    "Wiener": lambda curve: HammersteinWiener(states=2, output=curve),
-    "Wiener-Hammerstein": lambda curve: WienerHammerstein(first=2, second=2, curve=curve),
+KINDS: dict[str, Callable[[str, int], AbstractStructure]] = {
+    "Hammerstein": lambda curve, more: HammersteinWiener(states=2 + more, input=curve),
+    "Wiener": lambda curve, more: HammersteinWiener(states=2 + more, output=curve),
+    "Wiener-Hammerstein": lambda curve, more: WienerHammerstein(first=2 + more, second=2 + more, curve=curve),
 }
 
 
@@ -77,17 +78,17 @@ def error(kind: str, curve: Curve, structure: AbstractStructure, seed: int) -> f
 def main() -> None:
     """Measure."""
     given = dict(option.removeprefix("--").split("=") for option in sys.argv[1:] if option.startswith("--"))
-    seeds = int(given.get("seeds", 20))
+    seeds, more = int(given.get("seeds", 20)), int(given.get("more", 0))
     for kind, structure in KINDS.items():
         for name, (curve, written) in CURVES.items():
             if given.get("only", kind) != kind or (kind == "Wiener-Hammerstein" and name not in BETWEEN):
                 continue
             began = time.process_time()
-            errors = np.array([error(kind, curve, structure(written), seed) for seed in range(seeds)])
+            errors = np.array([error(kind, curve, structure(written, more), seed) for seed in range(seeds)])
             missed = ", ".join(f"seed {i}: {100.0 * errors[i]:.1f} %" for i in np.flatnonzero(errors >= FOUND))
             seconds = (time.process_time() - began) / seeds
             note = f"median error {100.0 * np.median(errors):.2f} %, {seconds:.1f} s of processor time each; {missed}"
-            title = f"{kind} with {name}: found of {seeds}"
+            title = f"{kind} with {name}{f', {more} states more in each block' * (more > 0)}: found of {seeds}"
             count = float(np.count_nonzero(errors < FOUND))
             found(title, count, target=float(seeds), at_least=True, note=note.rstrip("; "))
 

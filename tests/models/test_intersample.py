@@ -78,3 +78,13 @@ def test_a_system_is_sampled_with_its_input_straight_from_sample_to_sample() -> 
         x = sampled.A @ x + sampled.B * value
     expected = lsim((system.A, system.B[:, None], system.C, system.D[:, None]), u, t, interp=True)[1]
     np.testing.assert_allclose(np.array(found), expected, atol=1e-12)
+
+
+def test_labels_say_that_inputs_move() -> None:
+    moving, held, one = (
+        [TransferFunction(poles=(1, 1), zeros=(0, 0), domain=Domain.CONTINUOUS, intersample=given).label,
+         GreyBox(equations=RATE, intersample=given).label]
+        for given in ("foh", "zoh", {"v": "foh"})
+    )  # fmt: skip
+    assert all(" foh" in label for label in (*moving, *one))
+    assert not any("foh" in label for label in held)

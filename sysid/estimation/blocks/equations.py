@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.estimation.blocks.linear_start import LinearStart
 from sysid.estimation.blocks.sections import Block, Pair
@@ -47,15 +48,26 @@ def hammerstein_wiener(
 
 def wiener_hammerstein(
     structure: WienerHammerstein, mapping: Mapping, begun: LinearStart, pair: Pair
-) -> tuple[GreyBox, frozenset[str]]:
-    """The equations of a Wiener-Hammerstein model; see :func:`hammerstein_wiener`.
+) -> tuple[GreyBox, NDArray[np.float64]]:
+    """The equations of a Wiener-Hammerstein model, and where the weights of a network begin that is its curve.
 
     How large what lies between is no record can say. The largest gain of the first block has a prior that does.
+
+    Args:
+        structure: The structure.
+        mapping: Which channels go in, which comes out.
+        begun: The linear model.
+        pair: The blocks, and the curve between them.
+
+    Returns:
+        The grey box, and the weights; none for other curves.
     """
     text = Text(taken=frozenset((*mapping.inputs, *mapping.outputs)))
     n = len(mapping.inputs)
     inputs = _inputs(text, (Curve(kind=NONE),) * n, mapping, begun, structure.lags(n))
-    scale, bends = structure.curve.like(pair.x, pair.y) or (1.0, None)
+    like = structure.curve.like(pair.x, pair.y)
+    scale, bends = like or (1.0, None)
+    weights = structure.curve.weights(pair.x, pair.y / scale) if like else np.zeros(0)
     behind = replace(pair.behind, gains=scale * pair.behind.gains, direct=scale * pair.behind.direct)
     drift = 0.0 if begun.integrates else None
     between = text.define("between", write_block(text, pair.before, inputs, "g1", known=True, fed=drift))
@@ -72,7 +84,7 @@ def wiener_hammerstein(
     scaling = begun.scaling
     right = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}*({linear} + {level})"
     text.lines.append(f"{quoted(mapping.output)} = {right}")
-    return _grey(text), frozenset(text.curved)
+    return _grey(text), weights
 
 
 def _between(

@@ -1,23 +1,33 @@
-"""Block-oriented models of traces: equations from the best linear model, fitted as any grey box."""
+"""Block-oriented models of traces: equations from the best linear model, fitted as any grey box.
+
+What a structure with fewer states has found is one of its starts (:mod:`sysid.estimation.blocks.grown`): states that a
+record does not need make poles of the linear model that belong to no block, and every start from these may end worse
+than the smaller structure does.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import TraceError
 from sysid.estimation.blocks.equations import hammerstein_wiener, wiener_hammerstein
+from sysid.estimation.blocks.grown import grown
 from sysid.estimation.blocks.linear_start import LinearStart, integrating_start, linear_start, parted, shifted, whole
 from sysid.estimation.clock import now
-from sysid.estimation.grey_box.fit import built_template, fit_equations
+from sysid.estimation.experiment import Experiment
+from sysid.estimation.grey_box.fit import built_template, fit_equations, raced_equations
+from sysid.estimation.grey_box.layout import Begun
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.result import FitResult
 from sysid.models import BuiltModel, GreyBox, HammersteinWiener, Mapping, Start, WienerHammerstein
 from sysid.models.block_oriented import BlockStructure
+from sysid.models.curves import Text
 from sysid.traces import Trace
 
 STARTS = 4
@@ -25,6 +35,17 @@ STARTS = 4
 
 LINEAR = 0.2
 """Share of a fit's time that each of its linear models may take."""
+
+SMALLER = 0.3
+"""Share of a fit's iterations and time for the structure with fewer states, and that of its starts' half."""
+
+SLOWER = 2.0
+"""How much slower than the slowest of the linear model the slowest pole is that is added."""
+
+Array = NDArray[np.float64]
+
+UNSCALED = (0.0, 1.0, 1.0)
+"""Norms of the network of a curve whose argument ranges from -1 to 1."""
 
 check_training = partial(check_hidden_states, "a block-oriented model")
 """Refuses options that do not apply to hidden states."""
@@ -63,30 +84,8 @@ def fit_hammerstein_wiener(
         ConfigError: If an option does not apply.
         TraceError: If no sample counts, or there is no linear model to start from.
     """
-    began, training = now(), (training or Training()).with_starts(STARTS)
-    rectified = structure.output.kind == "absolute"
-    begun = _begun(
-        traces, mapping, structure, structure.states, start=start, rest_output=rest_output, rectified=rectified,
-        seconds=LINEAR * training.max_time_s,
-    )  # fmt: skip
-    lags, ways = structure.lags(len(mapping.inputs)), [begun]
-    if begun.integrates and not rectified:
-        late = shifted(traces, mapping, lags)
-        stepping = integrating_start(
-            late, mapping, structure.states, start=start or Start(), scaling=begun.scaling,
-            seconds=LINEAR * training.max_time_s,
-        )  # fmt: skip
-        ways.insert(0, stepping)
-    direct = [lag == 0 for lag in lags]
-    (grey, curved), *others = [hammerstein_wiener(structure, mapping, one, whole(one, direct=direct)) for one in ways]
-    template, experiments = built_template(
-        traces, mapping, grey, built_of=structure, start=start or Start(), rest_output=rest_output
-    )
-    found = fit_equations(
-        template, experiments, training, (traces, selection, start or Start()),
-        others=_starts_of([one for one, _ in others]), scattered=curved, began=began, vet=vet, on_progress=on_progress,
-    )  # fmt: skip
-    return with_equations(found)
+    records = _Records(traces=traces, mapping=mapping, start=start or Start(), rest_output=rest_output)
+    return _fitted(records, structure, training, selection=selection, vet=vet, on_progress=on_progress)
 
 
 def fit_wiener_hammerstein(
@@ -105,35 +104,214 @@ def fit_wiener_hammerstein(
 
     The starts are ways to part the best linear model around the curve, the most promising first.
     """
-    began = now()
-    training = (training or Training()).with_starts(STARTS)
-    begun = _begun(
-        traces, mapping, structure, structure.first + structure.second, start=start, rest_output=rest_output,
-        seconds=LINEAR * training.max_time_s,
-    )  # fmt: skip
+    records = _Records(traces=traces, mapping=mapping, start=start or Start(), rest_output=rest_output)
+    return _fitted(records, structure, training, selection=selection, vet=vet, on_progress=on_progress)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Records:
+    """The records, and how they are looked at."""
+
+    traces: Sequence[Trace]
+    mapping: Mapping
+    start: Start
+    rest_output: float | None
+
+    def linear(self, structure: BlockStructure, states: int, *, seconds: float, rectified: bool = False) -> LinearStart:
+        """The best linear model."""
+        return linear_start(
+            self.late(structure), self.mapping, states, start=self.start, rest_output=self.rest_output,
+            output="absolute" if rectified else "plain", seconds=seconds,
+        )  # fmt: skip
+
+    def late(self, structure: BlockStructure) -> list[Trace]:
+        """The records without dead times."""
+        return shifted(self.traces, self.mapping, structure.lags(len(self.mapping.inputs)))
+
+    def template(self, structure: BlockStructure, grey: GreyBox) -> tuple[BuiltModel, tuple[Experiment, ...]]:
+        """The model before its fit, and the records as they are fitted."""
+        return built_template(
+            self.traces, self.mapping, grey, built_of=structure, start=self.start, rest_output=self.rest_output
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Ways:
+    """Where fits of a structure begin.
+
+    Args:
+        greys: The same equations, whose parameters begin otherwise; the most promising first.
+        weights: Of their networks; empty for networks that do nothing.
+        scattered: Names of the parameters around which further starts are drawn.
+        slowest: The longest time constant of the linear model, in samples.
+    """
+
+    greys: Sequence[GreyBox]
+    weights: Sequence[Array]
+    scattered: frozenset[str]
+    slowest: float
+
+    @property
+    def names(self) -> list[str]:
+        """Of the parameters."""
+        return [one.name for one in self.greys[0].free]
+
+    @property
+    def begins(self) -> list[Begun]:
+        """The same as starts."""
+        return [
+            Begun(parameters=np.array([one.start for one in grey.free]), weights=weights, norms=UNSCALED)
+            for grey, weights in zip(self.greys, self.weights, strict=True)
+        ]
+
+
+def _hammerstein_wiener_ways(
+    records: _Records, structure: HammersteinWiener, training: Training, settles: bool
+) -> _Ways:
+    seconds, mapping = LINEAR * training.max_time_s, records.mapping
+    rectified = structure.output.kind == "absolute"
+    begun = records.linear(structure, structure.states, seconds=seconds, rectified=rectified)
+    begun = replace(begun, settles=settles)
+    ways = [begun]
+    if begun.integrates and not rectified:
+        stepping = integrating_start(
+            records.late(structure), mapping, structure.states, start=records.start, scaling=begun.scaling,
+            seconds=seconds,
+        )  # fmt: skip
+        ways.insert(0, stepping)
     direct = [lag == 0 for lag in structure.lags(len(mapping.inputs))]
-    longest = max(shifted(traces, mapping, structure.lags(len(mapping.inputs))), key=len)
+    greys = [hammerstein_wiener(structure, mapping, one, whole(one, direct=direct)) for one in ways]
+    return _Ways(
+        greys=[grey for grey, _ in greys], weights=[np.zeros(0)] * len(greys), scattered=greys[0][1],
+        slowest=begun.slowest,
+    )  # fmt: skip
+
+
+def _wiener_hammerstein_ways(
+    records: _Records, structure: WienerHammerstein, training: Training, settles: bool
+) -> _Ways:
+    seconds, mapping = LINEAR * training.max_time_s, records.mapping
+    begun = replace(records.linear(structure, structure.first + structure.second, seconds=seconds), settles=settles)
+    direct = [lag == 0 for lag in structure.lags(len(mapping.inputs))]
+    longest = max(records.late(structure), key=len)
     signals = (
         begun.scaling.scale_inputs(longest.columns(mapping.inputs)),
         begun.scaling.scale_output(longest[mapping.output]),
     )
     rng = np.random.default_rng(training.seed)
-    seconds = LINEAR * training.max_time_s
-    ways = parted(begun, structure.first, signals, direct=direct, rng=rng, seconds=seconds)[: training.n_starts]
-    greys = [wiener_hammerstein(structure, mapping, begun, pair)[0] for pair in ways]
-    template, experiments = built_template(
-        traces, mapping, greys[0], built_of=structure, start=start or Start(), rest_output=rest_output
-    )
+    pairs = parted(begun, structure.first, signals, direct=direct, rng=rng, seconds=seconds)[: training.n_starts]
+    found = [wiener_hammerstein(structure, mapping, begun, pair) for pair in pairs]
+    return _Ways(
+        greys=[grey for grey, _ in found], weights=[weights for _, weights in found], scattered=frozenset(),
+        slowest=begun.slowest,
+    )  # fmt: skip
+
+
+def _ways(records: _Records, structure: BlockStructure, training: Training, *, settles: bool = False) -> _Ways:
+    if isinstance(structure, WienerHammerstein):
+        return _wiener_hammerstein_ways(records, structure, training, settles)
+    assert isinstance(structure, HammersteinWiener)  # noqa: S101 - there is no third
+    return _hammerstein_wiener_ways(records, structure, training, settles)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Race:
+    """A structure as it is trained: its model before the fit with the records, its training, and its starts."""
+
+    template: tuple[BuiltModel, tuple[Experiment, ...]]
+    training: Training
+    data: tuple[Sequence[Trace], Sequence[Trace], Start]
+    begins: Sequence[Begun]
+    scattered: frozenset[str]
+    began: float
+
+    @classmethod
+    def of(cls, records: _Records, structure: BlockStructure, training: Training, *, began: float) -> _Race:
+        """The race of a structure, after that of what it contains."""
+        ways = _ways(records, structure, training)
+        own = cls.between(records, structure, training, ways, began=began)
+        smaller, cheaper = structure.smaller, _cheaper(training)
+        if smaller is None or now() - began >= training.max_time_s:
+            return own
+        try:
+            found, loss = cls.of(records, smaller, cheaper, began=now()).run()
+        except TraceError:  # it has no free run where it begins: the larger one has starts of its own
+            return own
+        more = _grown(found, smaller, structure, training, ways)
+        if not more:  # one integrates, and the other does not: a pole that is not needed may lie anywhere
+            if replace(own, training=cheaper, began=now()).run()[1] < loss:
+                return own
+            ways = _ways(records, structure, training, settles=True)
+            more = _grown(found, smaller, structure, training, ways)
+        return cls.between(records, structure, training, ways, more=more, began=began)
+
+    @classmethod
+    def between(
+        cls, records: _Records, structure: BlockStructure, training: Training, ways: _Ways, *,
+        more: Sequence[Begun] = (), began: float,
+    ) -> _Race:  # fmt: skip
+        """The race of some starts before those of the linear model."""
+        return cls(
+            template=records.template(structure, ways.greys[0]),
+            training=replace(training, starts=training.n_starts + len(more)),
+            data=(records.traces, (), records.start),
+            begins=[*more, *ways.begins],
+            scattered=ways.scattered,
+            began=began,
+        )
+
+    def run(self) -> tuple[BuiltModel, float]:
+        """The best, and its loss."""
+        return raced_equations(
+            *self.template, self.training, self.data, begins=self.begins, scattered=self.scattered, began=self.began
+        )
+
+
+def _fitted(
+    records: _Records, structure: BlockStructure, training: Training | None, *, selection: Sequence[Trace],
+    vet: Callable[[Any], bool] | None, on_progress: Callable[[FitProgress], None],
+) -> FitResult:  # fmt: skip
+    race = _Race.of(records, structure, (training or Training()).with_starts(STARTS), began=now())
     found = fit_equations(
-        template, experiments, training, (traces, selection, start or Start()),
-        others=_starts_of(greys[1:]), scattered=frozenset(), began=began, vet=vet, on_progress=on_progress,
+        *race.template, race.training, (records.traces, selection, records.start),
+        begins=race.begins, scattered=race.scattered, began=race.began, vet=vet, on_progress=on_progress,
     )  # fmt: skip
     return with_equations(found)
 
 
-def _starts_of(greys: Sequence[GreyBox]) -> list[NDArray[np.float64]]:
-    """Where the parameters of the same equations begin otherwise."""
-    return [np.array([one.start for one in grey.free]) for grey in greys]
+def _cheaper(training: Training) -> Training:
+    """The training of a structure with fewer states."""
+    return replace(
+        training,
+        starts=(training.n_starts + 1) // 2,
+        max_iterations=max(round(SMALLER * training.max_iterations), 1),
+        max_time_s=SMALLER * training.max_time_s,
+    )
+
+
+def _grown(
+    found: BuiltModel, smaller: BlockStructure, structure: BlockStructure, training: Training, ways: _Ways
+) -> list[Begun]:
+    """Starts at which the structure is what one with fewer states has found, the states more at some radii.
+
+    There are none where the equations differ by more than these states.
+    """
+    inputs, begins = found.mapping.inputs, []
+    text = Text(taken=frozenset((*inputs, *found.mapping.outputs)))
+    for pole in _poles(ways.slowest)[: None if training.n_starts > 1 else 1]:
+        values = grown(found.parameters, smaller, structure, n_inputs=len(inputs), pole=pole, name=text.name)
+        if set(values) != set(ways.names):
+            return []
+        parameters = np.array([values[one] for one in ways.names])
+        weights = found.theta[len(found.grey.free) :]
+        begins.append(Begun(parameters=parameters, weights=weights, norms=found.lowered.norms))
+    return begins
+
+
+def _poles(slowest: float) -> list[float]:
+    """Poles that are added: of a time constant between the fastest and the slowest, and of these."""
+    longest = max(SLOWER * slowest, 2.0)
+    return [float(np.exp(-1.0 / constant)) for constant in (np.sqrt(longest), longest, 1.0)]
 
 
 def with_equations(found: FitResult) -> FitResult:
@@ -141,21 +319,3 @@ def with_equations(found: FitResult) -> FitResult:
     model = found.model
     assert isinstance(model, BuiltModel)  # noqa: S101 - the template is one
     return replace(found, notes=(*found.notes, *model.equations.splitlines()))
-
-
-def _begun(
-    traces: Sequence[Trace],
-    mapping: Mapping,
-    structure: BlockStructure,
-    states: int,
-    *,
-    start: Start | None,
-    rest_output: float | None,
-    seconds: float,
-    rectified: bool = False,
-) -> LinearStart:
-    late = shifted(traces, mapping, structure.lags(len(mapping.inputs)))
-    output = "absolute" if rectified else "plain"
-    return linear_start(
-        late, mapping, states, start=start or Start(), rest_output=rest_output, output=output, seconds=seconds
-    )

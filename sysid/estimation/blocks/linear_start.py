@@ -54,6 +54,7 @@ class LinearStart:
         samples: Of the longest record.
         slope: What the output of a plant that integrates gains in a sample where the inputs are 0; ``None`` where it
             has a level.
+        settles: Whether it is taken to settle, however slow its poles are.
     """
 
     scaling: Scaling
@@ -62,6 +63,7 @@ class LinearStart:
     level: float
     samples: int
     slope: float | None = None
+    settles: bool = False
 
     def constant(self, block: Block) -> float:
         """What a block of these poles is fed beside its inputs, at its last state."""
@@ -71,13 +73,18 @@ class LinearStart:
         return self.slope * float(np.real(others))
 
     @property
+    def slowest(self) -> float:
+        """The longest time constant, in samples."""
+        return float(-1.0 / np.log(np.clip(np.abs(self.poles).max(initial=0.0), 1e-3, LARGEST_POLE)))
+
+    @property
     def integrates(self) -> bool:
         """Whether a pole is as slow as the records: where they cannot tell it from an integrator.
 
         Such a block has no level of its own: a constant that it is fed is a slope of its output, and the level is
         where it began.
         """
-        return bool(np.abs(self.poles).max(initial=0.0) >= np.exp(-1.0 / self.samples))
+        return not self.settles and bool(np.abs(self.poles).max(initial=0.0) >= np.exp(-1.0 / self.samples))
 
 
 def shifted(traces: Sequence[Trace], mapping: Mapping, lags: Sequence[int]) -> list[Trace]:
@@ -203,7 +210,7 @@ def parted(
         for _ in range(DRAWS)
     ]
     blocks = [pair.before for _, pair in found]
-    second, slowest = len(begun.poles) - first, -SLOWEST / np.log(min(np.abs(begun.poles).max(), LARGEST_POLE))
+    second, slowest = len(begun.poles) - first, SLOWEST * begun.slowest
     found += searched(blocks, second, signals, direct=direct, slowest=slowest, rng=rng, until=until)
     return _distinct(sorted(found, key=lambda one: one[0]))
 

@@ -19,7 +19,7 @@ from sysid.estimation.findings import Findings
 from sysid.estimation.first_samples import shown_note
 from sysid.estimation.grey_box.by_case import case_notes, with_cases
 from sysid.estimation.grey_box.finishing import Done, Ready, finished, settled
-from sysid.estimation.grey_box.layout import EquationLayout
+from sysid.estimation.grey_box.layout import Begun, EquationLayout
 from sysid.estimation.grey_box.preparing import (
     WINDOW,
     first_terms,
@@ -208,7 +208,7 @@ def fit_equations(
     training: Training | None,
     data: tuple[Sequence[Trace], Sequence[Trace], Start],
     *,
-    others: Sequence[Array] = (),
+    begins: Sequence[Begun] = (),
     scattered: frozenset[str] | None = None,
     began: float | None = None,
     vet: Callable[[starts.Network], bool] | None,
@@ -221,7 +221,7 @@ def fit_equations(
         experiments: The records.
         training: How to train.
         data: Estimation traces, those that choose between starts, and what stands before each.
-        others: Where starts after the first begin: other parameters of those that are estimated.
+        begins: Where the first starts begin; where equations declare it by default.
         scattered: Parameters around which later starts are drawn; ``None`` for all.
         began: When the fit began, where that was before.
         vet: Whether a model's free run is stable.
@@ -234,29 +234,8 @@ def fit_equations(
     training = (training or Training()).with_starts(STARTS)
     check_training(training)
     template = with_cases(template, experiments, data[1], data[2])
-    windows = Windows.of(experiments, replace(training, window=0) if template.grey.by_case else training)
-    ready = _ready(template, windows.experiments)
-    starts.check_samples(ready.provider)
-    multistart = starts.Multistart(
-        training=training,
-        layout=EquationLayout(
-            named=ready.named,
-            first_weight=len(template.grey.free),
-            nets=ready.template.lowered.nets,
-            provider=ready.provider,
-            begun=ready.theta,
-            others=tuple(others),
-            scattered=scattered,
-        ),
-        provider=ready.provider,
-        to_plain=ready.to_plain,
-        template=ready.template,
-        selection=data[1],
-        start=data[2],
-        initial=None,
-        on_progress=on_progress,
-        checkpoints=checkpoints_of(on_progress),
-        until=starts.deadline(began, training, on_progress),
+    windows, ready, multistart = _prepared(
+        template, experiments, training, data, begins=begins, scattered=scattered, began=began, on_progress=on_progress
     )
     # The latest first: of a start that converged, the last look at it is chosen, and not one that saw the same.
     candidates = [settled(one, ready.provider) for one in reversed(starts.run(multistart))]
@@ -273,6 +252,85 @@ def fit_equations(
     seconds = multistart.checkpoints.earlier_s + now() - began
     found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
     return _told(found, done, data, ready.named)
+
+
+def raced_equations(
+    template: BuiltModel,
+    experiments: Sequence[Experiment],
+    training: Training,
+    data: tuple[Sequence[Trace], Sequence[Trace], Start],
+    *,
+    begins: Sequence[Begun] = (),
+    scattered: frozenset[str] | None = None,
+    began: float,
+) -> tuple[BuiltModel, float]:
+    """What the starts of equations come to, before anything is made of the best of them.
+
+    Args:
+        template: The model before its fit.
+        experiments: The records.
+        training: How to train.
+        data: As for :func:`fit_equations`.
+        begins: Likewise.
+        scattered: Likewise.
+        began: Likewise.
+
+    Returns:
+        The model of least loss on the estimation traces, and that loss.
+    """
+    *_, multistart = _prepared(
+        template,
+        experiments,
+        training,
+        data,
+        begins=begins,
+        scattered=scattered,
+        began=began,
+        on_progress=lambda _: None,
+    )
+    best = min(starts.run(multistart), key=lambda one: (not one.solution.status.usable, one.loss))
+    assert isinstance(best.model, BuiltModel)  # noqa: S101 - the template is one
+    return best.model, best.loss
+
+
+def _prepared(
+    template: GreyBoxModel | VectorGreyBoxModel,
+    experiments: Sequence[Experiment],
+    training: Training,
+    data: tuple[Sequence[Trace], Sequence[Trace], Start],
+    *,
+    begins: Sequence[Begun],
+    scattered: frozenset[str] | None,
+    began: float,
+    on_progress: Callable[[FitProgress], None],
+) -> tuple[Windows, Ready, starts.Multistart]:
+    """The windows of the records, what is trained on them, and its starts."""
+    windows = Windows.of(experiments, replace(training, window=0) if template.grey.by_case else training)
+    ready = _ready(template, windows.experiments)
+    starts.check_samples(ready.provider)
+    layout = EquationLayout(
+        named=ready.named,
+        first_weight=len(template.grey.free),
+        nets=ready.template.lowered.nets,
+        provider=ready.provider,
+        begun=ready.theta,
+        begins=tuple(begins),
+        scattered=scattered,
+    )
+    multistart = starts.Multistart(
+        training=training,
+        layout=layout,
+        provider=ready.provider,
+        to_plain=ready.to_plain,
+        template=ready.template,
+        selection=data[1],
+        start=data[2],
+        initial=None,
+        on_progress=on_progress,
+        checkpoints=checkpoints_of(on_progress),
+        until=starts.deadline(began, training, on_progress),
+    )
+    return windows, ready, multistart
 
 
 def _over_all(ready: Ready, multistart: starts.Multistart, windows: Windows, choice: Choice) -> tuple[Ready, Choice]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,21 @@ TRIES = 20
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Begun:
+    """Where a start begins that is not drawn.
+
+    Args:
+        parameters: Those that are estimated.
+        weights: Of the networks; empty for networks that do nothing.
+        norms: Levels and scales of what networks with these weights see and give.
+    """
+
+    parameters: Array
+    weights: Array = field(default_factory=lambda: np.zeros(0))
+    norms: Sequence[float] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class EquationLayout(AbstractLayout):
     """Where the parameters of one fit stand, and where they start.
 
@@ -37,7 +53,7 @@ class EquationLayout(AbstractLayout):
         nets: The networks.
         provider: The records.
         begun: What is trained where the fit starts: declared starts, networks that do nothing, and initial states.
-        others: Where the starts after the first begin: other values of the parameters.
+        begins: Where the first starts begin, in place of the declared one.
         scattered: Names of the parameters around which the starts after these are drawn; ``None`` for all.
     """
 
@@ -46,7 +62,7 @@ class EquationLayout(AbstractLayout):
     nets: tuple[Net, ...]
     provider: EquationProvider
     begun: Array
-    others: tuple[Array, ...] = ()
+    begins: tuple[Begun, ...] = ()
     scattered: frozenset[str] | None = None
 
     def centre(self) -> Array:
@@ -123,19 +139,28 @@ class EquationLayout(AbstractLayout):
         """
         del centre
         begun = self.draw(rng, self.begun)
+        if number < len(self.begins):
+            return self._begun(self.begins[number], begun)
         if number == 0:
             return begun, self.begun
-        if number <= len(self.others):
-            w = self.first_weight
-            begun[:w] = self.others[number - 1] / self.provider.scale[:w]
-            begun = self.provider.with_states(begun, self.provider.states(begun, WINDOW))
-            return begun, begun
         for _ in range(TRIES):
             theta = self._scattered(begun, rng)
             theta = self.provider.with_states(theta, self.provider.states(theta, WINDOW))
             if np.isfinite(self.provider.loss(theta)):
                 return theta, self.begun
         return begun, self.begun
+
+    def _begun(self, given: Begun, drawn: Array) -> tuple[Array, Array]:
+        """A start as it is given; networks are drawn to what does nothing, whatever they begin as."""
+        theta, w = drawn.copy(), self.first_weight
+        theta[:w] = given.parameters / self.provider.scale[:w]
+        if len(given.weights):
+            norms = self.provider.form.lowered.norms
+            theta[w : w + len(given.weights)] = renormed(self.nets, given.weights, given.norms, norms)
+        theta = self.provider.with_states(theta, self.provider.states(theta, WINDOW))
+        centre = theta.copy()
+        centre[w : len(self.provider.scale)] = self.begun[w : len(self.provider.scale)]
+        return theta, centre
 
     def _scattered(self, theta: Array, rng: np.random.Generator) -> Array:
         """Parameters around the declared ones, within their bounds."""
@@ -154,3 +179,28 @@ class EquationLayout(AbstractLayout):
             else:
                 moved[i] += z
         return np.clip(moved, low, high)
+
+
+def renormed(nets: Sequence[Net], weights: Array, before: Sequence[float], norms: Sequence[float]) -> Array:
+    """The weights of the same functions, where what networks see and give is scaled otherwise.
+
+    Args:
+        nets: The networks.
+        weights: Their weights.
+        before: Levels and scales that go with them.
+        norms: Those that shall.
+
+    Returns:
+        The weights with these.
+    """
+    found = weights.copy()
+    for net in nets:
+        m = net.arguments
+        old, new = (np.asarray(one)[net.norm : net.norm + 2 * m + 1] for one in (before, norms))
+        ratio, shift = old[1:-1:2] / new[1:-1:2], (new[:-1:2] - old[:-1:2]) * old[1:-1:2]
+        hidden, linear = weights[net.hidden].reshape(net.neurons, m + 1), weights[net.linear]
+        own = old[-1] / new[-1]
+        found[net.hidden] = np.column_stack([hidden[:, :m] * ratio, hidden[:, m] + hidden[:, :m] @ shift]).ravel()
+        found[net.readout] = own * weights[net.readout]
+        found[net.linear] = own * np.append(linear[:m] * ratio, linear[m] + linear[:m] @ shift)
+    return found

@@ -134,8 +134,9 @@ class NeuralLayout(AbstractLayout):
         if number == 0:
             return self.draw(rng, self.base), self.base
         s = self.sizes
-        # Dynamics that are random add up to anything in a sum: with one, all starts have those of the linear model.
-        base = self._random_dynamics(rng) if number % 2 and not s.integrators else self.base
+        # Behind sums alone there is nothing to draw, and without inputs nothing that says how sums are fed.
+        drawn = number % 2 and (not s.integrators or (s.sums.start > 0 and s.inputs > 0))
+        base = self._random_dynamics(rng) if drawn else self.base
         forgets = 1.0 - np.minimum(np.abs(np.diag(base[s.linear].reshape(s.states, -1))), LARGEST_POLE)
         theta = self.draw(rng, base)
         theta[s.readout] = (LOUD_SPREAD * forgets[:, None] * rng.standard_normal((s.states, s.neurons))).ravel()
@@ -158,22 +159,47 @@ class NeuralLayout(AbstractLayout):
         As many pairs as swing in the linear model swing here, near its frequencies. Each state is driven by the inputs
         so that it ranges as far as they do; each output is a random sum of them.
         """
-        s = self.sizes
-        linear = linalg.eigvals(self.base[s.linear].reshape(s.states, -1)[:, : s.states])
+        s, n = self.sizes, self.sizes.sums.start
+        linear = linalg.eigvals(self.base[s.linear].reshape(s.states, -1)[:n, :n])
         radius = min(float(np.abs(linear).max()), 1.0)
         ratio, least, spread = TIME_CONSTANTS
         slowest = min(max(-1.0 / np.log(max(radius, 1e-3)) if radius < 1.0 else np.inf, least), max(self.longest, 1))
         fastest = min(max(slowest / ratio, least), slowest)
-        places = np.linspace(np.log(fastest), np.log(slowest), s.states) if s.states > 1 else np.log([slowest])
-        poles = np.exp(-np.exp(-(places + spread * rng.standard_normal(s.states))))
-        gains = rng.standard_normal((s.states, s.inputs))
+        places = np.linspace(np.log(fastest), np.log(slowest), n) if n > 1 else np.log([slowest])
+        poles = np.exp(-np.exp(-(places + spread * rng.standard_normal(n))))
+        gains = rng.standard_normal((n, s.inputs))
         base = np.zeros(len(self.base))
-        A = _swinging(poles, linear, spread, rng)
-        base[s.linear] = np.column_stack([A, gains * (1.0 - poles)[:, None], np.zeros(s.states)]).ravel()
-        base[s.output_linear].reshape(s.outputs, s.row)[:, : s.states] = 0.5 * rng.standard_normal(
-            (s.outputs, s.states)
+        M, L, E = (base[part].reshape(rows, -1) for part, rows in self._parts)
+        M[:n, :n] = _swinging(poles, linear, spread, rng)
+        M[:n, s.states : -1] = gains * (1.0 - poles)[:, None]
+        L[:, :n] = 0.5 * rng.standard_normal((s.outputs, n))
+        E[:n, : s.inputs] = gains
+        return self._with_sums(base, rng) if s.integrators else base
+
+    @property
+    def _parts(self) -> tuple[tuple[slice, int], ...]:
+        s = self.sizes
+        return (s.linear, s.states), (s.output_linear, s.outputs), (s.start, s.states)
+
+    def _with_sums(self, base: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+        """Random dynamics before the sums of the linear model.
+
+        Dynamics that are random would add up to anything in a sum. At inputs that stay, they give sums and outputs what
+        those of the linear model do.
+        """
+        s, n = self.sizes, self.sizes.sums.start
+        (M, L, E), (M0, L0, E0) = (
+            [theta[part].reshape(rows, -1) for part, rows in self._parts] for theta in (base, self.base)
         )
-        base[s.start] = np.column_stack([gains, np.zeros((s.states, s.outputs + 1))]).ravel()
+        random, linear = (
+            np.linalg.lstsq(np.eye(n) - one[:n, :n], one[:n, s.states :], rcond=None)[0] for one in (M, M0)
+        )
+        M[n:], L[:, n:], E[n:] = M0[n:], L0[:, n:], E0[n:]
+        fed = M0[n:, :n] @ linear + M0[n:, s.states :]
+        M[n:, :n] = rng.standard_normal((s.integrators, n)) * np.linalg.norm(fed, axis=1)[:, None] / np.sqrt(n)
+        M[n:, s.states :] = fed - M[n:, :n] @ random
+        L[:, s.states :] += L0[:, :n] @ linear - L[:, :n] @ random
+        base[s.count :].reshape(-1, s.states)[:, n:] = self.base[s.count :].reshape(-1, s.states)[:, n:]
         return base
 
     def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -94,8 +94,13 @@ def choose(
     unit = squared(usable[best][0][0].model.ends.output_units[0]) if len(sizes) == 1 else "1"
     errors = {name: _mean(_errors, pairs, sizes, selection=selection) for name, pairs in usable.items()}
     told = against(best, mse, partial(quantity, unit=unit), errors)
-    favours = "" if selection else " It favours the model with the most parameters."
+    favours = "" if selection or not _differ(usable) else " It favours the model with the most parameters."
     return Choice(name=best, chosen_by=f"{sentence}{told}.{favours}")
+
+
+def _differ(fits: Mapping[str, Pairs]) -> bool:
+    """Whether some have more parameters than others."""
+    return len({sum(fit.model.n_parameters for fit, _ in pairs) for pairs in fits.values()}) > 1
 
 
 def _mse(scores: Scores, *, selection: bool) -> float:

@@ -276,6 +276,41 @@ def test_random_dynamics_swing_where_the_linear_model_does() -> None:
         assert turns[1] == 0.0 and 0.1 < turns[2] < np.pi and turns[0] == -turns[2]
 
 
+def test_random_dynamics_before_a_sum_do_to_it_what_the_linear_model_does() -> None:
+    n, inputs = 4, 2
+    sizes = NeuralStateSpace(states=n, neurons=2, integrators=1).sizes(inputs)
+    rng = np.random.default_rng(1)
+    base = np.zeros(sizes.count + n)
+    base[sizes.linear] = np.column_stack([np.diag([0.9, 0.8, 0.5, 1.0]), rng.standard_normal((n, inputs + 1))]).ravel()
+    base[sizes.linear].reshape(n, -1)[-1, :-4] = [0.3, -0.2, 0.1]
+    base[sizes.output_linear] = rng.standard_normal(sizes.row)
+    layout = NeuralLayout(sizes=sizes, base=sizes.hold(base), longest=1000)
+
+    def settled(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gain of the output and of the sum's steps at inputs that stay."""
+        M, L = theta[sizes.linear].reshape(n, -1), theta[sizes.output_linear]
+        x = np.linalg.solve(np.eye(n - 1) - M[:-1, : n - 1], M[:-1, n:])
+        return L[n:] + L[: n - 1] @ x, M[-1, n:] + M[-1, : n - 1] @ x
+
+    slowest = []
+    for seed in range(3):
+        theta, centre = layout.start(1, np.random.default_rng(seed), layout.centre())
+        A = centre[sizes.linear].reshape(n, -1)[:, :n]
+        assert A[:, -1] == pytest.approx([0.0, 0.0, 0.0, 1.0])
+        slowest.append(np.abs(np.linalg.eigvals(A[:-1, :-1])).max())
+        for found, wanted in zip(settled(centre), settled(layout.base), strict=True):
+            assert found == pytest.approx(wanted)
+        assert theta[sizes.held] == pytest.approx(layout.base[sizes.held])
+    assert len({round(one, 6) for one in slowest}) == 3
+    assert max(slowest) < 1.0
+
+
+def test_what_integrators_hold_is_no_parameter() -> None:
+    plain, summed = (NeuralStateSpace(states=3, neurons=2, integrators=n).sizes(1) for n in (0, 1))
+    assert plain.free == plain.count
+    assert summed.free == summed.count - len(set(summed.held.tolist())) < plain.free
+
+
 def hardening_spring(seed: int, n: int = 1500) -> Trace:
     """A hardly damped mass on a spring that stiffens."""
     rng = np.random.default_rng(seed)

@@ -35,3 +35,17 @@ def test_nothing_leaves_where_all_are_unstable_or_an_unstable_one_is_named(asked
     chosen = choose(fits, asked, unstable=False)
     assert (chosen.name, chosen.withheld) == ("lost", True)
     assert "not exported: its free run is unstable" in chosen.chosen_by
+
+
+@pytest.mark.parametrize("other", [7, 9])
+def test_a_choice_favours_those_of_most_parameters_only_where_counts_differ(other: int) -> None:
+    def one(mse: float, count: int):
+        model = Fake(ends=Fake(output_units=("V",)), n_parameters=count)
+        scores = Fake(
+            selection_mse=float("nan"), estimation_errors=(), evaluation=Fake(mean_mse=lambda _: mse), intervals=None
+        )
+        return [(Fake(status=Status.CONVERGED, model=model), scores)]
+
+    chosen = choose({"a": one(1.0, 7), "b": one(2.0, other)}, "best")
+    assert chosen.name == "a"
+    assert ("favours the model with the most parameters" in chosen.chosen_by) == (other != 7)
