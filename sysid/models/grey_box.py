@@ -187,7 +187,7 @@ class GreyBox(AbstractStructure):
         """States and estimated parameters, weights of networks, and ``foh``: ``GreyBox 2/5+41 foh``."""
         weights = lowered(self, self.system.others, (), None).n_weights
         size = f"{len(self.system.states)}/{len(self.free)}{f'+{weights}' if weights else ''}"
-        return f"{self.kind} {size}{marked(self.intersample)}"
+        return f"{self.kind} {size}{marked(self.intersample)}"  # type: ignore[arg-type]  # brought into this form
 
     def for_outputs(self, n_outputs: int) -> GreyBox:
         """The same equations of several outputs, where there are several: they share states and parameters."""

@@ -11,17 +11,21 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid.equations.lowered import Net
+from sysid.estimation.blocks.equations import hammerstein_wiener, wiener_hammerstein
 from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
 from sysid.estimation.blocks.grown import grown, states_of
+from sysid.estimation.blocks.linear_start import LinearStart
+from sysid.estimation.blocks.sections import Pair, block_of
+from sysid.estimation.grey_box.fit import built_template
 from sysid.estimation.grey_box.layout import renormed
 from sysid.estimation.networks.training import Training
-from sysid.models import BuiltModel, HammersteinWiener, Mapping, WienerHammerstein
+from sysid.models import BuiltModel, HammersteinWiener, Mapping, Scaling, Start, WienerHammerstein
 from sysid.models.block_oriented import BlockStructure
 from sysid.models.curves import Curve
 from sysid.traces import Channel, Trace
 
 FIRST, SECOND = ([0.0, 0.05, 0.04], np.poly([0.85 * np.exp(0.2j), 0.85 * np.exp(-0.2j)]).real), ([0.3], [1.0, -0.7])
-BRIEF = Training(starts=1, max_iterations=30, workers=1)
+BRIEF = Training(starts=1, max_iterations=20, workers=1)
 NOISE = 0.02
 
 
@@ -83,8 +87,8 @@ def test_states_that_a_record_does_not_need_cost_nothing(
     system: Callable[[np.ndarray], np.ndarray], needed: BlockStructure, larger: BlockStructure, seed: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("sysid.estimation.blocks.first_block.DRAWN", 30)
-    monkeypatch.setattr("sysid.estimation.blocks.first_block.MOVED", 2)
+    monkeypatch.setattr("sysid.estimation.blocks.first_block.DRAWN", 10)
+    monkeypatch.setattr("sysid.estimation.blocks.first_block.MOVED", 1)
     rng = np.random.default_rng(seed)
     u, other = steps(rng), steps(rng)
     y, wanted = system(u), system(other)
@@ -129,11 +133,28 @@ def test_a_pole_and_a_zero_on_it_change_nothing(smaller: BlockStructure, larger:
 
 
 def _begun(structure: BlockStructure, inputs: np.ndarray, y: np.ndarray) -> BuiltModel:
+    """A model of a structure, not fitted."""
     channels = tuple(Channel(name=name, unit="V") for name in ("u", "v", "y"))
     trace = Trace(name="record", sample_time=1.0, channels=channels, values=np.column_stack([inputs, y]))
-    model = fit_of(structure)([trace], Mapping.parse("u+v -> y"), structure, Training(starts=1, max_iterations=1)).model
-    assert isinstance(model, BuiltModel)
-    return model
+    mapping = Mapping.parse("u+v -> y")
+    scaling = Scaling(input_offset=(0.0, 0.0), input_scale=(1.0, 1.0), output_offset=0.5, output_scale=2.0)
+    begun = LinearStart(
+        scaling=scaling, poles=np.zeros(0, dtype=np.complex128), response=np.zeros((1, 2)), level=0.1, samples=60
+    )
+    low = states_of(structure)
+    blocks = {
+        tag: block_of(
+            np.linspace(0.2, 0.8, n).astype(np.complex128), np.ones((50, 1 if tag == "g2" else 2)), direct=True
+        )
+        for tag, n in low.items()
+    }
+    if isinstance(structure, WienerHammerstein):
+        pair = Pair(before=blocks["g1"], behind=blocks["g2"], x=np.linspace(-1.0, 1.0, 9), y=np.linspace(-1.0, 1.0, 9))
+        grey, _ = wiener_hammerstein(structure, mapping, begun, pair)
+    else:
+        assert isinstance(structure, HammersteinWiener)
+        grey, _ = hammerstein_wiener(structure, mapping, begun, blocks["g"])
+    return built_template([trace], mapping, grey, built_of=structure, start=Start(), rest_output=0.0)[0]
 
 
 def test_weights_are_those_of_the_same_network_whatever_it_sees_is_scaled_by() -> None:
