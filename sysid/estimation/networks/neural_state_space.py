@@ -246,7 +246,7 @@ def _fit(
             loss=None if NEURONS[template.network.activation].bounded else provider.loss,
         ),
         provider=provider,
-        to_plain=np.eye(template.n_parameters, provider.n_parameters),
+        to_plain=np.eye(len(template.theta), provider.n_parameters),
         template=template,
         selection=records.selection,
         start=records.start,
@@ -279,7 +279,7 @@ def _fit(
         own = replace(
             multistart,
             learnt=partial(learnt_map, provider),
-            to_plain=np.eye(template.n_parameters, provider.n_parameters),
+            to_plain=np.eye(len(template.theta), provider.n_parameters),
         )
         choice = windows.finished(own, choice, provider, theta, centre)
         candidates = in_place(candidates, race, choice.chosen)
@@ -342,7 +342,7 @@ def _posterior(
     if whole is not None and chosen is whole.candidate:
         found = whole.posterior(runs, unread)
     else:
-        to_plain = np.eye(model.n_parameters, provider.n_parameters)
+        to_plain = np.eye(len(model.theta), provider.n_parameters)
         to_plain[unread] = 0.0
         found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
     return None if found is None else calibrate(found, model, others)
