@@ -238,6 +238,8 @@ class ParityError(SysidError):
         unit: The output's unit.
         coarse: Whether the file computes in float32, whose rounding a model may make too much of.
         grown: How many times larger the model makes a difference; 0 where that is not the reason.
+
+    ``summary`` says it in one sentence.
     """
 
     def __init__(
@@ -253,13 +255,15 @@ class ParityError(SysidError):
     ) -> None:
         self.difference = difference
         self.tolerance = tolerance
+        found = f"{difference:g} {unit} in case {case}, where {tolerance:g} are allowed"
+        self.summary = f"{file} does not reproduce its model ({found})"
         super().__init__(
             f"{file} does not reproduce its model",
             where=f"case {case}",
             expected=f"a largest difference of at most {tolerance:g} {unit}",
             got=f"{difference:g} {unit}",
             remedy=f"nothing was published: this model makes {grown:.2g} times as much of a difference in the last "
-            "digit, which no two programs round alike. Its states are told by next to nothing: fit fewer, fit the free "
+            "digit, which no two programs round alike. Fit fewer states, train it longer or on more data, fit the free "
             "run (noise: false), or leave out an output that is made of others"
             if grown
             else "nothing was published: a model may make more of rounding to float32 than is allowed. Leave this "

@@ -91,7 +91,9 @@ class Evaluating:
         """
         found = self._outcome(cases, data)
         write_signals(self.context.store.path, found, self.context.config.outputs, cases)
-        return self.context.run.results(assembly_results(self.context, self.trained, found, cases, self.notes))
+        refused = tuple(f"It is not exported: {one.summary}." for one in self.context.run.refused)
+        notes = (*self.notes, *refused)
+        return self.context.run.results(assembly_results(self.context, self.trained, found, cases, notes))
 
     def _outcome(self, cases: TraceSet, data: AssemblyData) -> Outcome:
         """Every stage scored, one chosen by the selection traces, proven and exported."""
@@ -252,7 +254,7 @@ class Evaluating:
 
         def make(_: Work) -> Bundle:
             return export_bundle(
-                exported, cases, self.context.store.path / "bundle", outputs=self.context.config.outputs,
+                exported, cases, self.context.store.bundle, outputs=self.context.config.outputs,
                 formats=formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
             )  # fmt: skip
 
@@ -260,7 +262,9 @@ class Evaluating:
             worst = max((entry.largest_difference for entry in bundle.files), default=0.0)
             return f"{len(bundle.files)} files, at most {worst:.1e} off"
 
-        return self.context.compute(export_step(asked), make, outcome=outcome)
+        step = export_step(asked)
+        done = self.context.run.export(Step(name=step.name, title=step.title, make=make, outcome=outcome))
+        return None if done is None else done.value
 
     def _data(self, name: str) -> dict[str, str]:
         return {"name": name, "sha256": self.context.digests[name]}

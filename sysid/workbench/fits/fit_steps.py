@@ -139,10 +139,12 @@ class FitSteps:
         choice = self.chosen or choose(pairs, asked, sizes, unstable=unstable, tolerance=self.config.tolerance)
         best = fitted[choice.name]
         leaves = self.config.export is not None and not choice.withheld
-        bundle = run.do(self._export(run, best, loaded)) if leaves else None
+        bundle = run.export(self._export(run, best, loaded)) if leaves else None
         exports = () if bundle is None else bundle.value
+        for refused in run.refused:
+            choice = replace(choice, chosen_by=f"{choice.chosen_by} It is not exported: {refused.summary}.")
         if bundle is not None:
-            place, stored = run.store.path / "bundle", bundle.stored
+            place, stored = run.store.bundle, bundle.stored
             for ready in best.ready:
                 told = events.BundleReady(
                     of=ready, folder=place, exports=exports, stored=stored,
@@ -154,7 +156,7 @@ class FitSteps:
         results = self._results(run, loaded.value, fitted, choice=choice, exports=exports, advice=advice, orders=found)
         if not self.page:
             return results
-        if self.before_page is not None:
+        if self.before_page is not None and not run.refused:
             run.then(self.before_page)
         page = run.report(results)
         for ready in best.ready:
@@ -310,7 +312,7 @@ class FitSteps:
         )
 
     def _export(self, run: Run, best: Fitted, loaded: Done[Data]) -> Step[tuple[dict[str, Any], ...]]:
-        config, folder, fits = self.config, run.store.path / "bundle", [one.value for one in best.models.values()]
+        config, folder, fits = self.config, run.store.bundle, [one.value for one in best.models.values()]
         unit = ", ".join(dict.fromkeys(unit for fit in fits for unit in fit.model.ends.output_units))
         scores = {one.output.config.mapping.output: one.scores.value for one in best.outputs}
         provenance = {"pipeline": config.name, "fit": best.config.name, "command": run.command}

@@ -83,6 +83,8 @@ def carry_out(
         write_json(run.store.path / "environment.json", run.environment)
         run.tell(RunStarted(pipeline=program.name, folder=run.store.path, run_id=run.run_id, command=command))
         results = program.steps(run)
+        if run.refused:
+            raise run.refused[0]
         run.tell(RunDone(results=results))
         return results
 

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel
 
 from sysid.code_digest import code_digest
-from sysid.errors import ConfigError, SysidError
+from sysid.errors import ConfigError, ParityError, SysidError
 from sysid.estimation import FitProgress
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch
 from sysid.estimation.least_squares.threads import one_blas_thread
@@ -41,6 +41,7 @@ class Run:
         watchers: Told of everything that happens, in order.
         run_id: Name of this run.
         environment: The machine and the packages.
+        refused: Why files were not published, raised once the report is written.
     """
 
     store: RunFolder
@@ -49,6 +50,7 @@ class Run:
     watchers: tuple[Watcher, ...] = ()
     run_id: str = field(default_factory=lambda: time.strftime("%Y%m%d-%H%M%S"))
     environment: Mapping[str, Any] = field(default_factory=environment)
+    refused: list[ParityError] = field(default_factory=list)
 
     def tell(self, event: Event) -> None:
         """Tell everybody.
@@ -87,6 +89,23 @@ class Run:
         found = done.stored or step.was_found(done.value)
         self.tell(StepDone(step=step.title, stored=found, detail=step.outcome(done.value)))
         return done
+
+    def export(self, step: Step[T]) -> Done[T] | None:
+        """The step that writes the bundle; a file that does not reproduce its model costs nobody the report.
+
+        Args:
+            step: The step.
+
+        Returns:
+            Its result; ``None`` where a file was refused, which :attr:`refused` keeps.
+        """
+        try:
+            return self.do(step)
+        except ParityError as error:
+            self.refused.append(error)
+            self.store.put_aside_bundle()
+            self.tell(Warned(text=f"nothing is exported: {error.summary}"))
+            return None
 
     def do_all(self, title: str, steps: Sequence[Step[T]]) -> list[Done[T]]:
         """Many small steps that are told as one.

@@ -14,6 +14,7 @@ import json
 import math
 import os
 import platform
+import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -138,6 +139,18 @@ class RunFolder:
     def fit(self, slug: str) -> Path:
         """Folder of one fit."""
         return self.path / "fits" / slug
+
+    @property
+    def bundle(self) -> Path:
+        """The frozen surrogate."""
+        return self.path / "bundle"
+
+    def put_aside_bundle(self) -> None:
+        """Keep the bundle of an earlier run under another name: it is not that of the model that is there now."""
+        if self.bundle.is_dir():
+            before = self.bundle.with_name("bundle-before")
+            shutil.rmtree(before, ignore_errors=True)
+            self.bundle.rename(before)
 
     @contextmanager
     def locked(self) -> Iterator[None]:

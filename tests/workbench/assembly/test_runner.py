@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from sysid.composite.round import JointRound
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, ParityError
 from sysid.estimation import CascadeFit, Status
 from sysid.export import read_bundle
 from sysid.reporting import publish_run, read_run
@@ -362,6 +362,18 @@ def test_the_report_says_what_was_exported_and_how_far_it_is_from_the_whole(work
         (f"bundle/{one.name}", "torchscript", "cm") for one in bundle.files
     ]
     assert all(one.largest_difference <= one.tolerance == 1e-6 for one in exports)
+
+
+def test_a_file_that_is_refused_costs_nobody_the_report(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = workspace / "pipelines" / "tanks.yaml"
+    file.write_text(file.read_text().replace("export: null", "export: {formats: [torchscript], tolerance: 1.0e-30}"))
+    with pytest.raises(ParityError, match="does not reproduce its model"):
+        run(workspace)
+    assert "nothing is exported: " in capsys.readouterr().out
+    results = assembly_results(workspace / "runs" / "tanks")
+    assert not results.exports
+    assert "It is not exported: " in results.notes[-1]
+    assert (workspace / "runs" / "tanks" / "report" / "index.html").is_file()
 
 
 def test_what_is_known_may_be_any_equation(workspace: Path) -> None:

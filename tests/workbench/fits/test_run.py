@@ -17,6 +17,7 @@ import pytest
 import sysid
 from sysid import code_digest
 from sysid.code_digest import look_again
+from sysid.errors import ParityError
 from sysid.estimation import FitResult, Status
 from sysid.models import Start
 from sysid.reporting.results import Results, read_results
@@ -85,6 +86,22 @@ def test_own_data_from_a_yaml(workspace: Path) -> None:
     for file in ("results.json", "environment.json", "pipeline.yaml", "report/index.html"):
         assert (folder / file).stat().st_size > 0
     assert (folder / "pipeline.yaml").read_bytes() == (workspace / "pipelines" / "first.yaml").read_bytes()
+
+
+def test_a_file_that_is_refused_costs_nobody_the_report(workspace: Path) -> None:
+    rewrite(workspace, "export: null", "export: {formats: [onnx], tolerance: 1.0e-6}")
+    run(workspace)
+    rewrite(workspace, "tolerance: 1.0e-6", "tolerance: 1.0e-30")
+    with pytest.raises(ParityError, match=r"does not reproduce its model"):
+        run(workspace)
+    results = read_results(workspace / "run")
+    assert results.best is not None
+    assert not any(fit.exports for fit in results.fits)
+    assert ".onnx does not reproduce its model (" in results.best.chosen_by
+    assert results.best.chosen_by in (workspace / "run" / "report" / "index.html").read_text(encoding="utf-8")
+    # What an earlier run exported is not what the results are of.
+    assert not (workspace / "run" / "bundle").exists()
+    assert (workspace / "run" / "bundle-before" / "model.json").is_file()
 
 
 @pytest.fixture
