@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 OPEN = 0.5
 """Share of its prior's variance that a parameter keeps where the records do not determine it."""
 
+ALL_BUT_NOTHING = 0.99
+"""Share of a parameter's variance that its prior alone makes where the records say nothing of it."""
+
 TOGETHER = 0.99
 """Correlation above which two parameters cannot be told apart."""
 
@@ -127,8 +130,8 @@ class Findings:
         open_ = np.flatnonzero(~held[places])
         rows = half[np.searchsorted(free, places[open_])]
         inner = rows @ rows.T
-        left = np.diag(inner) * prior.precision[places[open_]]
-        lost = (left > OPEN) & np.array([named[i].parameter.prior is None for i in open_], dtype=np.bool_)
+        vague = np.array([named[i].parameter.prior is None for i in open_], dtype=np.bool_)
+        lost = _lost(inner, prior.precision[places[open_]]) & vague
         inner[lost, :] = np.nan
         inner[:, lost] = np.nan
         covariance = np.full((len(named), len(named)), np.nan)
@@ -236,6 +239,25 @@ class Findings:
         with np.errstate(invalid="ignore"):
             correlation = self.covariance / np.outer(deviations, deviations)
         return (*told, *_together([one.name for one in self.named], np.abs(correlation)))
+
+
+def _lost(covariance: Array, precision: Array) -> NDArray[np.bool_]:
+    """Which parameters the records leave open, by what is left of their prior.
+
+    One that keeps most of its prior's variance is. Of five of which the records show three combinations, each may keep
+    less: its deviation is its prior's all the same, and is told by no correlation with another one.
+    """
+    root = np.sqrt(precision)
+    kept, directions = np.linalg.eigh(covariance * np.outer(root, root))
+    left = np.diag(covariance) * precision
+    lost: NDArray[np.bool_] = left > OPEN
+    from_prior = (directions[:, kept > OPEN] ** 2) @ kept[kept > OPEN]
+    others = np.flatnonzero(~lost)
+    deviations = np.sqrt(np.diag(covariance)[others])
+    near = np.triu(np.abs(covariance[np.ix_(others, others)]) > TOGETHER * np.outer(deviations, deviations), 1)
+    alone = ~(near | near.T).any(axis=1)
+    lost[others[alone & (from_prior[others] > ALL_BUT_NOTHING * left[others])]] = True
+    return lost
 
 
 def _together(names: Sequence[str], correlation: Array) -> list[str]:

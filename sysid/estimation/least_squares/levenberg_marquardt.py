@@ -72,6 +72,9 @@ from sysid.estimation.result import Evidence, Status
 MIN_GAIN = 1e-4
 """Smallest share of the promised decrease for which a step is taken (Nocedal and Wright 2006, algorithm 4.1)."""
 
+MOST_OF_THE_WAY = 0.9
+"""To a bound at which there is no run, in one step."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Iteration:
@@ -269,12 +272,18 @@ class LevenbergMarquardt:
         g = state.at.gradient + ridge * (state.theta - state.prior.centre)
         now = state.at.loss + state.prior.penalty(state.theta)
         damping = state.damping.scaled_by(np.diag(H))
+        bounds = box = provider.bounds
         while damping.factor <= MAX_DAMPING:
-            step = _bounded(state.theta, provider.bounds, (H, damping, g))
-            trial = state.theta + step
+            step = _bounded(state.theta, box, (H, damping, g))
+            trial = state.theta + step if box is None else np.clip(state.theta + step, *box)  # a bound exactly
             with np.errstate(over="ignore", invalid="ignore"):  # what is promised is then no number, and nothing gained
                 promised = -float(g @ step + 0.5 * step @ (H @ step))
-            gain = (now - provider.loss(trial) - state.prior.penalty(trial)) / promised if promised > 0.0 else -1.0
+            loss = provider.loss(trial)
+            if bounds is not None and box is bounds and not np.isfinite(loss):
+                box = _short_of(bounds, state.theta)
+                if not np.array_equal(np.clip(trial, *box), trial):
+                    continue
+            gain = (now - loss - state.prior.penalty(trial)) / promised if promised > 0.0 else -1.0
             if gain > MIN_GAIN:
                 at = provider.linearise(trial)
                 if at.finite:
@@ -302,6 +311,17 @@ class LevenbergMarquardt:
         self.on_state(state)
         self.on_iteration(entry)
         return state
+
+
+def _short_of(
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]], theta: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Bounds most of the way from where a fit stands: at the others there is no run, as of a volume of 0.
+
+    More damping, in place of it, would hold all other parameters where they are.
+    """
+    low, high = (theta + MOST_OF_THE_WAY * (side - theta) for side in bounds)
+    return low, high
 
 
 def _bounded(

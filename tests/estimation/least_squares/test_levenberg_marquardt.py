@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import expm
 from scipy.optimize import least_squares, lsq_linear
 
 from sysid.estimation.least_squares.evidence import Group, Prior, update
@@ -198,6 +199,54 @@ def test_bounds_give_the_least_squares_within_them(seed: int) -> None:
     line = _Line(A, b, low, high)
     found = LevenbergMarquardt(evidence_after=None).minimise(line, np.zeros(5), flat_prior(5, 1e-12))
     assert found.theta == pytest.approx(lsq_linear(A, b, (low, high), tol=1e-14).x, abs=1e-6)
+
+
+class _Exchanger(AbstractProvider):
+    """Two volumes that exchange heat, from the inlet of one to both temperatures: without a volume there is no run."""
+
+    n_samples = 120
+
+    def __init__(self) -> None:
+        self.inlet = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, 12), 5)
+        self.measured = self._run(np.array([1.0, 3.0, 2.0]))
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(3), np.full(3, np.inf)
+
+    def loss(self, theta: np.ndarray) -> float:
+        return 0.5 * float(np.sum((self._run(theta) - self.measured) ** 2)) if theta[1:].min() > 0.0 else np.inf
+
+    def linearise(self, theta: np.ndarray) -> Linearisation:
+        moved = [1e-6 * theta[i] * np.eye(3)[i] for i in range(3)]
+        J = np.column_stack([(self._run(theta + d) - self._run(theta - d)) / (2.0 * d.sum()) for d in moved])
+        error = self._run(theta) - self.measured
+        return Linearisation(loss=self.loss(theta), gradient=J.T @ error, gauss_newton=J.T @ J)
+
+    def _run(self, theta: np.ndarray) -> np.ndarray:
+        exchange, cold, hot = theta
+        A = np.array([[-(1.0 + exchange) / hot, exchange / hot], [exchange / cold, -(1.0 + exchange) / cold]])
+        step = expm(0.5 * A)
+        gain = np.linalg.solve(A, (step - np.eye(2)) @ np.array([1.0 / hot, 0.0]))
+        states = [np.zeros(2)]
+        for u in self.inlet[:-1]:
+            states.append(step @ states[-1] + gain * u)
+        return np.array(states).ravel()
+
+
+@pytest.mark.parametrize("start", [(0.1, 0.3, 20.0), (10.0, 30.0, 0.2)])
+def test_a_bound_without_a_run_is_approached_and_holds_nothing_else_back(start: tuple[float, ...]) -> None:
+    # Ten times off. The first steps lead to a volume of 0; more damping there kept all others where they were.
+    found = LevenbergMarquardt(evidence_after=None).minimise(_Exchanger(), np.array(start), flat_prior(3, 1e-12))
+    assert found.theta == pytest.approx([1.0, 3.0, 2.0], rel=1e-6)
+    assert found.state.iteration < 20
+
+
+def test_a_bound_is_met_exactly() -> None:
+    # 0.7 + (0.1 - 0.7) is less than 0.1: the parameter then stands beyond its bound, or short of it.
+    line = _Line(np.eye(1), np.array([-5.0]), np.array([0.1]), np.array([np.inf]))
+    found = LevenbergMarquardt(evidence_after=None).minimise(line, np.array([0.7]), flat_prior(1, 1e-12))
+    assert found.theta[0] == 0.1
 
 
 def test_a_precision_that_is_known_is_not_the_evidences_to_find() -> None:
