@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,10 @@ import pytest
 
 from sysid.errors import ChannelError, ConfigError, MissingExtraError, ReaderError
 from sysid.ingest import READERS, FileOptions, load_dataset, read_table
+from sysid.ingest.options import RepairOptions
+from sysid.ingest.readers import choose_reader, read_with
 from sysid.ingest.readers.reader import silent
+from sysid.ingest.table import RawTable
 from tests.ingest.recordings import (
     PIPE,
     TIME,
@@ -122,6 +126,23 @@ def test_a_file_that_breaks_off_is_refused_or_read_as_far_as_it_goes(
         assert any("breaks off" in note for note in table.notes)
     if name.endswith(".mf4"):
         gc.collect()  # asammdf leaves a half-made object behind whose end prints a complaint: let it end here
+
+
+def test_a_file_that_is_written_to_meanwhile_is_no_record(tmp_path: Path) -> None:
+    # Half of it would be the old one; and the digest that the trace keeps would be of neither.
+    path = tmp_path / "log.csv"
+    path.write_text("time [s],u [V]\n0,1\n1,2\n2,3\n")
+    csv = choose_reader(path, READERS, None)
+
+    def logged(source: Path, files: FileOptions, repairs: RepairOptions) -> RawTable:
+        table = csv.read(source, files, repairs)
+        with source.open("a") as file:
+            file.write("3,4\n")
+        return table
+
+    assert len(read_with(csv, path, FileOptions(), RepairOptions())) == 3
+    with pytest.raises(ReaderError, match="written to while it was read"):
+        read_with(replace(csv, read=logged), path, FileOptions(), RepairOptions())
 
 
 @pytest.mark.parametrize(

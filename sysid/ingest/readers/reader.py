@@ -137,7 +137,7 @@ def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOpt
 
     Raises:
         ConfigError: If an option is given that the reader does not have.
-        ReaderError: If the file is missing or cannot be read as what it claims to be.
+        ReaderError: If the file is missing, cannot be read as what it claims to be, or is written to meanwhile.
     """
     strangers = sorted(files.model_fields_set - _COMMON - reader.options)
     if strangers:
@@ -160,7 +160,17 @@ def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOpt
             else "check the path; in a dataset.yaml it is relative to that file",
         )
     try:
-        return with_meaning(reader.read(path, files, repairs), files)
+        before = _state(path)
+        table = with_meaning(reader.read(path, files, repairs), files)
+        if before != _state(path):  # what was read is neither the old file nor the new one
+            raise ReaderError(
+                "the file was written to while it was read",
+                where=path,
+                expected="a file that stays as it is",
+                got=f"{path.stat().st_size:,} bytes after {before[0]:,}",
+                remedy="wait until it is written, or read a copy of it",
+            )
+        return table
     except OSError as error:
         raise ReaderError(
             f"the file cannot be read as {reader.name}",
@@ -169,6 +179,11 @@ def read_with(reader: Reader, path: Path, files: FileOptions, repairs: RepairOpt
             got=str(error).splitlines()[0] if str(error) else type(error).__name__,
             remedy="check permissions, that the copy is complete, and that the ending tells the format",
         ) from error
+
+
+def _state(path: Path) -> tuple[int, int]:
+    stat = path.stat()
+    return stat.st_size, stat.st_mtime_ns
 
 
 @contextmanager
