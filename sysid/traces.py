@@ -289,6 +289,19 @@ class Trace:
             return np.ones(len(self.values), dtype=np.bool_) if self.usable is None else self.usable
         return np.asarray(self.usable[:, [self.index(name) for name in names if name in self]].all(axis=1))
 
+    def counted(self, inputs: Iterable[str], outputs: Iterable[str]) -> NDArray[np.bool_]:
+        """The samples that count for each of some outputs: where it and every input does, whatever others lack.
+
+        Args:
+            inputs: Channel names; those that are not there count everywhere.
+            outputs: Likewise.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``.
+        """
+        known = tuple(inputs)
+        return np.column_stack([self.usable_of((*known, name)) for name in outputs])
+
     def seen_by(self, names: Iterable[str], *, each: bool = False) -> Trace:
         """The trace as who knows some of its channels alone sees it: what others lack is nothing to it.
 

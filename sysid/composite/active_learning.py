@@ -155,8 +155,10 @@ def sequence_errors(whole: Cascade, sequences: Sequence[Trace], outputs: Sequenc
     """
 
     def one(trace: Trace) -> float:
-        run, counted = whole.simulate_trace(trace), trace.usable_samples
-        return max(float(np.sqrt(np.mean((run[name] - trace[name])[counted] ** 2))) for name in outputs)
+        run, counts = whole.simulate_trace(trace), trace.counted(whole.inputs, outputs)
+        seen = [(name, own) for name, own in zip(outputs, counts.T, strict=True) if own.any()]
+        squares = [float(np.mean((run[name] - trace[name])[own] ** 2)) for name, own in seen]
+        return float(np.sqrt(max(squares, default=0.0)))
 
     with ThreadPoolExecutor(2) as pool:
         errors = np.array(list(pool.map(one, sequences)))

@@ -271,5 +271,5 @@ def unit_ranges(experiments: Sequence[Experiment]) -> VectorScaling:
 
 def _each(trace: Trace, mapping: Mapping) -> NDArray[np.bool_] | None:
     """Which samples count for each output, where outputs differ in that, shape ``(n_samples, n_outputs)``."""
-    counts = np.column_stack([trace.usable_of((*mapping.inputs, name)) for name in mapping.outputs])
+    counts = trace.counted(mapping.inputs, mapping.outputs)
     return None if (counts == counts[:, :1]).all() else counts

@@ -22,9 +22,10 @@ def spans_of(traces: Sequence[Trace], outputs: Sequence[str]) -> NDArray[np.floa
         outputs: Names.
 
     Returns:
-        In each output's unit, shape ``(n_outputs,)``; of one that never moves 1.
+        In each output's unit, shape ``(n_outputs,)``, over what is not masked; of one that never moves 1.
     """
-    spans = np.ptp(np.concatenate([trace.columns(tuple(outputs)) for trace in traces]), axis=0)
+    known = [np.concatenate([trace[name][trace.usable_of([name])] for trace in traces]) for name in outputs]
+    spans = np.array([np.ptp(values) if len(values) else 0.0 for values in known])
     return np.asarray(np.where(spans > 0.0, spans, 1.0), dtype=np.float64)
 
 

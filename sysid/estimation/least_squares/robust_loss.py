@@ -25,7 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def counted(residual: NDArray[np.float64], scale: float, samples: int) -> tuple[float, NDArray[np.float64]]:
+def counted(
+    residual: NDArray[np.float64], scale: float, samples: int | NDArray[np.int64]
+) -> tuple[float, NDArray[np.float64]]:
     """What the residuals of one trace count.
 
     Args:
@@ -33,7 +35,7 @@ def counted(residual: NDArray[np.float64], scale: float, samples: int) -> tuple[
             count.
         scale: Root mean square of a target's residuals from which on they count by its logarithm; infinity for plain
             squares.
-        samples: Rows that count, ``n``.
+        samples: Rows that count, ``n``; of each target where they differ, shape ``(n_targets,)``.
 
     Returns:
         The trace's part of the loss, summed over targets, and the weight of each target's squares in gradient and
@@ -47,5 +49,5 @@ def counted(residual: NDArray[np.float64], scale: float, samples: int) -> tuple[
     squares = np.array([column @ column for column in residual.T])  # a sum over rows goes through memory row by row
     if np.isinf(scale):
         return 0.5 * float(np.sum(squares)), np.ones(len(squares))
-    within = max(samples, 1) * scale**2
+    within = np.maximum(samples, 1) * scale**2
     return 0.5 * float(np.sum(within * np.log1p(squares / within))), 1.0 / (1.0 + squares / within)

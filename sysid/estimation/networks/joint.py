@@ -186,9 +186,10 @@ class Joint:
         scores = []
         for trace in self.selection:
             run, first = self._run(model, trace)
-            usable = trace.usable_samples[first:]
-            for name, error in self.provider.errors.items():
-                scores.append(float(np.mean((run[name] - trace[name][first:])[usable] ** 2)) / error**2)
+            counts = trace.counted(self.provider.cascade.inputs, self.provider.errors)[first:]
+            for (name, error), seen in zip(self.provider.errors.items(), counts.T, strict=True):
+                if seen.any():
+                    scores.append(float(np.mean((run[name] - trace[name][first:])[seen] ** 2)) / error**2)
         return float(np.exp(np.mean(np.log(np.maximum(scores, NEGLIGIBLE))))) if scores else float("nan")
 
     def _run(self, model: Cascade, trace: Trace) -> tuple[Dict[str, NDArray[np.float64]], int]:

@@ -47,7 +47,8 @@ class _Record:
     """One trace: every channel in a first run, after as many rows as the lags reach back; the targets where they count.
 
     Inputs, and outputs of members that come before any trained one, keep the values of the first run. ``rows`` are
-    those of the samples that count, among the samples. Targets stand column by column.
+    those of the samples that count, among the samples. Targets stand column by column, and so do the roots of what
+    they weigh: none where a target, or an input, is masked.
     """
 
     values: NDArray[np.float64]
@@ -119,8 +120,7 @@ class CascadeProvider(AbstractProvider):
             raise ChannelError(strangers or ["(none)"], cascade.outputs, where="targets and trained members")
         put(self, "_trained", TrainedMembers.of(cascade, self.trained))
         put(self, "_records", tuple(self._record(trace) for trace in self.traces))
-        counted = sum(_counted(record) for record in self._records)
-        put(self, "n_samples", counted * len(self.errors))
+        put(self, "n_samples", int(sum(_counted(record).sum() for record in self._records)))
         put(self, "_longest", np.inf if np.isinf(self.leverage) else self.leverage * self._median_row())
 
     @property
@@ -224,13 +224,13 @@ class CascadeProvider(AbstractProvider):
         if self.measured is not None:
             return self._begun(self.measured(trace))
         run = cascade.simulate_trace(trace, rest=rest)
-        rows = counted_rows(target / np.array(list(self.errors.values())), self.stride, self.moves)
-        usable = trace.usable_samples[rows]
+        counts = trace.counted(cascade.inputs, self.errors)
+        rows = self._rows(target, counts)
         return _Record(
             values=np.concatenate([np.tile(cascade.levels(inputs[0], rest), (self._trained.depth, 1)), run.values]),
             rows=rows,
             target=np.asfortranarray(target[rows]),
-            root_weights=None if usable.all() else usable.astype(np.float64),
+            root_weights=_roots(counts[rows]),
         )
 
     def _begun(self, experiment: Experiment) -> _Record:
@@ -240,14 +240,23 @@ class CascadeProvider(AbstractProvider):
         depth = self._trained.depth
         before = np.concatenate(experiment.history.padded(depth), axis=1)
         values = np.concatenate([before, np.concatenate([experiment.inputs, experiment.output], axis=1)])[:, order]
-        rows = counted_rows(experiment.output / np.array(list(self.errors.values())), self.stride, self.moves)
-        usable = np.ones(len(rows), dtype=np.bool_) if experiment.usable is None else experiment.usable[rows]
+        counts = np.ones(experiment.output.shape, dtype=np.bool_)
+        if experiment.each is not None:
+            counts = experiment.each.astype(np.bool_)
+        elif experiment.usable is not None:
+            counts &= experiment.usable[:, np.newaxis]
+        rows = self._rows(experiment.output, counts)
         return _Record(
             values=values,
             rows=rows,
             target=np.asfortranarray(experiment.output[rows]),
-            root_weights=None if usable.all() else usable.astype(np.float64),
+            root_weights=_roots(counts[rows]),
         )
+
+    def _rows(self, target: NDArray[np.float64], counts: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """The rows that count; where a target is masked, it is not known whether it moves."""
+        over = np.where(counts, target / np.array(list(self.errors.values())), np.nan)
+        return counted_rows(over, self.stride, self.moves)
 
     def _each(self, work: Callable[[_Record], _Found]) -> Iterator[_Found]:
         def quietly(record: _Record) -> _Found:
@@ -285,7 +294,7 @@ class CascadeProvider(AbstractProvider):
     def _residual(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weighted residuals over their errors, shape ``(n_counted, n_targets)``."""
         residual = self._away(record, values)
-        return residual if record.root_weights is None else residual * record.root_weights[:, None]
+        return residual if record.root_weights is None else residual * record.root_weights
 
     def _normal_equations(
         self, program: Program, record: _Record, n: int
@@ -301,7 +310,7 @@ class CascadeProvider(AbstractProvider):
             gathered += rows.stop - rows.start
             wait = gathered < min(GATHERED, n) and rows.stop < len(record.rows)
             for j, (moving, block) in enumerate(blocks):
-                roots = None if record.root_weights is None else record.root_weights[rows][moving]
+                roots = None if record.root_weights is None else record.root_weights[rows, j][moving]
                 weighted, errors = self._counting(block, residual[rows, j][moving], roots, per_error[j])
                 waiting[j].append((weighted.copy() if wait else weighted, errors))
             if wait:
@@ -406,5 +415,13 @@ class CascadeProvider(AbstractProvider):
             at += len(picked)
 
 
-def _counted(record: _Record) -> int:
-    return len(record.rows) if record.root_weights is None else int(np.count_nonzero(record.root_weights))
+def _roots(counts: NDArray[np.bool_]) -> NDArray[np.float64] | None:
+    """Weights of the rows for each target; nothing where all count."""
+    return None if counts.all() else np.asfortranarray(counts, dtype=np.float64)
+
+
+def _counted(record: _Record) -> NDArray[np.int64]:
+    """Rows that count for each target, shape ``(n_targets,)``."""
+    if record.root_weights is None:
+        return np.full(record.target.shape[1], len(record.rows), dtype=np.int64)
+    return np.count_nonzero(record.root_weights, axis=0).astype(np.int64)

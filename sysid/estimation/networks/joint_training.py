@@ -86,10 +86,10 @@ def unit_errors(
     runs = [cascade.simulate_trace(trace) for trace in traces]
     errors = {}
     for name in names:
-        differences = np.concatenate(
-            [(run[name] - t[name])[t.usable_of([name])] for run, t in zip(runs, traces, strict=True)]
-        )
-        spread = float(np.std(np.concatenate([trace[name] for trace in traces])))
+        seen = [trace.counted(cascade.inputs, [name])[:, 0] for trace in traces]
+        known = list(zip(runs, traces, seen, strict=True))
+        differences = np.concatenate([(run[name] - trace[name])[own] for run, trace, own in known])
+        spread = float(np.std(np.concatenate([trace[name][own] for _, trace, own in known])))
         errors[name] = max(float(np.sqrt(np.mean(differences**2))), SMALLEST_ERROR * spread, np.finfo(np.float64).tiny)
     return errors
 

@@ -452,7 +452,7 @@ def judged(multistart: Multistart, model: Network) -> tuple[float, int]:
         Of the mean squared errors, in the output's unit squared, or of several outputs in scaled numbers; NaN without
         selection traces. And on how many of these it leaves the tolerance of the training.
     """
-    errors, unit = [], model.scaling.error_unit / np.square(model.scaling.output_scale)
+    errors, unit = list[float](), model.scaling.error_unit / np.square(model.scaling.output_scale)
     shares, traces = list[NDArray[np.float64]](), multistart.selection
     spans = spans_of(traces, model.mapping.outputs) if traces else np.ones(1)
     for trace in traces:
@@ -463,8 +463,11 @@ def judged(multistart: Multistart, model: Network) -> tuple[float, int]:
             output = model.simulate(inputs[n:], history)
         else:
             output = gaps.predicted(model, inputs[n:], target[n:], history, trace.usable_samples[n:])
-        squared = np.mean((output - target[n:])[trace.usable_samples[n:]] ** 2, axis=0)
-        errors.append(squared * unit)
+        off = (output - target[n:]).reshape(len(output), -1)
+        counts = trace.counted(model.mapping.inputs, model.mapping.outputs)[n:]
+        known = counts.any(axis=0)  # of an output that is masked throughout nothing can be told
+        squared = np.array([np.mean(o[own] ** 2) if own.any() else 0.0 for o, own in zip(off.T, counts.T, strict=True)])
+        errors += list((squared * unit)[known])
         shares.append(np.sqrt(squared) / spans)
     with np.errstate(divide="ignore"):  # a trace that is met exactly, such as a constant: the mean is 0
         mean = float(np.exp(np.mean(np.log(errors)))) if errors else float("nan")

@@ -265,10 +265,11 @@ def _elected(
     targets = [_scored(multistart, members[0].candidate, trace) for trace in multistart.selection] if members else []
 
     def score(runs: Runs) -> float:
-        errors = []
+        errors = list[float]()
         for run, (target, counts) in zip(runs, targets, strict=True):
             y = np.clip(np.abs(run) if form.rectified else run, form.low, form.high)
-            errors.append(np.mean((y - target)[counts] ** 2, axis=0))
+            off = zip((y - target).T, counts.T, strict=True)
+            errors += [float(np.mean(column[own] ** 2)) for column, own in off if own.any()]
         with np.errstate(divide="ignore"):
             return float(np.exp(np.mean(np.log(errors))))
 
@@ -302,12 +303,12 @@ def _over_selection(multistart: starts.Multistart, member: Member) -> Runs:
 def _scored(
     multistart: starts.Multistart, candidate: starts.Candidate, trace: Trace
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Measured outputs of a selection trace in scaled numbers, and which samples are scored."""
+    """Measured outputs of a selection trace in scaled numbers, and which samples of each are scored."""
     model = _model(candidate)
     measured = model.measured(trace)
     inputs = trace.columns(model.mapping.inputs)
     n = beginning(model, inputs, measured, multistart.start, trace.usable_samples, case=trace.name).first
-    return model.recursion.scaled_outputs(measured[n:]), trace.usable_samples[n:]
+    return model.recursion.scaled_outputs(measured[n:]), trace.counted(model.mapping.inputs, model.mapping.outputs)[n:]
 
 
 def _candidate(

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.least_squares.counted_rows import counted_rows
 from sysid.estimation.networks.joint_provider import BLOCK, CascadeProvider
+from sysid.estimation.networks.joint_training import unit_errors
 from sysid.models import Cascade, Limit
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace
@@ -125,14 +126,18 @@ def test_blocks_join_without_a_seam():
 @pytest.mark.parametrize(("stride", "moves"), [(1, np.inf), (3, np.inf), (7, np.inf), (7, 150.0)])
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.usefixtures("short_blocks")
-def test_normal_equations_equal_the_dense_ones(stride, moves, workers):
+@pytest.mark.parametrize("each", [False, True], ids=["samples", "each channel"])
+def test_normal_equations_equal_the_dense_ones(stride, moves, workers, each):
     cascade = service()
-    usable = np.random.default_rng(5).random(BLOCK + 90) > 0.2
+    usable = np.random.default_rng(5).random((BLOCK + 90, len(cascade.wiring.channels) if each else 1)) > 0.2
+    usable = usable if each else usable[:, 0]
     traces = (trace(cascade, BLOCK + 90, usable=usable), trace(cascade, 50, 1))
     errors = {"BC": 2.0, "BP": 0.5}
     one = provider(cascade, traces=traces, errors=errors, stride=stride, moves=moves, workers=workers)
-    rows = [counted_rows(t.columns(list(errors)) / list(errors.values()), stride, moves) for t in traces]
-    weights = np.concatenate([np.tile(t.usable_samples[own], 2) for t, own in zip(traces, rows, strict=True)])
+    counts, scale = [t.counted(cascade.inputs, errors) for t in traces], list(errors.values())
+    over = [np.where(own, t.columns(list(errors)) / scale, np.nan) for t, own in zip(traces, counts, strict=True)]
+    rows = [counted_rows(one, stride, moves) for one in over]
+    weights = np.concatenate([one[own].T.ravel() for one, own in zip(counts, rows, strict=True)])
     weights = weights.astype(float)
     at, J, e = one.linearise(one.theta), one.jacobian(one.theta), one.residuals(one.theta)
     assert one.n_samples == weights.sum()
@@ -174,6 +179,25 @@ def test_a_gap_does_not_make_a_trace_count_as_better_than_it_is():
     one = provider(service(), traces=(trace(service(), usable=usable),), robust_scale=20.0)
     S = np.mean(one.residuals(one.theta).reshape(3, 60)[:, usable] ** 2, axis=1)
     assert_allclose(one.loss(one.theta), 0.5 * np.sum(20 * 20.0**2 * np.log1p(S / 20.0**2)))
+
+
+def test_what_stands_under_the_mask_of_one_output_changes_nothing():
+    """Neither loss nor step, nor which samples count; the other outputs count where it is masked."""
+    cascade, filled = service(), []
+    names, hidden = cascade.wiring.channels, np.arange(60) % 7 == 3
+    usable = np.ones((60, len(names)), dtype=bool)
+    usable[hidden, names.index("BC")] = False
+    for fill in (0.0, 80.0):
+        values = trace(cascade).values.copy()
+        values[hidden, names.index("BC")] = fill
+        record = replace(trace(cascade), values=values, usable=usable)
+        one = provider(cascade, traces=(record,), stride=3, moves=4.0, robust_scale=20.0)
+        filled.append((one.n_samples, one.linearise(one.theta), unit_errors(cascade, [record], None)))
+    (n, at, errors), (n2, at2, errors2) = filled
+    assert (n, at.loss, errors) == (n2, at2.loss, errors2)
+    assert_array_equal(at.gauss_newton, at2.gauss_newton)
+    assert_array_equal(at.gradient, at2.gradient)
+    assert provider(cascade, traces=(record,)).n_samples == 3 * 60 - hidden.sum()
 
 
 def test_parameters_go_in_and_come_out():
