@@ -16,6 +16,10 @@ from sysid.units import Reference, check_unit, is_pressure, plain_unit
 
 MOST_SAMPLES = 5_000_000
 """Of one run."""
+PLACEHOLDER = re.compile(r"\{([^{}]*)\}")
+"""In the command line of a program."""
+FILES = ("inputs", "outputs")
+"""What has to stand in it: the files that are passed."""
 
 
 def _unit(text: str) -> str:
@@ -156,9 +160,10 @@ class ReferenceConfig(_Strict):
     Args:
         fmu: File of an FMU, version 2.0 or 3.0. **It is code**, and runs with your rights.
         interface: Which half of an FMU is run, where it has both.
-        python: A function as ``package.module:function``. It is called as ``function(time, inputs, parameters)``: times
-            of the samples in seconds, shape ``(n,)``; inputs, shape ``(n, n_inputs)``; parameters by name. It gives the
-            outputs, shape ``(n, n_outputs)``, each of the instant at which its inputs hold.
+        python: A function as ``package.module:function``, or ``file.py:function`` in ``folder``. It is called as
+            ``function(time, inputs, parameters)``: times of the samples in seconds, shape ``(n,)``; inputs, shape
+            ``(n, n_inputs)``; parameters by name. It gives the outputs, shape ``(n, n_outputs)``, each of the instant
+            at which its inputs hold.
         program: A command line as a list; ``{inputs}`` and ``{outputs}`` in it stand for the files that are passed, and
             ``{name}`` for a parameter. No shell is in between.
         format: Of the files of a program.
@@ -177,7 +182,7 @@ class ReferenceConfig(_Strict):
 
     fmu: str | None = None
     interface: Literal["co-simulation", "model-exchange"] | None = None
-    python: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")] | None = None
+    python: Annotated[str, Field(pattern=r"^([A-Za-z_][\w.]*|.+\.py):[A-Za-z_]\w*$")] | None = None
     program: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     format: Literal["csv", "parquet"] = "csv"
     exit_codes: Annotated[tuple[int, ...], Field(min_length=1)] = (0,)
@@ -213,12 +218,26 @@ class ReferenceConfig(_Strict):
                 f"{renamed[0]} names a variable", expected="variable of parameters of an FMU alone", got=self.kind,
                 remedy="leave variable out: functions and programs get their parameters by name",
             )  # fmt: skip
+        self._check_command()
         if not self.inputs and not self.parameters:
             raise FieldError(
                 "nothing of the reference can be varied", expected="an input or a parameter", got="neither",
                 remedy="name an input under inputs, or a parameter that varies under parameters, with its range",
             )  # fmt: skip
         return self
+
+    def _check_command(self) -> None:
+        """Refuse the command line of a program that passes no file, or names what is none of the parameters."""
+        asked = {name for word in self.program or () for name in PLACEHOLDER.findall(word)}
+        known = {*FILES, *self.parameters, *self.constants}
+        if self.program is not None and (asked - known or set(FILES) - asked):
+            raise FieldError(
+                "the command of the program cannot be filled in",
+                expected="{inputs} and {outputs}, and no other braces than of parameters and constants",
+                got=" ".join(self.program),
+                remedy="pass the two files, as in [solver, '{inputs}', '{outputs}'], and name what else stands in "
+                "braces under parameters",
+            )  # fmt: skip
 
     @property
     def kind(self) -> str:
@@ -247,7 +266,3 @@ class ReferenceConfig(_Strict):
         place = (Path(folder) / self.folder).resolve()
         fmu = None if self.fmu is None else str((place / self.fmu).resolve())
         return self.model_copy(update={"folder": str(place), "fmu": fmu})
-
-
-PLACEHOLDER = re.compile(r"\{([^{}]*)\}")
-"""In the command line of a program."""

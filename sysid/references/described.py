@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ class Wish:
         outputs: Names; all outputs by default.
         sample_time: Seconds.
         duration: Seconds.
+        units: What is said of the unit of any of them, by name: the fields ``unit`` and ``reference`` of a port.
     """
 
     ranges: Mapping[str, tuple[float, float]]
@@ -37,10 +38,11 @@ class Wish:
     outputs: Sequence[str] = ()
     sample_time: float | None = None
     duration: float | None = None
+    units: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
-def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
-    """A reference as its description proposes it.
+def described(path: Path, wish: Wish) -> tuple[dict[str, Any], float | None, list[str]]:
+    """A reference as its description proposes it, with gaps where that says nothing.
 
     Args:
         path: The FMU.
@@ -51,10 +53,10 @@ def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
         from where, in words.
 
     Raises:
-        ConfigError: If something is neither described nor said; the remedy is the options that say it.
+        ConfigError: If it is no FMU that can be read, or has no such variable.
     """
-    described = read_fmu(path)
-    variables = {one.name: one for one in described.modelVariables}
+    description = read_fmu(path)
+    variables = {one.name: one for one in description.modelVariables}
     missing = [name for name in (*wish.ranges, *wish.parameters, *wish.outputs) if name not in variables]
     if missing:
         raise ConfigError(
@@ -65,31 +67,18 @@ def proposed(path: Path, wish: Wish) -> tuple[dict[str, Any], float, list[str]]:
     ports = _numbers_of(variables.values(), notes)
     inputs = {one.name: _input(one, wish, notes) for one in ports if _moves(one, wish)}
     _check_roles(path, wish, variables, inputs)
-    unknown = [name for name, port in inputs.items() if "range" not in port]
-    sample_time, duration = _times(described, wish, notes)
-    asked = [f"--range {name}=LOW:HIGH" for name in unknown]
-    asked += [] if sample_time else ["--sample-time SECONDS"]
-    asked += [] if duration else ["--duration SECONDS"]
+    sample_time, duration = _times(description, wish, notes)
     outputs = list(wish.outputs) or [one.name for one in ports if one.causality == "output"]
-    asked += [] if outputs else ["--output NAME"]
-    asked += [] if inputs or wish.parameters else ["--parameter NAME=LOW:HIGH"]
-    if asked:
-        raise ConfigError(
-            "the model description does not say all that an experiment needs", where=path,
-            expected="ranges of inputs (min and max), an input or a parameter that varies, sample time and duration",
-            got=f"nothing for {', '.join(one.split()[-1].partition('=')[0] for one in asked)}",
-            remedy=f"say it: {' '.join(asked)}",
-        )  # fmt: skip
     for name, span in wish.parameters.items():
         _told_beyond(variables[name], span, notes)
     fields = {
-        "fmu": str(path.resolve()),
+        "fmu": str(path),
         "sample_time": sample_time,
         "inputs": inputs,
-        "parameters": dict(_parameter(variables[n], r, {*inputs, *outputs}) for n, r in wish.parameters.items()),
-        "outputs": {name: {"unit": _unit(variables[name])} for name in outputs},
+        "parameters": dict(_parameter(variables[n], r, wish, {*inputs, *outputs}) for n, r in wish.parameters.items()),
+        "outputs": {name: {"unit": _unit(variables[name]), **wish.units.get(name, {})} for name in outputs},
     }
-    return {key: value for key, value in fields.items() if value}, float(duration or 0.0), notes
+    return fields, duration, notes
 
 
 def _numbers_of(variables: Iterable[Any], notes: list[str]) -> list[Any]:
@@ -129,9 +118,10 @@ def _check_roles(path: Path, wish: Wish, variables: Mapping[str, Any], inputs: M
             )  # fmt: skip
 
 
-def _parameter(variable: Any, span: tuple[float, float], ports: set[str]) -> tuple[str, dict[str, Any]]:
+def _parameter(variable: Any, span: tuple[float, float], wish: Wish, ports: set[str]) -> tuple[str, dict[str, Any]]:
     """The name of a parameter, and its fields; of a variable that is an output, it is the start value."""
-    fields: dict[str, Any] = {"unit": _unit(variable), "range": list(span), **_levels(variable, *span)}
+    fields: dict[str, Any] = {"unit": _unit(variable), **wish.units.get(variable.name, {}), "range": list(span)}
+    fields |= _levels(variable, *span)
     if variable.name not in ports:
         return variable.name, fields
     return f"{variable.name}_start", {**fields, "variable": variable.name}
@@ -139,7 +129,7 @@ def _parameter(variable: Any, span: tuple[float, float], ports: set[str]) -> tup
 
 def _input(variable: Any, wish: Wish, notes: list[str]) -> dict[str, Any]:
     (low, high), start = _limits(variable), _number(variable.start)
-    found: dict[str, Any] = {"unit": _unit(variable)}
+    found: dict[str, Any] = {"unit": _unit(variable), **wish.units.get(variable.name, {})}
     if variable.name in wish.ranges:
         found["range"] = list(wish.ranges[variable.name])
         _told_beyond(variable, wish.ranges[variable.name], notes)
@@ -189,8 +179,8 @@ def _levels(variable: Any, low: float, high: float) -> dict[str, list[float]]:
     return {"levels": [float(k) for k in range(int(np.ceil(low)), min(int(high), int(low) + 200) + 1)]}
 
 
-def _times(described: Any, wish: Wish, notes: list[str]) -> tuple[float | None, float | None]:
-    default = described.defaultExperiment
+def _times(description: Any, wish: Wish, notes: list[str]) -> tuple[float | None, float | None]:
+    default = description.defaultExperiment
     told = {name: _number(getattr(default, name, None)) for name in ("startTime", "stopTime", "stepSize")}
     duration, sample_time = wish.duration, wish.sample_time
     if duration is None and told["stopTime"] is not None:

@@ -55,8 +55,8 @@ def read_fmu(path: Path) -> Any:
         raise ConfigError(
             "this is no FMU that can be read", where=path, expected="an FMU of version 2.0 or 3.0",
             got=f"{type(error).__name__}: {error}",
-            remedy="check the path, and that the tool exported it whole; a Python function or a program is named in a "
-            "pipeline of kind experiment, which says its ports (docs/how/slow-models.md)",
+            remedy="check the path, and that the tool exported it whole; a Python function is named as "
+            "file.py:function, a program by its command line (docs/how/slow-models.md)",
         ) from None  # fmt: skip
     if description is None:
         raise ConfigError(

@@ -11,15 +11,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, SysidError
+from sysid.errors import SysidError
 from sysid.ingest import FileOptions, RawTable, RepairOptions, read_table
 from sysid.ingest.writers import write_csv, write_parquet
-from sysid.references.config import PLACEHOLDER, ReferenceConfig
+from sysid.references.config import FILES, PLACEHOLDER, ReferenceConfig
 from sysid.references.kinds import RunError, checked, with_files
 from sysid.traces import Channel, Trace
 from sysid.units import convert
 
-FILES = ("inputs", "outputs")
 UNEVEN = 0.01
 """Share of a sample by which a program's own times may be off, as rounded ones are."""
 TAIL = 2000
@@ -34,24 +33,11 @@ class ProgramReference:
 
     Args:
         config: What it is.
-
-    Raises:
-        ConfigError: If the command passes no file, or names what is none of the parameters.
     """
 
     def __init__(self, config: ReferenceConfig) -> None:
         self.config = config
         self.command = config.program or ()
-        asked = [name for word in self.command for name in PLACEHOLDER.findall(word)]
-        known = (*FILES, *config.parameters, *config.constants)
-        strangers = [name for name in asked if name not in known]
-        missing = [name for name in FILES if name not in asked]
-        if strangers or missing:
-            raise ConfigError(
-                "the command of the program cannot be filled in", where="program",
-                expected="{inputs} and {outputs}, and no other braces than of " + ", ".join(known),
-                got=" ".join(self.command), remedy="pass the two files, as in [solver, '{inputs}', '{outputs}']",
-            )  # fmt: skip
 
     @property
     def digest(self) -> str:

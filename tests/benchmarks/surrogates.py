@@ -29,6 +29,7 @@ from sysid.field_checks import check
 from sysid.references.described import Wish
 from sysid.references.design import drawn
 from sysid.references.runs import ReferenceRuns
+from sysid.references.sources import source_of
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.surrogates.plan import written
 from sysid.yaml_files import read_yaml
@@ -95,7 +96,12 @@ def pipeline(name: str, folder: Path, *, minutes: float, workers: int, compiled:
     if name not in PYTHON:
         file = Path(os.environ["REFERENCE_FMUS"]) / f"{name}.fmu"
         return written(
-            file, Wish(ranges={}, parameters=FMUS[name]), folder, minutes=minutes, workers=workers, seed=seed
+            source_of(str(file)),
+            Wish(ranges={}, parameters=FMUS[name]),
+            folder,
+            minutes=minutes,
+            workers=workers,
+            seed=seed,
         )[0]
     content: dict[str, Any] = {**PYTHON[name], "reference": {"folder": str(MODELS), **PYTHON[name]["reference"]}}
     if compiled:

@@ -13,10 +13,12 @@ import pytest
 import sysid
 from sysid.errors import ChannelError, ConfigError
 from sysid.references.config import ReferenceConfig
-from sysid.references.described import Wish, proposed
+from sysid.references.described import Wish
 from sysid.references.fmu import FmuReference, read_fmu
 from sysid.references.fmu_variables import check_variables
+from sysid.references.proposal import proposed
 from sysid.references.runs import Case, ReferenceRuns
+from sysid.references.sources import source_of
 
 pytest.importorskip("fmpy")
 
@@ -70,7 +72,7 @@ def test_a_parameter_may_set_a_variable_of_another_name(bundle: Path, tmp_path: 
     np.testing.assert_allclose(one.trace["y"], 2.0 * 0.8 ** np.arange(1, 4), rtol=1e-9)
     np.testing.assert_array_equal(one.trace["from"], 2.0)
     wish = Wish(ranges={"u": (0, 1)}, parameters={"y": (1, 2)}, outputs=("y",), sample_time=0.1, duration=1.0)
-    fields, _, _ = proposed(file, wish)
+    fields = proposed(source_of(str(file)), wish).content["reference"]
     assert fields["parameters"] == {"y_start": {"unit": "1", "range": [1, 2], "variable": "y"}}
     with pytest.raises(ValueError, match="names a variable"):
         reference(file, fmu=None, python="a:b", **given)
@@ -212,8 +214,8 @@ def asked(
     default = SimpleNamespace(startTime=None, stopTime="10", stepSize="0.1")
     described = SimpleNamespace(modelVariables=[*variables, OUTPUT], defaultExperiment=default)
     monkeypatch.setattr("sysid.references.described.read_fmu", lambda _: described)
-    fields, _, notes = proposed(Path("a.fmu"), Wish(**{"ranges": {}, "parameters": {}, **wish}))
-    return fields, "; ".join(notes)
+    found = proposed(source_of("a.fmu"), Wish(**{"ranges": {}, "parameters": {}, **wish}))
+    return found.content["reference"], "; ".join(found.notes)
 
 
 def test_text_is_left_out_of_a_proposal_and_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,7 +49,7 @@ def run(config: ReferenceConfig, folder: Path, cases: list[Case]) -> list[Outcom
 def test_a_run_that_fails_is_a_case_with_a_reason_and_the_study_goes_on(function: str, tmp_path: Path) -> None:
     config = reference(function, **({"time_limit": 0.5} if function == "hangs" else {}))
     first, bad, last = run(config, tmp_path, CASES)
-    assert bad.reason == REASONS[function]
+    assert str(bad.reason).partition(" (slow_models.py, line ")[0] == REASONS[function]
     assert bad.trace is None
     for one in (first, last):
         assert one.reason is None
@@ -255,16 +255,12 @@ def test_a_program_is_run_on_files_and_its_units_are_heeded(tmp_path: Path) -> N
         np.testing.assert_allclose(one.trace["y"], one.case.inputs[:, 0], rtol=1e-12)
 
 
-def test_a_command_that_passes_no_file_is_refused(tmp_path: Path) -> None:
-    config = reference("raises", python=None, program=["solver", "{inputs}", "{mass}"], folder=str(tmp_path))
-    with pytest.raises(ConfigError, match="cannot be filled in"):
-        run(config, tmp_path, CASES)
-
-
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
         ({"program": ["a"]}, "run by one thing"),
+        ({"python": None, "program": ["a", "{inputs}"]}, "cannot be filled in"),
+        ({"python": None, "program": ["a", "{inputs}", "{outputs}", "{mass}"]}, "cannot be filled in"),
         ({"inputs": {}}, "nothing of the reference can be varied"),
         ({"outputs": {"u": {}}}, "u is named twice"),
         ({"inputs": {"u": {"range": [0, 2], "start": 3}}}, "outside the range"),

@@ -15,7 +15,7 @@ from sysid.estimation.estimators import estimator_of
 from sysid.estimation.networks.halving import planned_iterations
 from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.finish import slowness
+from sysid.workbench.auto.finish import MOST, slowness
 from sysid.workbench.sweep.search_space import Point
 
 REFIT, TRIAL = 0.2, 0.15
@@ -76,6 +76,7 @@ class Budget:
         most: Share of the time of all trials that may be spent by the end of this round.
         finishing_s: Processor seconds of scores, export and report, which follow the last fit.
         unlimited: Points of the next round that are tried even so, as long as the time of the last fit is not reached.
+        forced: Whether the next round is tried whatever there is: without a trial there is no model.
     """
 
     wall_s: float | None
@@ -91,6 +92,7 @@ class Budget:
     most: float = 1.0
     finishing_s: float = 0.0
     unlimited: int = 0
+    forced: bool = False
     _worked: list[tuple[float, float]] = field(default_factory=list)
     _at_first: float = math.nan
     _rates: dict[str, float] = field(default_factory=dict)
@@ -110,13 +112,13 @@ class Budget:
         for point in points:
             cost = 0.0 if self.wall_s is None or self.is_stored(point) else self._seconds(point) / self.side_by_side
             fits = self._fits(price(point, self.folds), seconds + cost, paid=cost == 0.0)
-            if not fits and not (len(taken) < self.unlimited and self._before_the_last_fit()):
+            if not fits and not self.forced and not (len(taken) < self.unlimited and self._before_the_last_fit()):
                 continue
             seconds += cost
             self.spent += price(point, self.folds)
             taken.append(point)
         self._open = taken
-        self.unlimited = 0
+        self.unlimited, self.forced = 0, False
         return taken
 
     def tell(self, trials: Sequence[Trial]) -> None:
@@ -135,18 +137,23 @@ class Budget:
 
     @property
     def slowed(self) -> float:
+        """Seconds by the clock that a second of a trial takes, whose limits end it by the wall beyond some."""
+        return min(self._busy, SLOWEST)
+
+    @property
+    def _busy(self) -> float:
         """Seconds by the clock that a second of work takes, as trials have shown lately; at first, as is seen now."""
         if not self._worked and not math.isfinite(self._at_first):
             self._at_first = slowness()
         wall, worked = np.sum(self._worked[-LATELY:] or [(self._at_first, 1.0)], axis=0)
-        return float(np.clip(wall / worked, 1.0, SLOWEST))
+        return float(np.clip(wall / worked, 1.0, MOST))
 
     @property
     def ends_s(self) -> float:
         """Seconds by the clock by which the last fit has to be over, so that the command ends within its time."""
         if self.wall_s is None:
             return math.inf
-        kept = self.slowed * self.finishing_s - SPILL * self.wall_s
+        kept = self._busy * self.finishing_s - SPILL * self.wall_s
         return self.wall_s - min(max(kept, 0.0), MOST_KEPT * self.wall_s)
 
     def is_late(self) -> bool:

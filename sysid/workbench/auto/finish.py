@@ -8,7 +8,9 @@ from sysid.reporting.fit_tables import DRAWN
 
 FINISHING_S, PICTURE_S = 15.0, 0.25
 """Processor seconds that scores, export and what has to be loaded for them take, and each picture of the report."""
-PROBE_S, MOST = 0.2, 10.0
+PAGE_S = 4.0
+"""Of that, what the page alone takes beside its pictures."""
+PROBE_S, MOST = 0.2, 20.0
 """Processor seconds for which the machine is looked at, and how much slower it may be found at most."""
 
 
@@ -27,8 +29,25 @@ def finish_s(records: int, outputs: int, *, slowed: float | None = None) -> floa
         >>> finish_s(20, 2, slowed=1.0)
         27.0
     """
-    pictures = 2.0 * min(records, DRAWN) * outputs  # a gallery of all models, and each model by itself
-    return (slowness() if slowed is None else slowed) * (FINISHING_S + PICTURE_S * pictures)
+    return (slowness() if slowed is None else slowed) * (FINISHING_S + _pictures_s(records, outputs))
+
+
+def page_s(records: int, outputs: int) -> float:
+    """About how long the report takes, beside what else the machine does now.
+
+    Args:
+        records: As for :func:`finish_s`.
+        outputs: Likewise.
+
+    Returns:
+        Seconds by the clock.
+    """
+    return slowness() * (PAGE_S + _pictures_s(records, outputs))
+
+
+def _pictures_s(records: int, outputs: int) -> float:
+    """Processor seconds of a gallery of all models, and of each model by itself."""
+    return PICTURE_S * 2.0 * min(records, DRAWN) * outputs
 
 
 def slowness() -> float:

@@ -79,6 +79,7 @@ class Plan:
         tolerance: As for :func:`ranked_by`.
         ended: Why it ended, once it has.
         left_out: Linear structures for which there was no time beside the others.
+        hurried: Whether nothing usable had come in the time, and the least was tried even so.
     """
 
     looked: Looked
@@ -91,6 +92,7 @@ class Plan:
     tolerance: float | None = None
     ended: str = ""
     left_out: list[str] = field(default_factory=list)
+    hurried: bool = False
     trials: list[Trial] = field(default_factory=list)
     _tries: list[Try] = field(default_factory=list)
     _seen: set[str] = field(default_factory=set)
@@ -175,9 +177,19 @@ class Plan:
 
     def _all_rounds(self) -> Iterator[list[Try]]:
         yield from self._search()
+        yield from self._whatever_the_time()
         self.budget.kept = 0.0
         yield from self._finals()
         yield from self._ensembles()
+
+    def _whatever_the_time(self) -> Iterator[list[Try]]:
+        """Where nothing usable has come in the time, the least linear structures one by one, until one is."""
+        for one in self._least(linear=True):
+            if math.isfinite(self.least()):
+                return
+            if self._possible(one) and all(one.structure != tried.structure for tried in self._tries):
+                self.budget.forced, self.hurried = True, True
+                yield [one]
 
     def _finals(self) -> Iterator[list[Try]]:
         """The best nonlinear models once more, from other starts."""

@@ -12,9 +12,9 @@ from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, AbstractStructure
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget
+from sysid.workbench.auto.budget import FINAL, GOING_ON, MOST_KEPT, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
-from sysid.workbench.auto.finish import finish_s
+from sysid.workbench.auto.finish import finish_s, span
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
 from sysid.workbench.auto.plan import AGAIN, Plan, Rank, ranked_by
@@ -41,6 +41,10 @@ BUSY = 1.5
 LAST_FITS, LINEAR_LAST, RIPENING = 0.9, 0.25, 3
 """Share of the time that is left which the last fits may train, as they do more than that; of it, that of the best
 linear model; and iterations of a network below which it is not begun."""
+HURRIED = "The time was up before structures were compared"
+"""How it is said that a search was none."""
+LEAST_SHARE = 0.1
+"""Share of the time of a search in which trials can be made at least."""
 CHECKED = 50
 """Sequences over which a trial's free run is checked, or one for each second of the search where that is more: all of
 them took longer than the training of a short search. The last fit is checked over all."""
@@ -275,6 +279,7 @@ class Search:
             slowed=1.0 if self.config.wall_s is None else plan.budget.slowed,
             told=(
                 *self.parts.told,
+                *_hurried(plan, choice.chosen, clock.total),
                 *_busy(plan),
                 *_left_out(plan),
                 *(f"Look at the data: {one}" for one in self.looked.cautions),
@@ -314,6 +319,21 @@ class Search:
             winner=choice.chosen.number,
             trials=list(plan.trials),
         )
+
+
+def _hurried(plan: Plan, chosen: Trial, spent_s: float) -> list[str]:
+    """That the time was up before there was anything to compare, and about how long a search takes."""
+    if not plan.hurried:
+        return []
+    wall_s = plan.budget.wall_s
+    if wall_s is None:
+        return [f"The budget was spent before structures were compared: {chosen.label} is the least that there is."]
+    need = max(2.0 * wall_s, spent_s / max(1.0 - MOST_KEPT - plan.budget.refit, LEAST_SHARE))
+    return [
+        f"{HURRIED}: {chosen.label} is the least that there is, fitted once, "
+        f"whatever it is worth. Of {span(wall_s)}, looking at the record and one fit took {span(spent_s)}, and scores, "
+        f"export and report are still to come; a search that compares takes {span(need)} at least."
+    ]
 
 
 def _busy(plan: Plan) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -10,15 +11,18 @@ import typer
 commands = typer.Typer()
 
 Ranges = Annotated[
-    list[str] | None, typer.Option("--range", metavar="NAME=LOW:HIGH", help="Of an input of the FMU; repeated.")
+    list[str] | None,
+    typer.Option("--range", metavar="NAME=LOW:HIGH", help="Of an input, 'valve [V]=0:10' with its unit; repeated."),
 ]
 Parameters = Annotated[
     list[str] | None,
     typer.Option(metavar="NAME=LOW:HIGH", help="A parameter that varies, an input of the surrogate; repeated."),
 ]
-Outputs = Annotated[list[str] | None, typer.Option(metavar="NAME", help="An output; all by default; repeated.")]
-SampleTime = Annotated[float | None, typer.Option(help="Seconds; as the FMU says by default.")]
-Duration = Annotated[float | None, typer.Option(help="Seconds an experiment; as the FMU says by default.")]
+Outputs = Annotated[
+    list[str] | None, typer.Option(metavar="NAME", help="An output; all of an FMU by default; repeated.")
+]
+SampleTime = Annotated[float | None, typer.Option(help="Seconds; as an FMU says by default.")]
+Duration = Annotated[float | None, typer.Option(help="Seconds an experiment; as an FMU says by default.")]
 
 
 @commands.command(
@@ -26,7 +30,11 @@ Duration = Annotated[float | None, typer.Option(help="Seconds an experiment; as 
 )
 def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the command line
     source: Annotated[
-        str, typer.Argument(help="An FMU, or a pipeline of kind experiment. It is code, and is run with your rights.")
+        str,
+        typer.Argument(
+            help="An FMU, file.py:function, 'a command line with {inputs} and {outputs}', a YAML that has one of these "
+            "under reference, or a pipeline of kind experiment. It is code, and is run with your rights."
+        ),
     ],
     minutes: Annotated[float, typer.Option(min=0.1, help="Time for experiments, search and proof together.")] = 60.0,
     span: Ranges = None,
@@ -40,9 +48,7 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
     rounds: Annotated[
         int | None, typer.Option(min=1, help="Rounds of experiments that are added where the surrogate is worst.")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes; as the pipeline says, and of an FMU two, by default.")
-    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as the pipeline says, two by default.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/surrogate-<name> by default.")] = None,
     no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
@@ -51,6 +57,7 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
 
     What was killed goes on where it was.
     """
+    began = time.monotonic()  # what is imported counts
     from sysid.workbench.commands.surrogate import surrogate_command, wish_of
 
     wish = wish_of(span or [], parameter or [], output or [], sample_time=sample_time, duration=duration)
@@ -65,6 +72,7 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
             seed=seed,
             out=out,
             tracking=not no_tracking,
+            began=began,
         )
     )
 
@@ -73,7 +81,11 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
 def init(  # noqa: PLR0917 - one parameter an option, by name on the command line
     folder: Annotated[Path, typer.Argument(help="Folder to make.")],
     reference: Annotated[
-        Path | None, typer.Option(help="An FMU: the workspace has a pipeline of experiments on it. Nothing is run.")
+        str | None,
+        typer.Option(
+            help="A slow model, as sysid surrogate takes it: the workspace has a pipeline of experiments on it. "
+            "Nothing is run."
+        ),
     ] = None,
     span: Ranges = None,
     parameter: Parameters = None,

@@ -5,21 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.references.described import Wish
+from sysid.references.sources import source_of
 from sysid.workbench.commands.surrogate import no_options
 from sysid.workbench.runner.console import console
 from sysid.workbench.workspace import make_workspace
 
 
-def init_command(folder: Path, *, reference: Path | None, wish: Wish) -> None:
+def init_command(folder: Path, *, reference: str | None, wish: Wish) -> None:
     """Make a workspace and say what to do next.
 
     Args:
         folder: Where.
-        reference: An FMU that the workspace is for. It is read, not run.
-        wish: What is said beside its description.
+        reference: A slow model that the workspace is for, as :func:`~sysid.references.sources.source_of` takes it. It
+            is read, not run.
+        wish: What is said beside it.
 
     Raises:
-        ConfigError: If one is there already, the folder cannot be written to, or the FMU does not say enough.
+        ConfigError: If one is there already, the folder cannot be written to, or something is not said.
     """
     target = console()
     if reference is None:
@@ -28,7 +30,7 @@ def init_command(folder: Path, *, reference: Path | None, wish: Wish) -> None:
     else:
         from sysid.workbench.surrogates.begun import make_reference_workspace
 
-        files, name, notes = make_reference_workspace(folder, reference, wish)
+        files, name, notes = make_reference_workspace(folder, source_of(reference), wish)
         commands = [f"sysid run {name} --dry-run", f"sysid surrogate {name} --minutes 60"]
         for note in notes:
             target.print(note, soft_wrap=True, markup=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,34 +10,37 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.names import slug
 from sysid.references.described import Wish
+from sysid.references.sources import TABLES, source_of
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.listeners import Listeners
 from sysid.workbench.runner.program import Program, carry_out
 from sysid.workbench.surrogates.make import make_surrogate
-from sysid.workbench.surrogates.plan import pairs, written
+from sysid.workbench.surrogates.plan import named, pairs, written
+from sysid.yaml_files import read_yaml
 
 
 def wish_of(ranges: Sequence[str], parameters: Sequence[str], outputs: Sequence[str], **times: float | None) -> Wish:
-    """What was typed beside an FMU."""
+    """What was typed beside a reference."""
+    inputs, varied, given = pairs(ranges, "--range"), pairs(parameters, "--parameter"), dict(map(named, outputs))
+    units = {**given, **{name: unit for name, (_, unit) in (*inputs.items(), *varied.items())}}
     return Wish(
-        ranges=pairs(ranges, "--range"), parameters=pairs(parameters, "--parameter"), outputs=tuple(outputs), **times
-    )
-
-
-FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
-"""A Python function, which is named in a pipeline and not here."""
-
-
-def _is_fmu(source: str) -> bool:
-    """Whether a source is taken for an FMU: whoever reads it refuses what is none, and says what to do."""
-    file = Path(source)
-    return bool(FUNCTION.fullmatch(source)) or file.suffix.lower() == ".fmu" or (
-        file.is_file() and file.suffix.lower() not in {".yaml", ".yml"}
+        ranges={name: span for name, (span, _) in inputs.items()},
+        parameters={name: span for name, (span, _) in varied.items()},
+        outputs=tuple(given), units={name: unit for name, unit in units.items() if unit}, **times,
     )  # fmt: skip
 
 
+def _pipeline_of(source: str) -> Path | None:
+    """The pipeline that a source names; nothing where that is a reference, or a file that says less than a pipeline."""
+    file = Path(source)
+    if file.suffix.lower() in TABLES and file.is_file():
+        return file if "kind" in read_yaml(file) else None
+    words = len(source.split()) > 1 or ":" in source or file.suffix.lower() in {".fmu", ".py"}
+    return None if words or file.is_file() else find_pipeline(source)
+
+
 def no_options(wish: Wish, where: str, what: str) -> None:
-    """Refuse what is said beside an FMU where there is none: it would be passed over.
+    """Refuse what is said beside a reference where there is none: it would be passed over.
 
     Args:
         wish: What was typed.
@@ -53,27 +56,29 @@ def no_options(wish: Wish, where: str, what: str) -> None:
     }  # fmt: skip
     if given := [flag for flag, value in said.items() if value]:
         raise ConfigError(
-            what, where=where, expected="such options beside an FMU alone", got=", ".join(given),
+            what, where=where, expected="such options beside a reference alone", got=", ".join(given),
             remedy="leave them out; a pipeline of kind experiment has them as fields",
         )  # fmt: skip
 
 
 def surrogate_command(
     source: str, wish: Wish, *, minutes: float, proof: int | None, rounds: int | None, workers: int | None, seed: int,
-    out: Path | None, tracking: bool,
+    out: Path | None, tracking: bool, began: float,
 ) -> int:  # fmt: skip
     """Make a surrogate and say how it does.
 
     Args:
-        source: An FMU, or a pipeline of kind ``experiment``. **It is code, and is run.**
-        wish: What is said beside an FMU.
+        source: A reference, as :func:`~sysid.references.sources.source_of` takes it, or a pipeline of kind
+            ``experiment``. **It is code, and is run.**
+        wish: What is said beside a reference.
         minutes: Time for all.
         proof: New experiments.
         rounds: Rounds of added experiments, in place of those of the pipeline.
-        workers: Processes; as the pipeline says, and of an FMU two, by default.
+        workers: Processes; as the pipeline says, and two of a reference, by default.
         seed: Of everything random.
         out: Folder of the results.
         tracking: Whether fits are tracked.
+        began: When the time began, by ``time.monotonic``.
 
     Returns:
         Exit code.
@@ -81,17 +86,18 @@ def surrogate_command(
     Raises:
         UserError: If the reference cannot be used, or does not say enough.
     """
-    fmu = _is_fmu(source)
-    if not fmu:
+    pipeline, notes = _pipeline_of(source), list[str]()
+    reference = None if pipeline is not None else source_of(source)
+    if reference is None:
         no_options(wish, source, "a pipeline says its ports and times itself")
-    folder = out or Path("runs") / f"surrogate-{slug(Path(source).stem)}"
+    folder = out or Path("runs") / f"surrogate-{slug(Path(source).stem if reference is None else reference.name)}"
     listeners = Listeners.of(tracking=tracking)
-    target, command = listeners.target, f"sysid surrogate {source} --minutes {minutes:g}"
+    target, command = listeners.target, f"sysid surrogate {shlex.quote(source)} --minutes {minutes:g}"
     target.print(f"{source} is code and is run with your rights.", soft_wrap=True, markup=False)
-    pipeline, notes = find_pipeline(source) if not fmu else Path(source), list[str]()
-    if fmu:
-        pipeline, notes = written(Path(source), wish, folder, minutes=minutes, workers=workers or 2, seed=seed)
+    if reference is not None:
+        pipeline, notes = written(reference, wish, folder, minutes=minutes, workers=workers or 2, seed=seed)
         target.print(f"Proposed: {pipeline}; change it and run this again to have it otherwise.", soft_wrap=True)
+    assert pipeline is not None  # noqa: S101 - found, or written now
     for note in notes:
         target.print(f"  {note}", soft_wrap=True, markup=False)
 
@@ -101,7 +107,7 @@ def surrogate_command(
     try:
         made = make_surrogate(
             pipeline, folder, perform=perform, minutes=minutes, proof=proof, rounds=rounds, workers=workers,
-            seed=seed, say=lambda text: target.print(text, markup=False, soft_wrap=True),
+            seed=seed, began=began, say=lambda text: target.print(text, markup=False, soft_wrap=True),
         )  # fmt: skip
     finally:
         listeners.screen.close()

@@ -30,11 +30,12 @@ from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import finish_s, span
+from sysid.workbench.auto.finish import finish_s, page_s, slowness, span
 from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import MOVED, in_motion, span_of
 from sysid.workbench.auto.run import Searched, auto_of
 from sysid.workbench.auto.run import program_of as search_program
+from sysid.workbench.auto.search import HURRIED
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
 from sysid.workbench.experiments.run import DATASET, Experimented, Experiments
 from sysid.workbench.experiments.run import program_of as experiment_program
@@ -53,6 +54,8 @@ from sysid.yaml_files import read_yaml
 T = TypeVar("T")
 Perform = Callable[[Program[Any], Path], Any]
 """Carries a program out in a folder, and gives its results."""
+OVERRUN = 0.05
+"""Share of the time by which it is exceeded without a word."""
 RUNS_MOST = 1.0 - SEARCHING
 """Share of the time beyond which it is told before, how long the experiments take."""
 GROWING = 0.25
@@ -97,6 +100,7 @@ def make_surrogate(
     rounds: int | None = None,
     workers: int | None = None,
     seed: int = 0,
+    began: float | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Made:
     """Run experiments, find a model of them, or fit the given ones, export it with the reference's ports, and prove it.
@@ -111,6 +115,7 @@ def make_surrogate(
         rounds: Rounds of added experiments, in place of those of the pipeline.
         workers: Processes, in place of those of the pipeline.
         seed: Of the search.
+        began: When the time began, by ``time.monotonic``; now by default.
         say: Told what makes a surrogate wrong, and how the proof goes.
 
     Returns:
@@ -141,7 +146,7 @@ def make_surrogate(
                 "experiments grow around what a search has chosen", where=pipeline, expected="rounds, or fits",
                 got="both", remedy="leave rounds out, or the fits of the pipeline",
             )  # fmt: skip
-    began = time.monotonic()
+    began = time.monotonic() if began is None else began
     if (first := first_look(Experiments(config=config, reference=reference), minutes=minutes)) is not None:
         say(first)
     found = work.experimented()
@@ -158,7 +163,7 @@ def make_surrogate(
     seconds_left = _kept(folder / TIMES, plan.search) - (0.0 if growth is None else GROWING * plan.whole)
     proving = _Proving(
         reference=reference, design=config.experiment, taught=found.traces, count=count, workers=config.workers,
-        until=inf if proof or iterations else began + plan.whole - plan.finish, say=say,
+        ends=inf if proof or iterations else began + plan.whole, say=say,
     )  # fmt: skip
     place = folder / "model"
     if config.fits:
@@ -166,6 +171,7 @@ def make_surrogate(
     else:
         before_page = partial(proving, place) if growth is None else None
         searched = work.searched(found, seconds_left / 60.0, before_page)
+        notes += [one for one in searched.told if one.startswith(HURRIED)]
         if growth is not None:
             ground = Ground(config=config, reference=reference, found=found, folder=folder)
             seconds = None if iterations else GROWING * 60.0 * minutes
@@ -179,9 +185,7 @@ def make_surrogate(
         page = write_report(place)
     if fmu is not None:
         fmu = Path(shutil.copyfile(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu"))
-    if (run := len(shown.errors) + shown.failed) < PROOF:
-        why = f", not of {count:,}, as the time was up" if run < count else ""
-        notes.append(f"the proof is of {run} experiments{why}; --proof 1000 makes it of 1,000")
+    notes += _short_of_time(shown, plan, count, took=time.monotonic() - began, asked=bool(proof or iterations))
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes)
 
 
@@ -214,7 +218,10 @@ class _Work:
         with ReferenceRuns(config=self.reference) as runs:
             each = runs.seconds_each()[0]
         each = self.reference.time_limit if each is None else max(each, 1e-3)
-        count = proof or int(np.clip(RUNNING * 60.0 * minutes * workers / each, FEWEST, PROOF))
+        # What is short of time is not the search first: a proof of fewer experiments says the same, less sharply.
+        left = (1.0 - SEARCHING) * 60.0 * minutes - spent - finish
+        seconds = min(RUNNING * 60.0 * minutes, max(left, 0.0))
+        count = proof or int(np.clip(seconds * workers / each, FEWEST, PROOF))
         found_out = times(each, minutes=minutes, spent=spent, experiments=count, workers=workers, finish=finish)
         return found_out, count
 
@@ -256,15 +263,16 @@ class _Proving:
     taught: TraceSet
     count: int
     workers: int
-    until: float
+    ends: float
     say: Callable[[str], None]
     done: dict[Path, Proof] = field(default_factory=dict)
 
     def __call__(self, place: Path) -> Proof:
-        """Prove the bundle in a folder."""
+        """Prove the bundle in a folder; what time the page takes, which comes after it, is seen now."""
+        until = self.ends - page_s(len(self.taught), len(self.reference.outputs)) if np.isfinite(self.ends) else inf
         proof, section = prove(
             read_bundle(place / "bundle"), self.reference, self.design, self.taught, count=self.count,
-            workers=self.workers, tolerance=TOLERANCE, until=self.until, progress=self._progress,
+            workers=self.workers, tolerance=TOLERANCE, until=until, progress=self._progress,
         )  # fmt: skip
         (place / FOLDER).mkdir(exist_ok=True)
         write_record(place / FOLDER / "proof.json", section)
@@ -321,6 +329,20 @@ def first_look(experiments: Experiments, *, minutes: float) -> str | None:
         f"Time: {left} experiments are to be run, about {span(seconds)} of the {span(60.0 * minutes)} that were "
         f"asked for, as one takes {each:.3g} s{failed}. Fewer runs take less, and a shorter time_limit where they hang."
     )
+
+
+def _short_of_time(shown: Proof, plan: Times, count: int, *, took: float, asked: bool) -> list[str]:
+    """What was left out for want of time, and how much longer it took; nothing where what is done was asked for."""
+    notes, run = [], len(shown.errors) + shown.failed
+    if run < PROOF:
+        why = f", not of {count:,}, as the time was up" if run < count else ""
+        notes.append(f"the proof is of {run} experiments{why}; --proof 1000 makes it of 1,000")
+    if took > (1.0 + OVERRUN) * plan.whole and not asked:
+        notes.append(
+            f"it took {span(took)}, {span(took - plan.whole)} more than was asked for: experiments, a few fits, export "
+            f"and report come to that here, where a second of work takes {slowness():.2g} s"
+        )
+    return notes
 
 
 def _failed(found: Experimented) -> list[str]:

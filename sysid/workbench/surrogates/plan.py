@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from sysid.errors import ConfigError
 from sysid.field_checks import check
+from sysid.ingest.headers import parse_header
+from sysid.names import slug
 from sysid.references.config import ReferenceConfig
-from sysid.references.described import Wish, proposed
+from sysid.references.described import Wish
 from sysid.references.design import Counts, Design, drawn
+from sysid.references.proposal import proposed
 from sysid.references.runs import ReferenceRuns
+from sysid.references.sources import Source
+from sysid.references.told import reasons_of
 from sysid.workbench.auto.finish import span
 from sysid.workbench.auto.parts import SEARCHED
 from sysid.workbench.experiments.config import ExperimentConfig
@@ -24,6 +30,8 @@ RUNNING = 0.2
 """Share of the time in which the reference is run for data; as much again for the proof."""
 SEARCHING = 0.4
 """Share of the time in which a model is looked for at least, whatever the rest takes."""
+TRIES = 3
+"""Experiments that are run before any is asked for, at most: one, where that gives a record."""
 KNOWN = """\
 # A search finds smooth maps, and a model that jumps at events (a velocity that flips, a state that is reset) is none.
 # Where you know what happens, write it, and it is fitted in place of the search (docs/how/events.md):
@@ -43,12 +51,14 @@ FEWEST, ENOUGH, MOST = 8, 12, 60
 make its trials slow; rounds of growth add what is missing."""
 
 
-def written(fmu: Path, wish: Wish, folder: Path, *, minutes: float, workers: int, seed: int) -> tuple[Path, list[str]]:
-    """The pipeline of an FMU, written; one that is there already is left as it is.
+def written(
+    source: Source, wish: Wish, folder: Path, *, minutes: float, workers: int, seed: int
+) -> tuple[Path, list[str]]:
+    """The pipeline of a reference, written; one that is there already is left as it is.
 
     Args:
-        fmu: The reference. **Its code is run once**, to see how long that takes.
-        wish: What is said beside its description.
+        source: The reference. **Its code is run once**, to see how long that takes.
+        wish: What is said beside it.
         folder: Where.
         minutes: Time for all.
         workers: Processes.
@@ -58,48 +68,50 @@ def written(fmu: Path, wish: Wish, folder: Path, *, minutes: float, workers: int
         The file, and what was taken from where.
 
     Raises:
-        ConfigError: If the description does not say enough, or the reference cannot be run.
+        ConfigError: If something is not said, or the reference cannot be run.
     """
     file = folder / "experiment.yaml"
     if file.is_file():
         return file, [f"{file} is there already and is taken as it is"]
-    fields, duration, notes = proposed(fmu, wish)
-    reference = check(ReferenceConfig, fields, where=fmu)
-    runs = affordable(reference, Design(duration=duration, seed=seed), minutes=minutes, workers=workers)
-    experiment = {"duration": duration, "runs": runs.model_dump(), "seed": seed}
-    text = _text(fmu, f"{fmu.stem}-runs", fields, experiment, workers=workers, notes=notes)
-    write_bytes(file, text.encode())
-    return file, notes
+    found = proposed(source, wish)
+    content: dict[str, Any] = {"name": f"{slug(source.name)}-runs", "workers": workers, **found.content}
+    content["experiment"] = {"seed": seed, **content["experiment"]}
+    config = check(ExperimentConfig, content, where=source.file)
+    if "runs" not in content["experiment"]:
+        runs = affordable(config.reference, config.experiment, minutes=minutes, workers=workers)
+        content["experiment"]["runs"] = runs.model_dump()
+    write_bytes(file, _text(source, content, found.notes).encode())
+    return file, list(found.notes)
 
 
-def text_of(fmu: Path, wish: Wish, *, written_as: str, name: str) -> tuple[str, list[str]]:
-    """The pipeline of an FMU as text, with as many experiments as usual; nothing is run.
+def text_of(source: Source, wish: Wish, *, name: str, places: Mapping[str, str]) -> tuple[str, list[str]]:
+    """The pipeline of a reference as text, with as many experiments as usual; nothing is run.
 
     Args:
-        fmu: The reference.
-        wish: What is said beside its description.
-        written_as: Its path in the pipeline.
+        source: The reference.
+        wish: What is said beside it.
         name: Of the pipeline.
+        places: Fields of the reference that are written otherwise: its folder, or its FMU, seen from the pipeline.
 
     Returns:
         The text, and what was taken from where.
 
     Raises:
-        ConfigError: If the description does not say enough.
+        ConfigError: If something is not said.
     """
-    fields, duration, notes = proposed(fmu, wish)
-    return _text(fmu, name, {**fields, "fmu": written_as}, {"duration": duration}, workers=2, notes=notes), notes
+    found = proposed(source, wish)
+    content = {"workers": 2, **found.content, "name": name}
+    check(ExperimentConfig, content, where=source.file)
+    content["reference"] = {**content["reference"], **places}
+    return _text(source, content, found.notes), list(found.notes)
 
 
-def _text(
-    fmu: Path, name: str, reference: dict[str, Any], experiment: dict[str, Any], *, workers: int, notes: Sequence[str]
-) -> str:
-    content: dict[str, Any] = {
-        **{"kind": "experiment", "name": name, "reference": reference, "experiment": experiment}, "workers": workers,
-    }  # fmt: skip
-    check(ExperimentConfig, content, where=fmu)
+def _text(source: Source, content: Mapping[str, Any], notes: Sequence[str]) -> str:
+    first = ("kind", "name", "description", "reference", "experiment", "workers")
+    ordered = {name: content[name] for name in (*first, *content) if name in content}
     told = "".join(f"# {one}\n" for one in notes)
-    return f"# Proposed for {fmu.name}. An FMU is code, and is run.\n{told}{yaml_text(content)}{KNOWN}"
+    head = f"# Proposed for {source.text}. It is code, and is run.\n{told}"
+    return f"{head}{yaml_text(ordered)}{'' if 'fits' in content else KNOWN}"
 
 
 def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, workers: int) -> Counts:
@@ -113,10 +125,22 @@ def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, wo
 
     Returns:
         By role.
+
+    Raises:
+        ConfigError: If none of :data:`TRIES` experiments gives a record.
     """
-    (case,) = drawn(reference, design, 1, seed=(design.seed, 9), prefix="TRY")
-    with ReferenceRuns(config=reference, workers=1) as runs:
-        (one,) = runs.run([case])
+    cases = drawn(reference, design, TRIES, seed=(design.seed, 9), prefix="TRY")
+    with ReferenceRuns(config=reference, workers=TRIES) as runs:
+        (one,) = runs.run(cases[:1])
+        # Of one that fails nobody knows whether it always does; one that hangs is not waited for one after the other.
+        more = runs.run(cases[1:]) if one.trace is None else []
+    if one.trace is None and all(other.trace is None for other in more):
+        raise ConfigError(
+            f"the reference gave no record of {TRIES} experiments", where=reference.kind,
+            expected="outputs of experiments within the ranges", got=reasons_of([one, *more]),
+            remedy="run the reference by itself with such inputs first; nothing was written",
+        )  # fmt: skip
+    one = next(one for one in (one, *more) if one.trace is not None)
     each = one.wall_s if np.isfinite(one.wall_s) else reference.time_limit
     most = int(np.clip(SEARCHED * reference.sample_time / design.duration, ENOUGH, MOST))
     count = int(np.clip(RUNNING * 60.0 * minutes * workers / max(each, 1e-3) / 1.5, FEWEST, most))
@@ -190,36 +214,55 @@ def times(each: float, *, minutes: float, spent: float, experiments: int, worker
     return Times(whole=60.0 * minutes, spent=spent, proof=experiments * each / workers, finish=finish)
 
 
-def pairs(options: Sequence[str], flag: str) -> dict[str, tuple[float, float]]:
-    """Ranges as they are typed, ``NAME=LOW:HIGH``.
+def pairs(options: Sequence[str], flag: str) -> dict[str, tuple[tuple[float, float], dict[str, str]]]:
+    """Ranges as they are typed, ``NAME=LOW:HIGH`` or ``NAME [UNIT]=LOW:HIGH``.
 
     Args:
         options: As typed.
         flag: For errors.
 
     Returns:
-        By name.
+        By name the range, and what is said of the unit.
 
     Raises:
         ConfigError: If one is not of that form.
 
     Example:
-        >>> pairs(["u=0:10"], "--range")
-        {'u': (0.0, 10.0)}
+        >>> pairs(["u=0:10", "p [bar gauge]=0:5"], "--range")
+        {'u': ((0.0, 10.0), {}), 'p': ((0.0, 5.0), {'unit': 'bar', 'reference': 'gauge'})}
     """
-    from sysid.errors import ConfigError
-
     found = {}
     for text in options:
-        name, _, span = text.rpartition("=")
+        head, _, span = text.rpartition("=")
         try:
             low, high = (float(part) for part in span.split(":"))
         except ValueError:
-            name = ""
-        if not name or not low < high:
+            head = ""
+        if not head or not low < high:
             raise ConfigError(
                 f"{flag} is not a range", where="the command line", expected="NAME=LOW:HIGH, as valve=0:10", got=text,
                 remedy="write the name, and two rising numbers",
             )  # fmt: skip
-        found[name] = (low, high)
+        name, unit = named(head)
+        found[name] = (low, high), unit
     return found
+
+
+def named(text: str) -> tuple[str, dict[str, str]]:
+    """A port as it is typed, ``NAME`` or ``NAME [UNIT]``, as in the header of a table.
+
+    Args:
+        text: As typed.
+
+    Returns:
+        Its name, and what is said of its unit.
+
+    Example:
+        >>> named("position [mm]"), named("x[3]")
+        (('position', {'unit': 'mm'}), ('x[3]', {}))
+    """
+    if not text.endswith("]") or " [" not in text:
+        return text, {}
+    header = parse_header(text)
+    told = {"unit": header.unit, "reference": None if header.reference is None else header.reference.value}
+    return header.name, {name: value for name, value in told.items() if value}

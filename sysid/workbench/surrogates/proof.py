@@ -170,7 +170,8 @@ def prove(
         count: How many.
         workers: Processes.
         tolerance: Share of the range.
-        until: The time of ``time.monotonic`` after which no run is begun any more, but for the first :data:`FEWEST`.
+        until: The time of ``time.monotonic`` by which reference and surrogate have been run; the first
+            :data:`FEWEST` are whatever the time.
         progress: Told of each run.
 
     Returns:
@@ -181,7 +182,7 @@ def prove(
     """
     cases = drawn(config, design, count, seed=(design.seed, SEED), prefix="N")
     with ReferenceRuns(config=config, workers=workers) as runs:
-        done = runs.run(cases, progress, until=until, fewest=FEWEST)
+        done = runs.run(cases, progress, until=_begun_until(until, bundle, runs, cases[0]), fewest=FEWEST)
     there = [one for one in done if one.trace is not None]
     if not there:
         raise ConfigError(
@@ -191,7 +192,7 @@ def prove(
     outputs = tuple(config.outputs)
     spans = np.ptp(np.concatenate([trace.columns(outputs) for trace in taught]), axis=0)
     spans = np.where(spans > 0.0, spans, 1.0)
-    began, runs_of = time.process_time(), [_run(bundle, config, one) for one in there]
+    began, runs_of = time.process_time(), [_run(bundle, config, one.case) for one in there]
     spent = (time.process_time() - began) / len(there)
     errors, largest = [], []
     for one, found in zip(there, runs_of, strict=True):
@@ -206,6 +207,18 @@ def prove(
         reference_s=float(np.nanmean([one.cpu_s for one in there])), **dropped,
     )  # fmt: skip
     return proof, proof.record([runs_of[k] for k in proof.worst])
+
+
+def _begun_until(until: float, bundle: Bundle, runs: ReferenceRuns, case: Case) -> float:
+    """When the last run of the reference is begun, so that the surrogate's runs after them are over in time too."""
+    if not np.isfinite(until):
+        return until
+    _run(bundle, runs.config, case)  # what is loaded and compiled for the first run is not for each
+    began = time.monotonic()
+    _run(bundle, runs.config, case)
+    now, each = time.monotonic(), runs.seconds_each()[0]
+    beside = 0.0 if each is None else (time.monotonic() - began) * runs.workers / max(each, 1e-6)
+    return now + (until - now) / (1.0 + beside)
 
 
 def _shares(
@@ -244,12 +257,12 @@ def surrogate_inputs(config: ReferenceConfig, case: Case) -> NDArray[np.float64]
     return np.hstack([case.inputs, *(np.full((len(case.inputs), 1), case.parameters[n]) for n in config.parameters)])
 
 
-def _run(bundle: Bundle, config: ReferenceConfig, one: Outcome) -> NDArray[np.float64]:
+def _run(bundle: Bundle, config: ReferenceConfig, case: Case) -> NDArray[np.float64]:
     """The surrogate's free run, from its declared levels, a column an output of the reference."""
     names = [*config.inputs, *config.parameters]
-    columns = dict(zip(names, surrogate_inputs(config, one.case).T, strict=True))
+    columns = dict(zip(names, surrogate_inputs(config, case).T, strict=True))
     with np.errstate(all="ignore"):
-        found = np.asarray(bundle.simulate(columns, warn=False)).reshape(len(one.case.inputs), -1)
+        found = np.asarray(bundle.simulate(columns, warn=False)).reshape(len(case.inputs), -1)
     order = [str(entry["name"]) for entry in bundle.outputs]
     return found[:, [order.index(name) for name in config.outputs]]
 

@@ -95,6 +95,14 @@ def test_limits_count_processor_time_and_a_slow_machine_has_room_for_fewer_trial
     assert budget(None, iterations=10).has_room(1e9)
 
 
+def test_scores_export_and_report_are_not_limited_as_trials_are_and_take_as_long_as_the_machine_makes_them() -> None:
+    found = budget(1000.0, finishing_s=20.0)
+    found.take([point(1, 4)])
+    found.tell([trial(point(1, 4), 1.0).model_copy(update={"seconds": 80.0, "cpu_s": 8.0})])
+    assert found.slowed == SLOWEST
+    assert found.ends_s == 1000.0 - (10.0 * 20.0 - 0.05 * 1000.0)
+
+
 def test_scores_export_and_report_are_over_in_time_too() -> None:
     """On a busy machine they take longer: trials and the last fit end sooner."""
     clock = [0.0]

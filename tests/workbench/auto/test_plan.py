@@ -103,6 +103,17 @@ def test_a_slow_machine_tries_a_nonlinear_model_a_worker_where_that_leaves_time_
     assert [linear(point) for point in plan.ask()] == [False] * some
 
 
+def test_the_least_linear_structures_are_tried_whatever_the_time_until_one_can_be_used() -> None:
+    budget = Budget(wall_s=1.0, iterations=None, clock=lambda: 1000.0, is_stored=lambda _: False)
+    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    tried: list[str] = []
+    while points := plan.ask():
+        tried += [point.structure.kind for point in points]
+        plan.tell([trial(point, 1.0 if len(tried) == 2 else math.inf) for point in points])
+    assert tried == ["ARX", "TransferFunction"]
+    assert plan.hurried
+
+
 def test_curves_and_polynomials_are_tried_beside_networks() -> None:
     _, rounds = searched(lambda _: 1.0)
     # The least of each kind tells what the others of it cost.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,8 +17,10 @@ from sysid.export import Bundle
 from sysid.field_checks import check
 from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
-from sysid.references.described import Wish, proposed
+from sysid.references.described import Wish
 from sysid.references.design import Design, designed
+from sysid.references.proposal import proposed
+from sysid.references.sources import source_of
 from sysid.reporting import report
 from sysid.reporting.judging.results import JudgementRecord
 from sysid.reporting.report import write_report
@@ -26,8 +30,9 @@ from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.experiments.run import Experimented, Experiments
 from sysid.workbench.surrogates import make
 from sysid.workbench.surrogates.make import beginning_of, restless
-from sysid.workbench.surrogates.plan import pairs, times
-from sysid.workbench.surrogates.proof import Proof, fmu_of, prove
+from sysid.workbench.surrogates.plan import pairs, times, written
+from sysid.workbench.surrogates.proof import Proof, _begun_until, fmu_of, prove
+from sysid.yaml_files import read_yaml
 
 pytest.importorskip("fmpy")
 MODELS = Path(__file__).parents[2] / "references"
@@ -77,10 +82,10 @@ def test_what_an_fmu_does_not_say_is_asked_for_by_its_option(proven: tuple[Bundl
     file = fmu_of(proven[0])
     assert file is not None
     wish = Wish(ranges={"u": (0.0, 2.0)}, parameters={}, outputs=("y",), sample_time=0.5, duration=40.0)
-    fields, duration, _ = proposed(file, wish)
-    assert (list(fields["inputs"]), fields["inputs"]["u"]["unit"], duration) == (["u"], "V", 40.0)
+    content = proposed(source_of(str(file)), wish).content
+    assert (content["reference"]["inputs"]["u"]["unit"], content["experiment"]) == ("V", {"duration": 40.0})
     with pytest.raises(ConfigError, match="does not say all") as caught:
-        proposed(file, Wish(ranges={}, parameters={}, outputs=("y",)))
+        proposed(source_of(str(file)), Wish(ranges={}, parameters={}, outputs=("y",)))
     assert "--range u=LOW:HIGH" in str(caught.value.remedy)
 
 
@@ -103,6 +108,30 @@ def test_a_workspace_that_begins_with_an_fmu_runs(
     assert run_cli(["run", pipeline.stem, "--dry-run"]) == 0
     assert "20 of 20 runs to make" in capsys.readouterr().out.replace("\n", " ")
     assert run_cli(begun) != 0
+
+
+def test_a_workspace_begins_with_a_function_or_a_program_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "lag.py").write_text("def lag(time, inputs, parameters):\n    return inputs[:, 0]\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    said = ["--range", "u [V]=0:2", "--output", "y [bar gauge]", "--sample-time", "0.5", "--duration", "40"]
+    for name, source in (("lag", "lag.py:lag"), ("python", "python -m lag {inputs} {outputs}")):
+        assert run_cli(["init", name, "--reference", source, *said]) == 0
+        pipeline = tmp_path / name / "pipelines" / f"{name}.yaml"
+        config = check(ExperimentConfig, read_yaml(pipeline), where=pipeline)
+        assert (config.reference.inputs["u"].unit, config.reference.outputs["y"].reference.value) == ("V", "gauge")
+        assert Path(config.reference.at(pipeline.parent).folder) == tmp_path
+
+
+def test_a_reference_that_never_gives_a_record_is_refused_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "bug.py").write_text("def bug(time, inputs, parameters):\n    return inputs[:, 3]\n", encoding="utf-8")
+    wish = Wish(ranges={"u": (0.0, 2.0)}, parameters={}, outputs=("y",), sample_time=0.5, duration=20.0)
+    with pytest.raises(ConfigError, match="gave no record of 3 experiments") as caught:
+        written(source_of(f"{tmp_path / 'bug.py'}:bug"), wish, tmp_path / "out", minutes=1.0, workers=1, seed=0)
+    assert "out of bounds for axis 1 with size 1 (bug.py, line 2) (3)" in str(caught.value.got)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_search_has_the_time_that_experiments_proof_and_report_leave_and_what_takes_longer_is_told() -> None:
@@ -153,6 +182,27 @@ def test_a_proof_ends_with_its_time_and_says_what_gave_no_record(
     assert f"of {proof.failed} more, where nobody knows how the surrogate does: it raised ValueError" in section.method
 
 
+def test_a_proof_leaves_time_for_the_runs_of_the_surrogate(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+
+    def run(*_: object) -> None:
+        clock[0] += 0.5
+
+    monkeypatch.setattr("sysid.workbench.surrogates.proof._run", run)
+    monkeypatch.setattr("sysid.workbench.surrogates.proof.time", SimpleNamespace(monotonic=lambda: clock[0]))
+    runs: Any = SimpleNamespace(config=None, workers=2, seconds_each=lambda: (1.0, ""))
+    # Two references a second, and half a second of each surrogate: as long for these as for those.
+    assert _begun_until(101.0, cast("Any", None), runs, cast("Any", None)) == 1.0 + 0.5 * 100.0
+
+
+def test_what_takes_longer_than_was_asked_for_is_told(proven: tuple[Bundle, Proof, JudgementRecord]) -> None:
+    plan = times(0.03, minutes=1.0, spent=5.0, experiments=40, workers=1, finish=30.0)
+    short, over = make._short_of_time(proven[1], plan, 40, took=90.0, asked=False)
+    assert "of 12 experiments, not of 40, as the time was up" in short
+    assert "it took 1.5 min, 30 s more than was asked for" in over
+    assert len(make._short_of_time(proven[1], plan, 40, took=90.0, asked=True)) == 1
+
+
 def test_what_experiments_take_is_told_before_they_are_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("SYSID_CACHE", str(tmp_path))
     content = {"kind": "experiment", "name": "lag", "workers": 1, "experiment": {**DESIGN, "excitations": ["events"]}}
@@ -176,9 +226,8 @@ def test_what_would_be_passed_over_is_refused(tmp_path: Path, capsys: pytest.Cap
     for words, said in (
         (["surrogate", str(tmp_path / "lag.yaml"), "--range", "u=0:1", "--duration", "5"], "--range, --duration"),
         (["init", str(tmp_path / "ws"), "--parameter", "m=0:1"], "--parameter"),
-        (["surrogate", str(tmp_path / "lag.py")], "named in a pipeline of kind experiment"),
-        (["surrogate", "lag:lag", "--range", "u=0:1"], "named in a pipeline of kind experiment"),
-        (["init", str(tmp_path / "ws"), "--reference", str(tmp_path / "lag.py")], "named in a pipeline of kind"),
+        (["surrogate", str(tmp_path / "lag.py")], "named without its function"),
+        (["init", str(tmp_path / "ws"), "--reference", str(tmp_path / "lag.py")], "named without its function"),
     ):
         assert run_cli(words) != 0
         assert said in " ".join(capsys.readouterr().err.split())
