@@ -424,4 +424,4 @@ def _counted(record: _Record) -> NDArray[np.int64]:
     """Rows that count for each target, shape ``(n_targets,)``."""
     if record.root_weights is None:
         return np.full(record.target.shape[1], len(record.rows), dtype=np.int64)
-    return np.count_nonzero(record.root_weights, axis=0).astype(np.int64)
+    return np.asarray(np.count_nonzero(record.root_weights, axis=0), dtype=np.int64)
