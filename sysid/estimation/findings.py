@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 OPEN = 0.5
 """Share of its prior's variance that a parameter keeps where the records do not determine it."""
 
+ROUNDING = 1e-14
+"""Curvature along a direction, with 1 along each parameter, that may be nothing."""
+
 ALL_BUT_NOTHING = 0.99
 """Share of a parameter's variance that its prior alone makes where the records say nothing of it."""
 
@@ -131,7 +134,8 @@ class Findings:
         rows = half[np.searchsorted(free, places[open_])]
         inner = rows @ rows.T
         vague = np.array([named[i].parameter.prior is None for i in open_], dtype=np.bool_)
-        lost = _lost(inner, prior.precision[places[open_]]) & vague
+        unseen = np.sum(rows[:, values < ROUNDING] ** 2, axis=1)
+        lost = _lost(inner, prior.precision[places[open_]], unseen) & vague
         inner[lost, :] = np.nan
         inner[:, lost] = np.nan
         covariance = np.full((len(named), len(named)), np.nan)
@@ -241,8 +245,10 @@ class Findings:
         return (*told, *_together([one.name for one in self.named], np.abs(correlation)))
 
 
-def _lost(covariance: Array, precision: Array) -> NDArray[np.bool_]:
+def _lost(covariance: Array, precision: Array, unseen: Array) -> NDArray[np.bool_]:
     """Which parameters the records leave open, by what is left of their prior.
+
+    ``unseen`` is the variance along directions whose curvature is nothing but rounding, which stands for the prior's.
 
     One that keeps most of its prior's variance is. Of five of which the records show three combinations, each may keep
     less: its deviation is its prior's all the same, and is told by no correlation with another one.
@@ -251,7 +257,7 @@ def _lost(covariance: Array, precision: Array) -> NDArray[np.bool_]:
     kept, directions = np.linalg.eigh(covariance * np.outer(root, root))
     left = np.diag(covariance) * precision
     lost: NDArray[np.bool_] = left > OPEN
-    from_prior = (directions[:, kept > OPEN] ** 2) @ kept[kept > OPEN]
+    from_prior = np.maximum((directions[:, kept > OPEN] ** 2) @ kept[kept > OPEN], unseen * precision)
     others = np.flatnonzero(~lost)
     deviations = np.sqrt(np.diag(covariance)[others])
     near = np.triu(np.abs(covariance[np.ix_(others, others)]) > TOGETHER * np.outer(deviations, deviations), 1)

@@ -14,7 +14,7 @@ def covariance(J: np.ndarray) -> np.ndarray:
 
 
 def lost(J: np.ndarray) -> np.ndarray:
-    return _lost(covariance(J), np.full(J.shape[1], FLAT))
+    return _lost(covariance(J), np.full(J.shape[1], FLAT), np.zeros(J.shape[1]))
 
 
 def told(J: np.ndarray) -> np.ndarray:
@@ -53,3 +53,13 @@ def test_a_product_of_two_is_no_loss_of_both_and_what_is_shown_is_none() -> None
 
 def test_one_that_has_no_effect_is_open_alone() -> None:
     assert lost(100.0 * np.array([[1.0, 0.0, 0.0], [0.2, 1.0, 0.0]])).tolist() == [False, False, True]
+
+
+def test_a_direction_that_is_rounding_is_open_however_far_from_the_prior() -> None:
+    # Four that hang together by two directions, whose variance rounding has kept far below that of the prior.
+    J = np.random.default_rng(0).standard_normal((2, 4))
+    null = np.linalg.svd(J)[2][2:]
+    C = 1e-6 * np.linalg.inv(J.T @ J + FLAT * np.eye(4))
+    unseen = np.diag(1e-6 / FLAT * null.T @ null)
+    assert not _lost(C, np.full(4, FLAT), np.zeros(4)).any()
+    assert _lost(C, np.full(4, FLAT), unseen).any()
