@@ -11,7 +11,7 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
-from sysid.models import LinearStateSpace
+from sysid.models import ARX, LinearStateSpace
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import LARGER, LINEAR, Budget, size_of
 from sysid.workbench.auto.families import FAMILIES, Family, Try, suggested
@@ -60,6 +60,10 @@ def ranked_by(error: Callable[[Trial], float], tolerance: float | None) -> Rank:
         return outside if usable else math.inf, error(trial), trial.number
 
     return rank
+
+
+TAPS = 10
+"""Past values of each input of a model that is taken for want of time."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -183,8 +187,13 @@ class Plan:
         yield from self._ensembles()
 
     def _whatever_the_time(self) -> Iterator[list[Try]]:
-        """Where nothing usable has come in the time, the least linear structures one by one, until one is."""
-        for one in self._least(linear=True):
+        """Where nothing usable has come in the time, the least linear structures one by one, until one is.
+
+        The second has no past outputs: it is stable whatever the record, and fitted in no time.
+        """
+        m, least = self.looked.n_inputs, self._least(linear=True)
+        stable = Try(structure=ARX(na=0, nb=(TAPS,) * m, nk=(0,) * m))
+        for one in (*least[:1], stable, *least[1:]):
             if math.isfinite(self.least()):
                 return
             if self._possible(one) and all(one.structure != tried.structure for tried in self._tries):

@@ -108,9 +108,9 @@ def test_the_least_linear_structures_are_tried_whatever_the_time_until_one_can_b
     plan = Plan(looked=LOOKED, budget=budget, error=error)
     tried: list[str] = []
     while points := plan.ask():
-        tried += [point.structure.kind for point in points]
+        tried += [point.structure.label for point in points]
         plan.tell([trial(point, 1.0 if len(tried) == 2 else math.inf) for point in points])
-    assert tried == ["ARX", "TransferFunction"]
+    assert tried == ["ARX [2; 2; 1]", "ARX [0; 10; 0]"]
     assert plan.hurried
 
 
