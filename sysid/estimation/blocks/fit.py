@@ -39,6 +39,9 @@ LINEAR = 0.2
 SMALLER = 0.3
 """Share of a fit's iterations and time for the structure with fewer states, and that of its starts' half."""
 
+OWN = 0.4
+"""Share of the time for the starts of the linear model among themselves, where there are those of fewer states too."""
+
 SLOWER = 2.0
 """How much slower than the slowest of the linear model the slowest pole is that is added."""
 
@@ -243,19 +246,22 @@ class _Race:
                 return own
             ways = _ways(records, structure, training, settles=True)
             more = _grown(found, smaller, structure, training, ways)
-        return cls.between(records, structure, training, ways, more=more, began=began)
+            own = cls.between(records, structure, training, ways, began=began)
+        # Among themselves first: early on a start at a minimum, the smaller one's, is ahead of any that will pass it.
+        shorter = replace(training, max_time_s=OWN * training.max_time_s)
+        begins = [_begun(replace(own, training=shorter, began=now()).run()[0]), *more]
+        return replace(own, training=replace(training, starts=len(begins)), begins=begins)
 
     @classmethod
     def between(
-        cls, records: _Records, structure: BlockStructure, training: Training, ways: _Ways, *,
-        more: Sequence[Begun] = (), began: float,
-    ) -> _Race:  # fmt: skip
-        """The race of some starts before those of the linear model."""
+        cls, records: _Records, structure: BlockStructure, training: Training, ways: _Ways, *, began: float
+    ) -> _Race:
+        """The race of the starts of the linear model."""
         return cls(
             template=records.template(structure, ways.greys[0]),
-            training=replace(training, starts=training.n_starts + len(more)),
+            training=training,
             data=(records.traces, (), records.start),
-            begins=[*more, *ways.begins],
+            begins=ways.begins,
             scattered=ways.scattered,
             began=began,
         )
@@ -287,6 +293,12 @@ def _cheaper(training: Training) -> Training:
         max_iterations=max(round(SMALLER * training.max_iterations), 1),
         max_time_s=SMALLER * training.max_time_s,
     )
+
+
+def _begun(found: BuiltModel) -> Begun:
+    """What was found as a start."""
+    weights = found.theta[len(found.grey.free) :]
+    return Begun(parameters=np.array(list(found.parameters.values())), weights=weights, norms=found.lowered.norms)
 
 
 def _grown(
