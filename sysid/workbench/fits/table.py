@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from statistics import median
+
 from rich.table import Table
 from rich.text import Text
 
@@ -10,6 +12,9 @@ from sysid.reporting.fit_tables import scored_cases
 from sysid.reporting.results import FitRecord, Results, SystemRecord
 from sysid.units import squared
 from sysid.validation.metrics import mean_fit, percent
+
+MOST = 6
+"""Cases that have a column of their own. Of more each role has one, with their median: the report has them all."""
 
 
 def table_of_fits(results: Results) -> Table:
@@ -33,9 +38,9 @@ def table_of_fits(results: Results) -> Table:
     table.add_column("fit")
     table.add_column("structure")
     table.add_column("loop")
-    cases = list(results.data.cases)
-    for case in cases:
-        table.add_column(Text.assemble(f"{case}\n", (results.data.cases[case].role.value, "dim")), justify="right")
+    cases, columns = list(results.data.cases), _columns(results)
+    for head, _ in columns:
+        table.add_column(head, justify="right")
     # One trace that chooses, and is a case too, has its figure already.
     selection = results.selection is not None and not (
         len(results.selection.cases) == 1 and {*results.selection.cases} <= {*cases}
@@ -49,13 +54,30 @@ def table_of_fits(results: Results) -> Table:
     for fit in results.fits:
         best = results.chosen(fit)
         fitted = [] if results.systems else [_mean_fit(fit)]
-        row = _row(fit, cases, fitted, selection=selection)
+        row = _row(fit, columns, fitted, selection=selection)
         table.add_row(*row, style="bold" if best else None)
         whole = whole_after.get(fit.name)
         if whole is not None:
-            row = _whole(whole, fit, cases, selection=selection)
+            row = _whole(whole, fit, columns, selection=selection)
             table.add_row(*row, style="bold" if best else None, end_section=True)
     return table
+
+
+Columns = list[tuple[Text, list[str]]]
+"""Heads, and the cases whose median each holds."""
+
+
+def _columns(results: Results) -> Columns:
+    cases = results.data.cases
+    if len(cases) <= MOST:
+        return [(Text.assemble(f"{name}\n", (one.role.value, "dim")), [name]) for name, one in cases.items()]
+    by_role = dict[str, list[str]]()
+    for name, one in cases.items():
+        by_role.setdefault(one.role.value, []).append(name)
+    return [
+        (Text.assemble(f"median of {len(names)}\n" if len(names) > 1 else f"{names[0]}\n", (role, "dim")), names)
+        for role, names in by_role.items()
+    ]
 
 
 def _judged(results: Results) -> str:
@@ -87,13 +109,13 @@ def told_of_fits(results: Results) -> list[str]:
     return [f"Look at {'; '.join(names)}: {one}" for one, names in alike.items()]
 
 
-def _whole(whole: SystemRecord, last: FitRecord, cases: list[str], *, selection: bool) -> list[str]:
-    figures = [f"{whole.cases[case].mean_fit:.2f} %" for case in cases]
+def _whole(whole: SystemRecord, last: FitRecord, columns: Columns, *, selection: bool) -> list[str]:
+    figures = [f"{median(whole.cases[case].mean_fit for case in cases):.2f} %" for _, cases in columns]
     chosen = [""] if selection else []
     return [whole.name, whole.label, last.loop.value, *figures, *chosen, f"{whole.train_time_s:.1f} s"]
 
 
-def _row(fit: FitRecord, cases: list[str], fitted: list[str], *, selection: bool) -> list[str]:
-    figures = [f"{fit.cases[case].free_run.mse:.3e}" for case in cases]
+def _row(fit: FitRecord, columns: Columns, fitted: list[str], *, selection: bool) -> list[str]:
+    figures = [f"{median(fit.cases[case].free_run.mse for case in cases):.3e}" for _, cases in columns]
     chosen = [f"{fit.selection_mse:.3e}"] if selection else []
     return [fit.name, fit.label, fit.loop.value, *figures, *chosen, *fitted, f"{fit.train_time_s:.1f} s"]

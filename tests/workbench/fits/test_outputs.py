@@ -18,6 +18,7 @@ from sysid.models import model_from_dict
 from sysid.reporting.results import Results, read_results
 from sysid.reporting.training_view import RELATIVE, error_unit, trained_models
 from sysid.workbench.cli import run_cli
+from sysid.workbench.fits import table
 from sysid.workbench.fits.config import Pipeline, parse_pipeline
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.run import run_pipeline
@@ -134,6 +135,19 @@ def test_the_screen_has_the_whole_below_its_outputs(results: Results) -> None:
     assert cells[:3] == ["ARX, level", "ARX, heat", "ARX"]
     run_3 = list(table_of_fits(results).columns[3 + list(results.data.cases).index("run-3")].cells)
     assert run_3[2] == f"{results.systems[0].cases['run-3'].mean_fit:.2f} %"
+
+
+def test_more_cases_than_a_screen_has_room_for_are_their_roles_medians(
+    results: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table, "MOST", 2)
+    assert len(results.data.cases) == 3
+    found = table_of_fits(results)
+    estimation = [name for name, case in results.data.cases.items() if case.role.value == "estimation"]
+    head = estimation[0] if len(estimation) == 1 else f"median of {len(estimation)}"
+    assert str(found.columns[3].header) == f"{head}\nestimation"
+    mses = [results.fits[0].cases[name].free_run.mse for name in estimation]
+    assert next(iter(found.columns[3].cells)) == f"{np.median(mses):.3e}"
 
 
 def test_the_training_of_one_model_is_told_once_and_its_errors_have_no_single_unit(results: Results) -> None:
