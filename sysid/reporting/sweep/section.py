@@ -78,9 +78,12 @@ def sweep_points(folder: Path, published: PublishedTable | None) -> list[tuple[s
         return []
     unit = FIGURES[record.choose_by].unit.format(unit=record.unit, squared=squared(record.unit))
     least = record.choice(winner)
+    # A search may have held parts of records out, where nothing is declared to choose; its choice says which.
+    chose = "what chose" if record.method == "auto" else TRACES[record.choose_on]
+    trials = "1 trial" if len(record.trials) == 1 else f"{len(record.trials)} trials"
     text = (
-        f"{winner.label} has the least {FIGURES[record.choose_by].words} on {TRACES[record.choose_on]}, "
-        f"{quantity(least, unit)}, of {len(record.trials)} trials ({_shown(record)}). They took "
+        f"{winner.label} has the least {FIGURES[record.choose_by].words} on {chose}, "
+        f"{quantity(least, unit)}, of {trials} ({_shown(record)}). They took "
         f"{seconds(record.wall_s)} on {record.workers} workers."
     )
     best = next(iter(_published(record, published)["error"]), None)
