@@ -23,9 +23,9 @@ from sysid.estimation.experiment import Experiment
 from sysid.estimation.grey_box.again import profile_again
 from sysid.estimation.grey_box.by_case import for_case
 from sysid.estimation.grey_box.profile import Profile
-from sysid.ingest.arrays import inputs_of, level_of
 from sysid.ingest.frames import as_array
-from sysid.ingest.run_records import before_a_run
+from sysid.ingest.run_inputs import inputs_of
+from sysid.ingest.run_records import before_a_run, level_of
 from sysid.models import Cascade, History, Start
 from sysid.models.curve_values import curve_values
 from sysid.models.form import unheeded

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from sysid.export.measured_run import Initial, check_able, check_one_start, run_measured, run_with
 from sysid.export.surrogate import Surrogate
-from sysid.ingest.arrays import inputs_of
 from sysid.ingest.frames import columns_by_name
 from sysid.ingest.headers import parse_header
+from sysid.ingest.run_inputs import inputs_of
 from sysid.ingest.run_records import record_of
 from sysid.models import AbstractModel, Cascade, Start, StartKind, StartLike
 from sysid.traces import Channel, Trace, check_units

@@ -1,4 +1,4 @@
-"""What a free run is given from memory beside its inputs: outputs that were measured, and the samples before it."""
+"""What a free run is given from memory beside its inputs: outputs that were measured, and what was before it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import TraceError
-from sysid.ingest.arrays import data, inputs_of
+from sysid.errors import ConfigError, TraceError
+from sysid.ingest.arrays import data
 from sysid.ingest.frames import as_array, columns_by_name
 from sysid.ingest.headers import parse_header
+from sysid.ingest.run_inputs import inputs_of
 from sysid.traces import Channel, Trace
 
 
@@ -21,10 +22,10 @@ def before_a_run(
     """The samples before a run, from which it goes on.
 
     Args:
-        pair: Inputs, as for :func:`sysid.ingest.arrays.inputs_of`, and the outputs that were measured with them.
+        pair: Inputs, as for :func:`sysid.ingest.run_inputs.inputs_of`, and the outputs that were measured with them.
         inputs: Names of the inputs.
         outputs: Names of the outputs.
-        units: Of both, as for :func:`sysid.ingest.arrays.inputs_of`.
+        units: Of both, as for :func:`sysid.ingest.run_inputs.inputs_of`.
 
     Returns:
         Shapes ``(n_past, n_inputs)`` and ``(n_past, n_outputs)``, oldest first.
@@ -62,6 +63,29 @@ def _not_before(got: str, outputs: tuple[str, ...]) -> TraceError:
         expected=f"a pair (u, y) of as many samples each, y with a column for each of {', '.join(outputs)}",
         got=got,
         remedy="give both over the same samples: initial=(u_before, y_before)",
+    )
+
+
+def level_of(initial: Any) -> float:
+    """A level that an output has stood at before a run.
+
+    Args:
+        initial: What was given.
+
+    Returns:
+        The number.
+
+    Raises:
+        ConfigError: If it is not one finite number.
+    """
+    if np.ndim(initial) == 0 and isinstance(initial, int | float | np.number) and np.isfinite(initial):
+        return float(initial)
+    raise ConfigError(
+        "the output before the first sample is one finite number",
+        where="initial",
+        expected="a number, in the output's unit",
+        got=repr(initial)[:60],
+        remedy="samples before the first are a pair: initial=(u_before, y_before); several outputs are a dict by name",
     )
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from sysid.errors import ChannelError, ConfigError, TraceError, UnitError
-from sysid.ingest.arrays import data, inputs_of
+from sysid.ingest.arrays import data
 from sysid.traces import Role
 
 T = np.arange(20) * 0.1
@@ -181,11 +181,6 @@ def test_a_share_cuts_a_record_in_two_and_loses_nothing(n: int, share: float) ->
         return
     assert_array_equal(np.concatenate([trace["y"] for trace in traces]), y)
     assert traces.traces[1].start_time == 0.5 * len(traces.traces[0])
-
-
-def test_inputs_stand_in_the_order_of_the_mapping() -> None:
-    assert_array_equal(inputs_of({"b": [2.0], "a": [1.0]}, ("a", "b")), [[1.0, 2.0]])
-    assert inputs_of(7, ()).shape == (7, 0)
 
 
 def test_what_a_masked_array_masks_is_missing_and_not_its_number() -> None:

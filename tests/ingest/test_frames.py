@@ -12,10 +12,10 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 import torch
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
-from sysid.errors import ConfigError, UserError
-from sysid.ingest.arrays import data, inputs_of
+from sysid.errors import UserError
+from sysid.ingest.arrays import data
 
 T = np.arange(20) * 0.5
 U = np.where((np.arange(20) // 5) % 2, 3.0, 1.0)
@@ -107,22 +107,6 @@ def test_each_remedy_for_rows_leads_on() -> None:
     frame = pd.DataFrame({"y": Y}, index=RUNS)
     runs = data({str(key): part.droplevel(0) for key, part in frame.groupby(level=0)}, sample_time=1)
     assert [(one.name, len(one)) for one in runs] == [("a", 10), ("b", 10)]
-
-
-def test_inputs_are_told_by_their_names_without_units_and_by_their_clock() -> None:
-    frame = pd.DataFrame({"time [ms]": 1000 * T, "pump [V]": U})
-    assert_array_equal(inputs_of(frame, ("pump",), sample_time=0.5)[:, 0], U)
-    assert_array_equal(inputs_of(pd.Series(U, index=T, name="other"), ("pump",), sample_time=0.5)[:, 0], U)
-    with pytest.raises(ConfigError, match="another distance"):
-        inputs_of(frame, ("pump",), sample_time=0.1)
-    assert_allclose(inputs_of(pd.DataFrame({"a": T}), ()).shape, (20, 0))
-
-
-@pytest.mark.parametrize("u", [U[:0], np.where(U > 2, np.nan, U), np.where(U > 2, np.inf, U), U * 1j, ["a", "b"]])
-def test_inputs_that_cannot_be_run_are_refused(u: Any) -> None:
-    with pytest.raises(UserError) as caught:
-        inputs_of(u, ("u",))
-    assert caught.value.remedy
 
 
 def test_a_pair_of_series_with_labels_of_time_needs_no_sample_time() -> None:

@@ -1,0 +1,131 @@
+"""The inputs of a free run, from whatever memory holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError, TraceError
+from sysid.ingest.frames import INDEX, Columns, as_array, columns_by_name
+from sysid.ingest.in_units import stamps_in_seconds
+from sysid.ingest.memory_table import check_lengths, no_samples, table_of
+from sysid.ingest.options import FileOptions
+from sysid.ingest.table import RawColumn
+from sysid.traces import Trace, TraceSet, check_units
+from sysid.units import Reference, convert, is_same_unit
+
+WHERE = "the inputs of a simulation"
+
+
+def inputs_of(
+    values: Any,
+    names: tuple[str, ...],
+    *,
+    sample_time: float | None = None,
+    units: Mapping[str, str] | None = None,
+) -> NDArray[np.float64]:
+    """Inputs as a matrix in a mapping's order.
+
+    Args:
+        values: An array, a frame, a dict of columns, or a trace; for a model without input the number of samples.
+        names: The inputs.
+        sample_time: Of the model, in seconds: a trace, and a frame whose index or column is time, must have it.
+        units: Of the model's channels: a trace, whose channels have units, must be in them; columns whose names say
+            others (``"u [mV]"``) are converted.
+
+    Returns:
+        Shape ``(n_samples, n_inputs)``, float64.
+
+    Raises:
+        ChannelError: If one is missing.
+        ConfigError: If an array has another number of columns, the samples are at another distance, or a trace is in
+            other units.
+        TraceError: If a value is missing or not finite.
+    """
+    if not names and isinstance(values, int):
+        return np.zeros((values, 0))
+    if isinstance(values, TraceSet):
+        raise ConfigError(
+            "a run is over one record",
+            where=WHERE,
+            expected="a trace, an array or a frame",
+            got=f"a data set of {len(values.traces)}: {', '.join(values.names)}",
+            remedy=f'write traces["{values.names[0]}"]',
+        )
+    wanted = {name: unit for name, unit in (units or {}).items() if name in names}
+    if isinstance(values, Trace):
+        _check_step(values.sample_time, sample_time)
+        found = values.columns(names)
+        check_units(wanted, values)
+        return found
+    named = columns_by_name(values, where=WHERE)
+    if named is None:
+        found = _of_array(values, names)
+    else:
+        if len(names) == 1 and hasattr(values, "to_frame"):  # a series is one column, whatever it is called
+            named = {names[0] if key != INDEX else key: column for key, column in named.items()}
+        found = _of_columns(named, names, sample_time, wanted)
+    if not len(found):
+        raise no_samples(WHERE)
+    _check_finite(found, names)
+    return found
+
+
+def _of_array(values: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
+    array = as_array(values)
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or array.shape[1] != len(names) or array.dtype.kind not in "buif":
+        raise ConfigError(
+            "the inputs do not match the model",
+            where=WHERE,
+            expected=f"numbers of shape (n_samples, {len(names)}), for {', '.join(names)}",
+            got=f"shape {np.shape(array)} of type {array.dtype}",
+            remedy="give one column an input, in this order, or columns by name",
+        )
+    return array.astype(np.float64)
+
+
+def _of_columns(
+    named: Columns, names: tuple[str, ...], sample_time: float | None, units: Mapping[str, str]
+) -> NDArray[np.float64]:
+    table = table_of(named, name=WHERE)
+    check_lengths(table, names)
+    if table.time is not None and table.time not in names and sample_time is not None and len(table) > 1:
+        stamps = stamps_in_seconds(table, FileOptions())
+        _check_step(float(np.median(np.diff(stamps))), sample_time)
+    columns = [_in_unit(table.find(name), units.get(name, "1")) for name in names]
+    return np.column_stack(columns) if names else np.zeros((len(table), 0))
+
+
+def _check_finite(found: NDArray[np.float64], names: tuple[str, ...]) -> None:
+    bad = ~np.isfinite(found)
+    if bad.any():
+        row, column = (int(index) for index in np.argwhere(bad)[0])
+        raise TraceError(
+            "a value is missing" if bad.sum() == 1 else f"{int(bad.sum())} values are missing",
+            where=f"{WHERE}, channel {names[column]}, sample {row}",
+            expected="a finite number in each sample: a free run has nothing else to go by",
+            got=f"{found[row, column]}",
+            remedy="fill them before, for example frame.interpolate() or frame.ffill()",
+        )
+
+
+def _in_unit(column: RawColumn, unit: str) -> NDArray[np.float64]:
+    """A column in a model's unit, where its name says another one; as it stands where one of them is none."""
+    if column.unit is None or is_same_unit(column.unit, unit):
+        return column.values
+    return convert(column.values, column.unit, unit, reference=column.reference or Reference.NONE)
+
+
+def _check_step(step: float, sample_time: float | None) -> None:
+    if sample_time is not None and abs(step - sample_time) > 1e-3 * sample_time:
+        raise ConfigError(
+            "the samples are at another distance than the model's",
+            where=WHERE,
+            expected=f"{sample_time:g} s",
+            got=f"{step:g} s",
+            remedy="resample them: sysid.data(frame, sample_time=..., grid={'method': 'linear'}) gives a trace",
+        )
