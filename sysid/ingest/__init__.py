@@ -12,6 +12,7 @@ from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
     from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
+    from sysid.ingest.columns import RawColumn
     from sysid.ingest.dataset import Progress, find_dataset, load_dataset, load_described
     from sysid.ingest.description import DatasetDescription, read_description
     from sysid.ingest.findings import ColumnFinding, FileFinding
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from sysid.ingest.proposal import propose_dataset
     from sysid.ingest.readers import READERS, Reader
     from sysid.ingest.reading import read_table, read_trace
-    from sysid.ingest.table import RawColumn, RawTable
+    from sysid.ingest.table import RawTable
     from sysid.ingest.timing import Timing, survey
     from sysid.ingest.writers import write_csv, write_parquet, write_trace
 
@@ -62,6 +63,7 @@ __all__ = [
 __getattr__ = imported_when_asked(
     {
         "sysid.ingest.cache": ("TraceCache", "content_key", "default_cache_folder"),
+        "sysid.ingest.columns": ("RawColumn",),
         "sysid.ingest.dataset": ("Progress", "find_dataset", "load_dataset", "load_described"),
         "sysid.ingest.description": ("DatasetDescription", "read_description"),
         "sysid.ingest.findings": ("ColumnFinding", "FileFinding"),
@@ -71,7 +73,7 @@ __getattr__ = imported_when_asked(
         "sysid.ingest.proposal": ("propose_dataset",),
         "sysid.ingest.readers": ("READERS", "Reader"),
         "sysid.ingest.reading": ("read_table", "read_trace"),
-        "sysid.ingest.table": ("RawColumn", "RawTable"),
+        "sysid.ingest.table": ("RawTable",),
         "sysid.ingest.timing": ("Timing", "survey"),
         "sysid.ingest.writers": ("write_csv", "write_parquet", "write_trace"),
     }

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError, UserError, did_you_mean
 from sysid.ingest import repairs as repair
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.grid import Gridded, fill, grid_places, place, resample
 from sysid.ingest.in_units import check_units_said, clock_by_its_steps, in_unit, stamps_in_seconds
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions
 from sysid.ingest.repairs import Record
-from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.table import RawTable
 from sysid.ingest.timing import Timing, survey
 from sysid.traces import Channel, Trace
 

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from sysid.errors import ReaderError, UserError
 from sysid.ingest.blanks import marks_in
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.numbers import spaced, usually_missing
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.reading import read_table
-from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.table import RawTable
 from sysid.ingest.words import PAIRS, TRUTH, known_states
 
 _OF_TEXT = frozenset({"csv", "excel"})

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.ingest.table import RawColumn
+from sysid.ingest.columns import RawColumn
 
 _SHARE = 0.9
 _CLEAR = 2.0

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, ReaderError
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.headers import parse_header, unit_in_name
-from sysid.ingest.table import RawColumn, is_time_unit, recognise_time, time_unit
+from sysid.ingest.time_columns import is_time_unit, recognise_time, time_unit
 from sysid.units import convert
 
 INDEX = "(index)"

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError, UnitError
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.options import ColumnOptions, FileOptions
-from sysid.ingest.table import RawColumn, RawTable, time_unit
+from sysid.ingest.table import RawTable
+from sysid.ingest.time_columns import time_unit
 from sysid.ingest.words import quoted
 from sysid.traces import Channel
 from sysid.units import Reference, convert

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sysid.ingest.attempts import Attempt, read_somehow
 from sysid.ingest.blanks import blanks_mean, marks_in
 from sysid.ingest.clocks import clock_of
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.events import are_events
 from sysid.ingest.findings import CaseFinding, ColumnFinding, FileFinding, counted
 from sysid.ingest.headers import is_unit, split_reference, unit_in_name
@@ -22,7 +23,8 @@ from sysid.ingest.readers.leaves import step_in
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.restarts import finer_than_clock, records_by_clock
 from sysid.ingest.second_clocks import counts_rows, is_counter, without_second_clocks
-from sysid.ingest.table import RawColumn, RawTable, is_time_unit
+from sysid.ingest.table import RawTable
+from sysid.ingest.time_columns import is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
 from sysid.traces import coarse_step
 from sysid.units import Reference, atmosphere_in, is_pressure

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, ReaderError, UnitError
 from sysid.ingest.clocks import clock_of
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.options import FileOptions, LongOptions
-from sysid.ingest.table import RawColumn, RawTable, time_unit
+from sysid.ingest.table import RawTable
+from sysid.ingest.time_columns import time_unit
 from sysid.ingest.words import Words, states_for
 from sysid.units import convert
 

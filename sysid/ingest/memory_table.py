@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.ingest.columns import array_column
 from sysid.ingest.frames import INDEX, check_distinct, not_numbers
 from sysid.ingest.headers import parse_header, unit_in_name
 from sysid.ingest.meaning import with_clock
-from sysid.ingest.table import RawTable, array_column, by_length, is_time_unit, recognise_time
+from sysid.ingest.table import RawTable, by_length
+from sysid.ingest.time_columns import is_time_unit, recognise_time
 
 
 def table_of(columns: Mapping[str, NDArray[Any]], *, name: str) -> RawTable:

@@ -10,7 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from sysid.field_checks import FieldError
 from sysid.ingest.headers import parse_header
-from sysid.ingest.table import is_time_unit
+from sysid.ingest.time_columns import is_time_unit
 from sysid.units import Reference
 
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError, did_you_mean
 from sysid.ingest.blanks import marks_in
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.options import RepairOptions
-from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.table import RawTable
 
 HOUR = 3600.0
 

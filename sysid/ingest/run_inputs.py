@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.frames import INDEX, Columns, as_array, columns_by_name
 from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.memory_table import check_lengths, no_samples, table_of
 from sysid.ingest.options import FileOptions
-from sysid.ingest.table import RawColumn
 from sysid.traces import Trace, TraceSet, check_units
 from sysid.units import Reference, convert, is_same_unit
 

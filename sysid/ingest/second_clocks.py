@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UnitError
-from sysid.ingest.table import RawColumn, RawTable, is_called_time, is_time_unit
+from sysid.ingest.columns import RawColumn
+from sysid.ingest.table import RawTable
+from sysid.ingest.time_columns import is_called_time, is_time_unit
 from sysid.units import convert
 
 _NUMBERED = re.compile(r"(?:t|time|zeit|temps|tiempo)(?:[ _]?\d+|[ _.][^\W_]{1,12})", re.IGNORECASE)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from sysid.errors import UnitError
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.in_units import clock_by_its_steps, in_unit, stamps_in_seconds
 from sysid.ingest.options import ColumnOptions, FileOptions
-from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.table import RawTable
 from sysid.traces import Channel
 
 FILE = Path("x.csv")

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.second_clocks import without_second_clocks
-from sysid.ingest.table import RawColumn, RawTable
+from sysid.ingest.table import RawTable
 
 T = np.arange(20) * 0.1
 Y = np.sin(T)

@@ -10,7 +10,7 @@ import pytest
 
 from sysid.errors import ReaderError
 from sysid.ingest import FileOptions, RepairOptions, read_table
-from sysid.ingest.readers import csv_body, csv_layout, text_source
+from sysid.ingest.readers import csv_body, csv_split, text_source
 
 N = 9000
 TIME = (np.arange(N) / 8.0).tolist()
@@ -113,7 +113,7 @@ def test_a_line_without_end_is_refused_before_it_is_read(write: Write, monkeypat
 def test_too_many_columns_are_refused_with_the_command_that_cuts_them(
     write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(csv_layout, "MOST_COLUMNS", 8)
+    monkeypatch.setattr(csv_split, "MOST_COLUMNS", 8)
     text = "".join(",".join(str(i * k) for i in range(9)) + "\n" for k in range(12))
     with pytest.raises(ReaderError, match=r"(?s)the file has 9 columns.*cut -d ',' -f 1-8"):
         read_table(write("run.csv", text))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
 from sysid.ingest.calendar import Calendar
+from sysid.ingest.columns import RawColumn
 from sysid.ingest.headers import Header, parse_header, split_reference
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.rates import said_step
@@ -24,7 +25,8 @@ from sysid.ingest.readers.csv_sideways import sideways
 from sysid.ingest.readers.reader import Reader
 from sysid.ingest.readers.sheets import SheetText
 from sysid.ingest.readers.text_source import PACKED_SUFFIXES, TextFile, ZeroBytesError, encodings, not_text
-from sysid.ingest.table import RawColumn, RawTable, recognise_time
+from sysid.ingest.table import RawTable
+from sysid.ingest.time_columns import recognise_time
 from sysid.ingest.words import WordCollector, states_for
 from sysid.names import from_csv_cell
 

@@ -16,7 +16,8 @@ from sysid.ingest.readers.joining import Signal, joined_signals, not_over_time
 from sysid.ingest.readers.leaves import Leaf, refused
 from sysid.ingest.readers.reader import Reader, damaged, silent
 from sysid.ingest.readers.tree import table_of
-from sysid.ingest.table import RawTable, is_called_time
+from sysid.ingest.table import RawTable
+from sysid.ingest.time_columns import is_called_time
 
 _NO_TIMES = {"frequency", "frequenz", "angle", "winkel", "order", "ordnung", "distance", "weg"}
 

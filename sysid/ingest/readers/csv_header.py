@@ -1,0 +1,209 @@
+"""The header of a text file: names, units and titles in the lines above its numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import compress, pairwise
+
+from sysid.errors import ReaderError, shortened
+from sysid.ingest.options import FileOptions
+from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, is_units, kind_of, trimmed
+from sysid.ingest.readers.csv_split import Split
+from sysid.ingest.time_columns import is_called_time
+
+_BRACKET = re.compile(r"(?P<name>.*?)\s*(?P<unit>[\[(<][^\])>]*[\])>])")
+
+_MARKS = "#%!;/*'\" \t"
+
+
+@dataclass(kw_only=True)
+class Header:
+    """What stands above the numbers.
+
+    Args:
+        names: One text a column; empty where none were found.
+        units: Texts of the line of units, or ``None``.
+        line: Line of the names, or ``None``.
+        units_line: Line of the units, where it stands above the names.
+        notes: What was recognised and should be told.
+    """
+
+    names: Sequence[str] = ()
+    units: Sequence[str] | None = None
+    line: int | None = None
+    units_line: int | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def header_of(split: Split, first: int, comments: list[tuple[int, str]], options: FileOptions) -> Header:
+    """Names and units: the last lines before the numbers, else the last comment before them.
+
+    Args:
+        split: The rows of the file.
+        first: Index of the first row of numbers.
+        comments: Line and text of the comments before it.
+        options: Whether there are a header and a line of units, where that is known.
+
+    Returns:
+        The header; an empty one where there is none.
+
+    Raises:
+        ReaderError: If a comma seems to divide the numbers themselves.
+    """
+    found = Header()
+    if options.header is False:
+        return found
+    above = _heads_joined(list(split.rows[:first]), split)
+    if options.units_line is None and len(above) > 1 and _units_above(above, split):
+        found.units_line = above[-2].line
+        found.units = _to_width(above.pop(-2), split)
+    elif options.units_line or (options.units_line is None and len(above) > 1 and _is_units(above, split)):
+        found.units = _to_width(above.pop(), split)
+    if above and _take_names(found, above, split):
+        return found
+    for line, text in comments[-1:]:
+        bare = text.split(split.separator) if split.separator != BLANKS else text.split()
+        cells = _to_width(Row(line=line, cells=bare), split)
+        if cells is not None and (split.width > 1 or len(text.split()) == 1):
+            found.names, found.line = [cell.strip(_MARKS) for cell in cells], line
+            found.notes.append(f"names from the comment in line {line}")
+    return found
+
+
+def _take_names(found: Header, above: list[Row], split: Split) -> bool:
+    """Whether the last line before the numbers, or before their units, has a name for each column; they are taken."""
+    row = above[-1]
+    cells = _to_width(row, split)
+    repeats = cells is not None and len({cell.strip() for cell in cells if cell.strip()}) < sum(map(_filled, cells))
+    upper = _to_width(above[-2], split) if repeats and len(above) > 1 else None
+    grouped = None if upper is None or cells is None else _in_groups(upper, cells)
+    if grouped is not None:
+        row, cells = above[-2], grouped
+    elif upper is not None:  # a line of types or of numbers of channels below the names
+        row, cells = above[-2], upper
+    if cells is not None:
+        found.names, found.line = [re.sub(r"^(?:%|//|!|;|\*)+\s*(?=\S)", "", cells[0]), *cells[1:]], row.line
+        return True
+    if split.separator == "," and len(row.cells) > 1 and 2 * len(row.cells) == split.width:
+        raise ReaderError(
+            "every row has twice as many cells as the header has names: a comma may stand in each number",
+            where=f"line {row.line}",
+            expected="another mark between the columns than in the numbers",
+            got=f"{len(row.cells)} names over {split.width} cells: {shortened(','.join(row.cells))}",
+            remedy="export with semicolons between the columns, or with decimal points; if these are whole numbers "
+            "in columns of their own, leave the header out and name them (skip_lines, names: [...])",
+        )
+    if split.separator != BLANKS and len(row.cells) > 1:
+        found.notes.append(
+            f"line {row.line} before the numbers has {len(row.cells)} cells for {split.width} columns, "
+            "which are numbered; names: [...] names them"
+        )
+    return False
+
+
+def _heads_joined(above: list[Row], split: Split) -> list[Row]:
+    """Two lines that are one head, as merged cells leave them, made one: titles over some columns, names over others.
+
+    Of such a pair each column has a name in one line or in both, and some have it in only one of them, either way.
+    """
+    for last in (len(above), len(above) - 1):  # a line of units may stand below
+        if last < 2:
+            break
+        upper, lower = (_to_width(row, split) for row in above[last - 2 : last])
+        joined = None if upper is None or lower is None else _one_head(upper, lower)
+        if joined is not None:
+            return [*above[: last - 2], replace(above[last - 2], cells=joined), *above[last:]]
+    return above
+
+
+def _one_head(upper: list[str], lower: list[str]) -> list[str] | None:
+    pairs = list(zip(map(_filled, upper), map(_filled, lower), strict=True))
+    if not {(True, False), (False, True), (True, True)} <= set(pairs) or (False, False) in pairs:
+        return None
+    joined, title = list[str](), ""
+    for above, below in zip(upper, lower, strict=True):
+        title = above.strip() or title
+        if not _filled(below):
+            joined, title = [*joined, above], ""
+            continue
+        named = _BRACKET.fullmatch(title)
+        unit = f" {named['unit']}" if named and _BRACKET.fullmatch(below.strip()) is None else ""
+        joined.append(f"{named['name'] if named else title} {below.strip()}{unit}".strip())
+    return joined if len(set(joined)) == len(joined) else None
+
+
+def _in_groups(upper: list[str], cells: list[str]) -> list[str] | None:
+    """Names that come again under a title for some columns each, with their title: ``Inlet p``, ``Outlet p``."""
+    if sum(map(_filled, upper)) >= sum(map(_filled, cells)):
+        return None
+    titles, title = [], ""
+    for above in upper:
+        title = above.strip() or title
+        titles.append(title)
+    again = {cell.strip() for cell in cells if _filled(cell) and sum(c.strip() == cell.strip() for c in cells) > 1}
+    found = [f"{t} {c.strip()}".strip() if c.strip() in again else c for t, c in zip(titles, cells, strict=True)]
+    named = [name for name in found if _filled(name)]
+    return found if len(set(named)) == len(named) else None
+
+
+def _filled(cell: str) -> bool:
+    return bool(cell.strip())
+
+
+def _is_units(above: list[Row], split: Split) -> bool:
+    units, names = (_to_width(row, split) for row in (above[-1], above[-2]))
+    if units is None or names is None or not is_units(units):
+        return False
+    # Short names are units too (t, u, V): without brackets it is the line above that must look like names.
+    if any(is_called_time(cell) for cell in units[:1]) and not any(map(is_called_time, names)) and _rises(split):
+        return False
+    return sum(map(_filled, names)) >= sum(map(_filled, units)) and not any(kind_of(cell) in DATA for cell in names[:1])
+
+
+def _rises(split: Split) -> bool:
+    """Whether the first column goes up from row to row, as time does."""
+    try:
+        values = [float(row.cells[0].replace(",", ".")) for row in compress(split.rows[:100], split.fitting)]
+    except ValueError:
+        return False
+    return len(values) > 2 and all(after > before for before, after in pairwise(values))
+
+
+def _counts(split: Split) -> bool:
+    """Whether the first column numbers the rows in quotes, as R writes names of rows and gives them no head."""
+    rows = split.run()[:100]
+    numbers = [row.cells[0].strip() for row in rows]
+    if len(rows) < 2 or not numbers[0].isdecimal():
+        return False
+    quoted = all(split.lines[row.line - 1].lstrip().startswith('"') for row in rows)
+    return quoted and numbers == [str(int(numbers[0]) + k) for k in range(len(rows))]
+
+
+def _units_above(above: list[Row], split: Split) -> bool:
+    """Whether the line of units stands above the names: names as short as t and u are units too."""
+    names, units = (_to_width(row, split) for row in (above[-1], above[-2]))
+    if names is None or units is None:
+        return False
+    shares = [sum(is_units([cell]) for cell in cells) / max(sum(map(_filled, cells)), 1) for cells in (units, names)]
+    return shares[0] == 1.0 and shares[1] < 1.0
+
+
+def _to_width(row: Row, split: Split) -> list[str] | None:
+    """A header brought to the width of the numbers, or ``None`` if it does not fit them."""
+    cells, width = trimmed(row.cells, split.width), split.width
+    if len(cells) == width - 1 > 1 and _counts(split):
+        return ["row", *cells]
+    if split.separator == BLANKS and len(cells) != width:
+        text = split.lines[row.line - 1].strip().strip(_MARKS)
+        for cut in (
+            re.sub(r"\s+(?=[\[(<])", "", text).split(),  # t [s]  u [V]
+            re.split(r"\t|\s{2,}", text),
+            text.split(),
+        ):
+            if len(cut) == width:
+                return cut
+    if len(cells) == width - 1 > 0 and split.kinds[-1] is Kind.NOTHING:
+        cells = [*cells, ""]
+    return cells if len(cells) == width else None
