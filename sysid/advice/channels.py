@@ -12,7 +12,7 @@ from sysid.advice.record import Record, stacked
 from sysid.estimation.held_output import held_for, straight_for
 from sysid.estimation.record_drift import trend_of
 from sysid.estimation.wrapped import jumping, period_of
-from sysid.traces import coarse_step, converter_step
+from sysid.traces.converter import coarse_step, converter_step
 
 COARSE = 0.1
 """Of a channel's standard deviation: a step of its converter that is larger is coarse."""

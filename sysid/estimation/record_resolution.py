@@ -8,7 +8,7 @@ import numpy as np
 
 from sysid.estimation.fitted_run import FreeRun
 from sysid.models import AbstractModel
-from sysid.traces import converter_step
+from sysid.traces.converter import converter_step
 
 MATTERS, POOR = 0.02, 0.1
 """Part of the output's standard deviation that the error of the free run has where it is worth a word, and where the

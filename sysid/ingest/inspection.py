@@ -26,7 +26,7 @@ from sysid.ingest.second_clocks import counts_rows, is_counter, without_second_c
 from sysid.ingest.table import RawTable
 from sysid.ingest.time_columns import is_time_unit
 from sysid.ingest.timing import Timing, even_step, round_step, survey
-from sysid.traces import coarse_step
+from sysid.traces.converter import coarse_step
 from sysid.units import Reference, atmosphere_in, is_pressure
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so

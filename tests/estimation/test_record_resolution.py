@@ -8,7 +8,6 @@ import scipy
 from numpy.typing import NDArray
 
 import sysid
-from sysid.traces import coarse_step, converter_step
 
 ARX, OE = sysid.ARX(na=2, nb=2, nk=1), sysid.OE(nb=1, nf=2, nk=2)
 UNASKED = sysid.StabilityOptions(count=0)
@@ -48,19 +47,6 @@ def test_what_the_free_run_leaves_may_be_the_steps_alone() -> None:
 def test_ordinary_digits_are_not_told(structure: object, noise: float, digits: int) -> None:
     u, y = _record(10.0, noise)
     assert _warned((u, np.round(y, digits)), structure) == []
-
-
-def test_a_step_is_found_through_rounding_and_none_where_there_is_none() -> None:
-    rng = np.random.default_rng(1)
-    slow = np.cumsum(rng.standard_normal(500)) / 10
-    assert converter_step(np.round(slow / 0.3) * 0.3 * 1.8 + 32.0) == pytest.approx(0.54)
-    assert converter_step((np.round(slow / 0.3) * 0.3).astype(np.float32).astype(float)) == pytest.approx(0.3, rel=1e-4)
-    assert converter_step(slow) is None
-    assert converter_step(np.where(slow > 0, 1.0, -1.0)) is None
-    assert converter_step(slow[:10].round(1)) is None
-    assert coarse_step(np.round(slow / 0.3) * 0.3) == pytest.approx(0.3)
-    assert coarse_step(np.round(slow / 0.01) * 0.01) is None
-    assert coarse_step(np.repeat(rng.uniform(0, 100, 50).round(), 10)) is None
 
 
 def test_advice_and_the_look_into_a_file_tell_it(tmp_path) -> None:

@@ -16,12 +16,6 @@ def test_a_trace_says_which_channels_it_has():
     assert "XX" not in TRACE
 
 
-def test_a_set_says_which_cases_it_has():
-    traces = TraceSet(name="abdx", traces=(TRACE,))
-    assert "EST01" in traces
-    assert "VAL01" not in traces
-
-
 @pytest.mark.parametrize("made", [lambda name: Channel(name=name, unit="V"), lambda name: Channel(name="u", unit=name)])
 def test_half_a_character_is_refused_where_it_enters_and_the_remedy_is_whole(made):
     with pytest.raises(TraceError, match="half a character") as refused:
@@ -64,21 +58,6 @@ def test_traces_are_shown_in_a_line_however_long_they_are() -> None:
     known = TraceSet(name="rig", traces=tuple(traces), roles={"a": Role.ESTIMATION})
     assert repr(known) == "<TraceSet rig: 1 estimation, 1 validation; 4,000 samples of 0.1 s; u [V]>"
     assert repr(traces[0]) == "<Trace a: 2,000 samples of 0.1 s; u [V]>"
-
-
-@pytest.mark.parametrize(("start", "shares"), [(0, True), (30, True), (50, False)])
-def test_a_case_that_has_samples_of_a_fitted_one_is_known(start: int, shares: bool) -> None:
-    values = np.random.default_rng(0).standard_normal((80, 1))
-
-    def cut(name: str, a: int, b: int) -> Trace:
-        return Trace(
-            name=name, sample_time=0.1, channels=TRACE.channels, values=values[a:b].copy(), start_time=round(0.1 * a, 9)
-        )
-
-    other = Trace(name="other", sample_time=0.1, channels=TRACE.channels, values=-values)
-    roles = {"fitted": Role.ESTIMATION, "again": Role.SELECTION, "other": Role.TEST}
-    traces = TraceSet(name="rig", traces=(cut("fitted", 0, 50), cut("again", start, 80), other), roles=roles)
-    assert traces.shared == ((("again", "fitted"),) if shares else ())
 
 
 def test_a_mask_of_each_channel_hides_a_sample_from_who_knows_that_channel_alone() -> None:

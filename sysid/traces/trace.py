@@ -1,53 +1,21 @@
-"""Trace and TraceSet: the words that every other room speaks.
-
-A **trace** is one experiment: a uniform sample time, named channels with units, float64, frozen. A
-**trace set** is a group of traces with a role each. Experiments are never concatenated: a recursion
-starts afresh in each of them.
-"""
+"""A trace: one experiment, and what of it counts."""
 
 from __future__ import annotations
 
-import enum
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError, TraceError, did_you_mean
-from sysid.units import Reference, is_same_unit
+from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.traces.channel import Channel, check_text
+from sysid.units import is_same_unit
 
-ROUNDING, EVEN = 1e-6, 0.95
-"""Part of a signal's range that is rounding, as float32 leaves it; and part of the distances between its values that
-are multiples of one, where that is the step of a converter."""
-FEW_STEPS, VISIBLE = 4, 0.01
-"""Steps that a signal of a converter has at least: a switch has fewer; and least part of a signal's standard deviation
-that a coarse step is."""
 SMALLEST, LARGEST = 1e-150, 1e150
 """Magnitudes between which a channel's largest value may lie: beyond them a sum of squares is none in float64."""
-
-
-def check_text(text: str, what: str) -> None:
-    """Refuse text that is not made of whole characters: a lone surrogate, as from names of files that are no text.
-
-    Args:
-        text: Anything that somebody named.
-        what: What it is, for the error.
-
-    Raises:
-        TraceError: If it cannot be written as UTF-8.
-    """
-    try:
-        text.encode("utf-8")
-    except UnicodeEncodeError:
-        whole = text.encode("utf-8", "replace").decode()
-        raise TraceError(
-            f"{what} holds half a character, which no file can hold", where=ascii(text),
-            expected="text that can be written as UTF-8", got=ascii(text),
-            remedy=f"name it in whole characters, for example {whole!r}",
-        ) from None  # fmt: skip
 
 
 def _is_given_away(values: object) -> bool:
@@ -59,45 +27,6 @@ def _is_given_away(values: object) -> bool:
         and values.flags.owndata
         and not values.flags.writeable
     )
-
-
-class Role(enum.Enum):
-    """What a trace may be used for. Scores on a trace count only if nothing was chosen on it."""
-
-    ESTIMATION = "estimation"
-    SELECTION = "selection"
-    VALIDATION = "validation"
-    TEST = "test"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Channel:
-    """A named quantity.
-
-    Args:
-        name: Short name, unique in its trace (``"BP"``).
-        unit: A unit known to pint (``"psi"``); ``"1"`` for a pure number.
-        reference: For pressures, what they are measured from.
-        description: What it is, for people.
-
-    Raises:
-        TraceError: If a text holds half a character, which no file can be written with.
-    """
-
-    name: str
-    unit: str
-    reference: Reference = Reference.NONE
-    description: str = ""
-
-    def __post_init__(self) -> None:
-        for what, text in (("name", self.name), ("unit", self.unit), ("description", self.description)):
-            check_text(text, f"the {what} of a channel")
-
-    @property
-    def label(self) -> str:
-        """Name and unit as they stand on an axis, for example ``BP [psi gauge]``."""
-        suffix = "" if self.reference is Reference.NONE else f" {self.reference.value}"
-        return f"{self.name} [{self.unit}{suffix}]"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -187,6 +116,9 @@ class Trace:
                 got=", ".join(names),
                 remedy="rename or drop one of them",
             )
+        self._check_samples()
+
+    def _check_samples(self) -> None:
         if not (np.isfinite(self.sample_time) and self.sample_time > 0.0):
             raise TraceError(
                 "the sample time is not positive",
@@ -204,7 +136,7 @@ class Trace:
             row, column = (int(index) for index in np.argwhere(bad)[0])
             raise TraceError(
                 f"{int(bad.sum())} values are not finite",
-                where=f"trace {self.name}, channel {names[column]}, sample {row}",
+                where=f"trace {self.name}, channel {self.channel_names[column]}, sample {row}",
                 expected="finite numbers",
                 got=self.values[row, column],
                 remedy="ask for a repair at ingest, or mark the samples as not usable",
@@ -368,185 +300,6 @@ class Trace:
         if missing:
             raise ChannelError(missing, self.channel_names, where=f"trace {self.name}")
         return np.ascontiguousarray(self.values[:, [self.index(name) for name in names]])
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TraceSet:
-    """Named traces with a role each.
-
-    Args:
-        name: Name of the data set.
-        traces: The experiments; all share sample time and channels.
-        roles: Role of each trace, by name; those not named are for validation.
-        source: How the traces came to be, for people (a command, a file, a rig).
-
-    Raises:
-        TraceError: If names repeat, a role names no trace, or sample times or channels differ.
-    """
-
-    name: str
-    traces: tuple[Trace, ...]
-    roles: Mapping[str, Role] = field(default_factory=dict)
-    source: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "traces", tuple(self.traces))
-        object.__setattr__(
-            self, "roles", {t.name: self.roles.get(t.name, Role.VALIDATION) for t in self.traces} | dict(self.roles)
-        )
-        if not self.traces:
-            raise TraceError("the trace set is empty", where=f"data set {self.name}", remedy="give at least one trace")
-        names = self.names
-        if len(set(names)) != len(names):
-            raise TraceError(
-                "two traces have the same name",
-                where=f"data set {self.name}",
-                expected="a different name for each trace",
-                got=", ".join(names),
-                remedy="rename one of them",
-            )
-        strangers = sorted(set(self.roles) - set(names))
-        if strangers:
-            raise TraceError(
-                f"a role is given to {', '.join(strangers)}, which is not in the set",
-                where=f"data set {self.name}",
-                expected=f"one of {', '.join(names)}",
-                got=", ".join(strangers),
-                remedy=did_you_mean(strangers[0], names, "correct the name in roles"),
-            )
-        first = self.traces[0]
-        for trace in self.traces[1:]:
-            self._check_alike(first, trace)
-
-    def _check_alike(self, first: Trace, other: Trace) -> None:
-        if not np.isclose(first.sample_time, other.sample_time, rtol=1e-9, atol=0.0):
-            raise TraceError(
-                "the traces have different sample times",
-                where=f"data set {self.name}, trace {other.name}",
-                expected=f"{first.sample_time:g} s as in {first.name}",
-                got=f"{other.sample_time:g} s",
-                remedy="resample them to one sample time at ingest",
-            )
-        ours, theirs = ([(c.name, c.unit, c.reference) for c in t.channels] for t in (first, other))
-        if ours != theirs:
-            raise TraceError(
-                "the traces have different channels",
-                where=f"data set {self.name}, trace {other.name}",
-                expected=", ".join(channel.label for channel in first.channels),
-                got=", ".join(channel.label for channel in other.channels),
-                remedy="choose the same channels, in the same units, for every trace",
-            )
-
-    def __len__(self) -> int:
-        return len(self.traces)
-
-    def __repr__(self) -> str:
-        first, samples = self.traces[0], sum(map(len, self.traces))
-        roles = ", ".join(f"{len(ours)} {role.value}" for role in Role if (ours := self.with_role(role)))
-        channels = ", ".join(channel.label for channel in first.channels)
-        return f"<TraceSet {self.name}: {roles}; {samples:,} samples of {first.sample_time:g} s; {channels}>"
-
-    def __iter__(self) -> Iterator[Trace]:
-        return iter(self.traces)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.names
-
-    def __getitem__(self, name: str) -> Trace:
-        for trace in self.traces:
-            if trace.name == name:
-                return trace
-        raise TraceError(
-            f"no trace named {name}",
-            where=f"data set {self.name}",
-            expected=f"one of {', '.join(self.names)}",
-            got=name,
-            remedy=did_you_mean(name, self.names, "correct the name of the case"),
-        )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the traces, in order."""
-        return tuple(trace.name for trace in self.traces)
-
-    @property
-    def sample_time(self) -> float:
-        """Seconds between samples, the same for every trace."""
-        return self.traces[0].sample_time
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """The channels that every trace has."""
-        return self.traces[0].channels
-
-    @property
-    def digest(self) -> str:
-        """SHA-256 over names, roles and the digests of the traces."""
-        parts = [[t.name, self.roles[t.name].value, t.digest] for t in self.traces]
-        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-    @property
-    def shared(self) -> tuple[tuple[str, str], ...]:
-        """Cases that choose or are scored and have samples of one that is fitted, with the name of that one.
-
-        Found where both have the same values at the same times, be it by a copy or by two cuts of one record.
-        """
-        fitted = self.with_role(Role.ESTIMATION)
-        scored = self.with_role(Role.SELECTION, Role.VALIDATION, Role.TEST)
-        pairs = ((one, next((other for other in fitted if _share_samples(one, other)), None)) for one in scored)
-        return tuple((one.name, other.name) for one, other in pairs if other is not None)
-
-    def with_role(self, *roles: Role) -> tuple[Trace, ...]:
-        """The traces that have one of these roles, in order."""
-        return tuple(trace for trace in self.traces if self.roles[trace.name] in roles)
-
-
-def _share_samples(one: Trace, other: Trace) -> bool:
-    """Whether two records have the same values where their times overlap, and these are no constants."""
-    later = round((other.start_time - one.start_time) / one.sample_time)
-    mine, theirs = one.values[max(later, 0) :], other.values[max(-later, 0) :]
-    n = min(len(mine), len(theirs))
-    return n > 1 and np.array_equal(mine[:n], theirs[:n]) and bool((np.ptp(mine[:n], axis=0) > 0.0).any())
-
-
-def converter_step(values: NDArray[np.float64]) -> float | None:
-    """The step of a converter, where all values are multiples of one.
-
-    Args:
-        values: Finite, shape ``(n,)``.
-
-    Returns:
-        The step, in the values' unit; ``None`` where they have none, or are too few to say.
-
-    Example:
-        >>> converter_step(np.round(np.sin(np.arange(200.0)) / 0.1) * 0.1).__round__(9)
-        0.1
-    """
-    apart = np.diff(np.unique(values)) if len(values) >= 20 else np.empty(0)
-    apart = apart[apart > ROUNDING * apart.sum()]
-    if not 0 < len(apart) <= 0.7 * len(values) or apart.sum() / FEW_STEPS < apart.min():
-        return None
-    count = apart / apart.min()
-    return float(apart.min()) if np.mean(np.abs(count - np.round(count)) < 0.05) > EVEN else None
-
-
-def coarse_step(values: NDArray[np.float64]) -> float | None:
-    """The step of a converter that is coarse: a signal that moves by less from sample to sample shows its steps.
-
-    Args:
-        values: Neighbouring samples, finite, shape ``(n,)``.
-
-    Returns:
-        The step, in the values' unit; ``None`` where it is fine, or the signal goes several steps at a time, as
-        commands do.
-    """
-    step = converter_step(values)
-    if step is None:
-        return None
-    moves = np.abs(np.diff(values))
-    one_by_one = np.median(moves[moves > 0.5 * step]) < 1.5 * step
-    shown = step**2 > np.mean(moves**2) and step > VISIBLE * float(values.std())
-    return step if one_by_one and shown else None
 
 
 def check_units(units: Mapping[str, str], trace: Trace) -> None:
