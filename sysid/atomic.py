@@ -1,12 +1,20 @@
-"""Files that are there whole or not at all."""
+"""Files and folders that are there whole or not at all."""
 
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+LEFT_S = 3600.0
+"""Seconds after which a draft counts as left by a process that was killed."""
+_DRAFT = re.compile(r"\.(?P<of>.*)\.[a-z0-9_]{8}(?P<ending>\.[^.]*)?", re.DOTALL)
+"""Names of drafts: those of :mod:`tempfile`."""
 
 
 @contextmanager
@@ -46,6 +54,68 @@ def replacing(path: Path) -> Iterator[Path]:
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """A new folder that takes the place of ``path``, with all that is in it, when the block ends without an error.
+
+    What killed processes have left of earlier drafts goes with it.
+
+    Args:
+        path: The folder to fill; one that is there is put back where the new one cannot take its place.
+
+    Yields:
+        An empty folder.
+
+    Raises:
+        OSError: What the system refuses, with the name of ``path`` for that of the draft, which nobody knows.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = f".{path.name}."
+    try:
+        with tempfile.TemporaryDirectory(prefix=beside, dir=path.parent) as workplace:
+            draft, old = Path(workplace) / "new", Path(workplace) / "old"
+            draft.mkdir()
+            yield draft
+            if path.exists():
+                path.rename(old)
+            try:
+                draft.rename(path)
+            except OSError:
+                if old.exists():
+                    old.rename(path)
+                raise
+            shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        if error.filename is None or any(part.startswith(beside) for part in Path(str(error.filename)).parts):
+            error.filename = str(path)
+        raise
+    for left in path.parent.glob(".*"):
+        if left.is_dir() and _is_left(left, of=path.name):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def clear_drafts(folder: Path) -> None:
+    """Remove the drafts of files that killed processes have left somewhere in a folder.
+
+    Args:
+        folder: The folder, which nobody else writes to.
+    """
+    for file in folder.rglob(".*.*"):
+        if _is_left(file) and file.is_file():
+            file.unlink(missing_ok=True)
+
+
+def _is_left(draft: Path, of: str | None = None) -> bool:
+    """Whether this is a draft, old enough that nobody is at it any more."""
+    named = _DRAFT.fullmatch(draft.name)
+    if named is None or (of is not None and (named["of"] != of or named["ending"])):
+        return False
+    try:
+        return time.time() - draft.stat().st_mtime > LEFT_S
+    except OSError:  # gone meanwhile
+        return False
 
 
 def _draft(path: Path) -> Path:

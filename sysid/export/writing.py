@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as Dict
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sysid.atomic import replacing
+from sysid.atomic import replacing, replacing_folder
 from sysid.errors import ConfigError
 from sysid.estimation.result import FitResult
 from sysid.export.archive import write_archive
@@ -200,7 +197,8 @@ def publish_bundle(folder: Path, source: AbstractModel | Cascade, manifest: dict
     """
     surrogate, cases, sequences, allowed = content.surrogate, content.cases, content.sequences, content.allowed
     writers = [exporter(name) for name in content.formats]
-    with _published(folder) as draft:
+    _check_free(folder)
+    with replacing_folder(folder) as draft:
         written = [file for writer in writers for file in writer.write(surrogate, draft)]
         checked = [
             check_parity(file, draft, cases, sequences, allowed=allowed[file.dtype], outputs=surrogate.outputs)
@@ -260,9 +258,7 @@ def _check_finite(model: Member) -> None:
         )
 
 
-@contextmanager
-def _published(folder: Path) -> Iterator[Path]:
-    """A draft folder beside ``folder`` that takes its place when the block ends without an error."""
+def _check_free(folder: Path) -> None:
     if folder.exists() and not (folder.is_dir() and (not any(folder.iterdir()) or (folder / MANIFEST).is_file())):
         raise ConfigError(
             "the bundle's folder is already used for something else",
@@ -271,29 +267,3 @@ def _published(folder: Path) -> Iterator[Path]:
             got="a file" if folder.is_file() else f"a folder without {MANIFEST}",
             remedy="choose another folder, or remove what lies there",
         )
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    beside = f".{folder.name}."
-    with _named(folder, beside), tempfile.TemporaryDirectory(prefix=beside, dir=folder.parent) as workplace:
-        draft, old = Path(workplace) / "new", Path(workplace) / "old"
-        draft.mkdir()
-        yield draft
-        if folder.exists():
-            folder.rename(old)
-        try:
-            draft.rename(folder)
-        except OSError:
-            if old.exists():
-                old.rename(folder)
-            raise
-        shutil.rmtree(old, ignore_errors=True)
-
-
-@contextmanager
-def _named(folder: Path, beside: str) -> Iterator[None]:
-    """What the system refuses is refused for the folder: an error names a draft that nobody knows, or nothing."""
-    try:
-        yield
-    except OSError as error:
-        if error.filename is None or any(part.startswith(beside) for part in Path(str(error.filename)).parts):
-            error.filename = str(folder)
-        raise

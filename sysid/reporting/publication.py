@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 from pathlib import Path
 from typing import Final
 
+from sysid.atomic import replacing_folder
 from sysid.errors import ConfigError
 from sysid.names import markdown, markdown_cell, markdown_code
 from sysid.reporting.fit_tables import worst_case
@@ -70,11 +70,8 @@ def publish_run(
     chosen = name or document.results.pipeline
     target = into / chosen
     refuse_others(target)
-    into.mkdir(parents=True, exist_ok=True)
     # A folder of its own that takes the place of the old one whole: no figure of an older run stays behind.
-    with tempfile.TemporaryDirectory(dir=into, prefix=f".{chosen}-") as scratch:
-        draft = Path(scratch) / chosen
-        draft.mkdir()
+    with replacing_folder(target) as draft:
         command = f"sysid publish {run_folder} --as {chosen}{' --bundle' if frozen else ''}"
         text = _page(document, chosen, command, draft)
         for left in frozen:
@@ -87,9 +84,6 @@ def publish_run(
         (draft / PAGE).write_text(text, encoding="utf-8", newline="\n")
         if scores:
             write_scores(draft, scores)
-        if target.exists():
-            target.rename(Path(scratch) / "before")
-        draft.rename(target)
     return target / PAGE
 
 

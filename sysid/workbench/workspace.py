@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.traces import Channel, Trace
 
@@ -33,7 +34,10 @@ def make_workspace(folder: Path) -> list[Path]:
 
     templates = sorted(file for file in TEMPLATE.rglob("*") if file.is_file())
     targets = [folder / file.relative_to(TEMPLATE) for file in templates]
+    records = {folder / "datasets" / "tank" / f"{name.lower()}.csv": name for name in CASES}
     taken = [target for target in targets if target.exists()]
+    if not all(file.exists() for file in (*targets, *records)):  # a call that was cut off has left whole files, as here
+        taken = [target for source, target in zip(templates, targets, strict=True) if _is_another(source, target)]
     if taken:
         raise ConfigError(
             "the folder has files of a workspace already",
@@ -44,15 +48,21 @@ def make_workspace(folder: Path) -> list[Path]:
         )
     try:
         for source, target in zip(templates, targets, strict=True):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source, target)
+            with replacing(target) as draft:
+                shutil.copyfile(source, draft)
         schemas = write_schemas(folder)
     except OSError as error:
         raise ConfigError(
             "the workspace cannot be written", where=folder, got=error, remedy="name another folder"
         ) from error
-    records = [write_csv(tank(name), folder / "datasets" / "tank" / f"{name.lower()}.csv") for name in CASES]
+    for file, name in records.items():
+        if not file.exists():
+            write_csv(tank(name), file)
     return [*targets, *schemas, *records]
+
+
+def _is_another(source: Path, target: Path) -> bool:
+    return target.exists() and not (target.is_file() and target.read_bytes() == source.read_bytes())
 
 
 def tank(case: str, n_samples: int = 1500) -> Trace:

@@ -9,8 +9,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import urllib.error
-import urllib.request
 import webbrowser
 from pathlib import Path
 from typing import IO
@@ -21,6 +19,7 @@ from sysid.workbench.runner.console import console
 from sysid.workbench.tracking.landing import VARIABLE
 from sysid.workbench.tracking.mlflow_store import QUIET, latest_experiment, store_uri
 from sysid.workbench.tracking.mlflow_views import VIEW
+from sysid.workbench.tracking.server import answers
 
 APP = "sysid"
 """Name of our entry point for MLflow's server."""
@@ -166,11 +165,9 @@ def _interrupt(*_: object) -> None:
 def _wait_until_up(process: subprocess.Popen[bytes], address: str, log: IO[bytes]) -> None:
     deadline = time.monotonic() + START_LIMIT_S
     while time.monotonic() < deadline and process.poll() is None:
-        try:
-            with urllib.request.urlopen(f"{address}/health", timeout=2):  # noqa: S310 - our own address
-                return
-        except (urllib.error.URLError, OSError):
-            time.sleep(0.2)
+        if not answers(address, patience_s=2.0):
+            return
+        time.sleep(0.2)
     log.seek(0)
     last = log.read().decode(errors="replace").strip().splitlines()[-5:]
     raise SysidError(

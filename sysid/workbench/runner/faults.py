@@ -65,6 +65,12 @@ _DATABASE = {
         got="a store that is locked",
         remedy=f"wait until the other process is done, or stop it; {_TRACKED_LATER}",
     ),
+    "out-of-date database schema": _Refusal(
+        what="the tracking store was made by another version of MLflow",
+        got="tables that this version does not have, or that it has more of",
+        remedy="take the MLflow that made it; where this one is newer, copy mlflow.db and run mlflow db upgrade "
+        f"sqlite:///mlflow.db; or move it away: {_TRACKED_LATER}",
+    ),
 }
 """What a database says where its disk or another process stands in the way: its own words, and ours."""
 

@@ -27,7 +27,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from sysid import bounded_text
-from sysid.atomic import replacing
+from sysid.atomic import clear_drafts, replacing
 from sysid.errors import ConfigError, UserError
 
 LINE = "line.json"
@@ -189,6 +189,7 @@ class RunFolder:
             ) from error
         try:
             write_json(holder, {"pid": os.getpid(), "host": platform.node(), "since": time.strftime("%H:%M:%S")})
+            clear_drafts(self.path)
             yield
         finally:
             lock.release()

@@ -34,6 +34,7 @@ from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_store as tracking
 from sysid.workbench.tracking import mlflow_views as views
 from sysid.workbench.tracking.judgement_run import log_judgement
+from sysid.workbench.tracking.moved_store import ARTIFACTS
 from sysid.workbench.tracking.served_table import SEQUENCE_FILE
 from sysid.workbench.tracking.sqlite_store import SQLITE
 from sysid.workbench.tracking.sweep_run import experiment_name, log_sweep
@@ -83,7 +84,7 @@ class Tracker:
             The tracker; nothing is opened yet.
         """
         uri = tracking.store_uri(workspace)
-        return cls(uri=uri, artifacts=workspace / "mlartifacts" if uri.startswith(SQLITE) else None, warn=warn)
+        return cls(uri=uri, artifacts=workspace / ARTIFACTS if uri.startswith(SQLITE) else None, warn=warn)
 
     def __call__(self, event: Event) -> None:
         """Log an event; never raises."""

@@ -31,8 +31,10 @@ from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_views as views
 from sysid.workbench.tracking.fit_run import Entities
 from sysid.workbench.tracking.landing import VARIABLE, App, leading_to
+from sysid.workbench.tracking.moved_store import ARTIFACTS, follow
 from sysid.workbench.tracking.registry import parsed, register
 from sysid.workbench.tracking.served_table import SEQUENCE_FILE, STATE, flags_column, label, rests
+from sysid.workbench.tracking.server import check_server
 from sysid.workbench.tracking.sqlite_store import SQLITE, held, unhurried_disk
 from sysid.workbench.tracking.sweep_run import TRIALS_TAG
 
@@ -41,6 +43,8 @@ QUIET = {
     "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
     "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
     "GIT_PYTHON_REFRESH": "quiet",
+    # Seven times, as MLflow has it, take four minutes, for each thing that is told a server that has gone.
+    "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "3",
 }
 """Settings that MLflow reads when it is imported; what the user has set stays."""
 
@@ -74,6 +78,7 @@ def connect(uri: str) -> Any:
 
     Raises:
         MissingExtraError: If MLflow is not installed.
+        ConfigError: If a server does not answer, or a file is no store.
     """
     for name, value in QUIET.items():
         os.environ.setdefault(name, value)
@@ -83,9 +88,13 @@ def connect(uri: str) -> Any:
 
         for name in ("mlflow", "alembic"):
             logging.getLogger(name).setLevel(logging.WARNING)
+        if uri.startswith(("http://", "https://")):
+            check_server(uri)
         if not uri.startswith(SQLITE):
             return MlflowClient(uri)
-        with held(Path(uri.removeprefix(SQLITE)), _make_store):
+        database = Path(uri.removeprefix(SQLITE))
+        with held(database, _make_store):
+            follow(database)
             return MlflowClient(uri)
 
 
@@ -104,7 +113,7 @@ def _make_store(database: Path) -> None:
     from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
 
     with unhurried_disk():
-        store = SqlAlchemyStore(f"{SQLITE}{database.as_posix()}", "mlartifacts")
+        store = SqlAlchemyStore(f"{SQLITE}{database.as_posix()}", ARTIFACTS)
         store.engine.dispose()
 
 

@@ -33,7 +33,7 @@ def held(database: Path, make: Callable[[Path], None]) -> Iterator[None]:
         Nothing; the store is there.
 
     Raises:
-        ConfigError: If its file is no database: MLflow would ask for it again for 102 s before it says so.
+        ConfigError: If its file is no database, or cannot be opened: MLflow would try for 102 s before it says so.
     """
     with FileLock(database.with_name(f"{database.name}.lock")):
         if not database.exists():
@@ -86,7 +86,15 @@ def _write_ahead(database: Path) -> None:
     try:
         with closing(sqlite3.connect(database, timeout=0.0)) as connection:
             connection.execute("PRAGMA journal_mode=WAL")
-    except sqlite3.OperationalError:
+    except sqlite3.OperationalError as error:
+        if "unable to open" in str(error):
+            raise ConfigError(
+                "the store of tracked runs cannot be opened",
+                where=str(database),
+                expected="a file, in a folder that may be written to",
+                got="a folder" if database.is_dir() else str(error),
+                remedy="change the permissions of the file and of its folder, or move away what lies there",
+            ) from error
         # In use or read-only: it stays as it is, and what opens it next says what is wrong.
         return
     except sqlite3.DatabaseError as error:

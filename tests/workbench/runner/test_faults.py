@@ -17,6 +17,7 @@ SAID = {
     "disk I/O error": ("full, or reports a fault", "free some space"),
     "attempt to write a readonly database": ("may not be written to", "permissions"),
     "database is locked": ("held by another process", "wait"),
+    "Detected out-of-date database schema (found version a, but expected b)": ("another version", "mlflow db upgrade"),
 }
 STATEMENT = "UPDATE runs SET status=? WHERE runs.run_uuid = ?"
 

@@ -75,3 +75,11 @@ def test_what_is_no_database_is_refused_at_once_and_left_as_it_is(tmp_path: Path
         pass
     assert "move it away" in str(error.value)
     assert database.read_bytes() == b"not a database at all" * 100
+
+
+def test_what_cannot_be_opened_is_refused_at_once(tmp_path: Path) -> None:
+    database = tmp_path / "mlflow.db"
+    database.mkdir()
+    with pytest.raises(ConfigError, match="cannot be opened") as error, held(database, make):
+        pass
+    assert error.value.got == "a folder"
