@@ -1,4 +1,7 @@
-"""Slow models for the tests and benchmarks: named in a configuration as ``slow_models:thermal`` and so on."""
+"""Slow models for the tests and benchmarks: named in a configuration as ``slow_models:thermal`` and so on.
+
+Every worker imports this file: what takes a second to import is imported where it is used.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,7 @@ import time as clock
 from collections.abc import Mapping
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 Array = NDArray[np.float64]
 STATES = 200
@@ -93,6 +94,8 @@ def thermal_run(h: float, inputs: Array, conductivity: float, tolerance: float) 
         j[0, 0] -= FILM
         j[-1, -1] -= FILM + 4.0 * AREA * x[-1] ** 3
         return j / capacity[:, np.newaxis]
+
+    from scipy.integrate import solve_ivp
 
     x, found = np.full(STATES, 293.15), np.empty((len(inputs), 2))
     for k, (heat, air) in enumerate(inputs):
@@ -237,6 +240,8 @@ def stands_still(time: Array, inputs: Array, parameters: Mapping[str, float]) ->
 
 def gives(time: Array, inputs: Array, parameters: Mapping[str, float]) -> object:
     """What somebody's function may give for a record of two outputs; the number of ``how`` says what."""
+    import pandas as pd
+
     y, z = 0.5 * inputs[:, 0], 100.0 * inputs[:, 0]
     both = np.column_stack([y, z])
     return [
