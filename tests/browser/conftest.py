@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -37,14 +38,19 @@ def program(browser) -> str:
     return find_browser() or str(browser.browser_type.executable_path)
 
 
-@pytest.fixture
-def page(browser, request: pytest.FixtureRequest) -> Iterator[object]:
-    """A fresh page that accepts downloads, as wide as a desk's screen."""
+def new_context(browser) -> object:
+    """A visitor who accepts downloads, with pages as wide as a desk's screen."""
     context = browser.new_context(viewport={"width": 1600, "height": 1000}, accept_downloads=True)
     # The whole suite may run beside it on two cores.
     context.set_default_timeout(90_000)
-    yield context.new_page()
-    context.close()
+    return context
+
+
+@pytest.fixture
+def page(browser) -> Iterator[object]:
+    """The page of somebody who was never here."""
+    with closing(new_context(browser)) as context:
+        yield context.new_page()
 
 
 @pytest.fixture

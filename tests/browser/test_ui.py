@@ -8,12 +8,14 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
+from contextlib import closing
 from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
 
 from sysid.workbench.commands.ui import APP
+from tests.browser.conftest import new_context
 
 pytestmark = pytest.mark.browser
 
@@ -45,6 +47,22 @@ def address(tracked_workspace: Path) -> Iterator[str]:
         yield told
         process.send_signal(signal.SIGTERM)
         assert process.wait(timeout=30) == 0
+
+
+@pytest.fixture(scope="module")
+def visitor(browser, address) -> Iterator[object]:
+    """One visitor for all of these tests, who leaves before the server ends.
+
+    MLflow's ten megabytes of programs are loaded and translated once.
+    """
+    with closing(new_context(browser)) as context:
+        yield context
+
+
+@pytest.fixture
+def page(visitor) -> Iterator[object]:
+    with closing(visitor.new_page()) as page:
+        yield page
 
 
 def open_runs(page, address: str, shown: str = RUNS[0]) -> None:
