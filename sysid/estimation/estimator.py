@@ -215,7 +215,7 @@ class Estimator:
             found = self.with_posterior(found, traces, named["start"], given.get("selection", ()))
             told = () if found.posterior is not None else (f"No interval of the output: {self._unsure(options)}.",)
             off = equilibrium_notes(found.model, traces, named["start"])
-            against = contradicted(found.model, traces, named["start"], options)
+            against = contradicted(found.model, traces, named["start"], options, uncertainty=found.uncertainty)
             few = (*outnumbered(found.model, traces), *underexcited(found.model, traces), *held(found.model, traces))
             switches, levels = between_levels(found.model, traces)
             warned = (

@@ -19,6 +19,7 @@ from sysid.estimation.nonparametric.segments import segments_of
 from sysid.estimation.record_drift import drifts_told
 from sysid.estimation.record_levels import levels_told
 from sysid.estimation.record_resolution import resolution_told
+from sysid.estimation.uncertainty import Uncertainty
 from sysid.estimation.wrapped import jumping, period_of
 from sysid.estimation.wrapped import told as wrapped
 from sysid.models import AbstractModel, Mapping, Start
@@ -41,6 +42,7 @@ DIVERGED = 1e12
 WORSE, HARDLY, POOR = 1.1, 0.9, 0.6
 """Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt; above
 which it does as well, all but a twentieth of the output's movement; and above which a run is poor."""
+NO_INTERVALS = " The intervals of its parameters mean nothing: they take the model for true, and its error for noise."
 
 
 def undetermined(traces: Sequence[Trace], mapping: Mapping) -> tuple[str, ...]:
@@ -249,7 +251,12 @@ def between_levels(model: AbstractModel, traces: Sequence[Trace]) -> tuple[tuple
 
 
 def contradicted(
-    model: AbstractModel, traces: Sequence[Trace], start: Start, training: object = None
+    model: AbstractModel,
+    traces: Sequence[Trace],
+    start: Start,
+    training: object = None,
+    *,
+    uncertainty: Uncertainty | None = None,
 ) -> tuple[str, ...]:
     """What the free run says against a model, over the very records that it was fitted to.
 
@@ -258,6 +265,7 @@ def contradicted(
         traces: The records; the first so many are looked at.
         start: What stands before each.
         training: How it was fitted.
+        uncertainty: Of its parameters, where the fit knows one.
 
     Returns:
         One sentence for each output whose free run a constant beats or equals, for each that acts on the inputs, and
@@ -276,7 +284,8 @@ def contradicted(
     # A lag that is left out is a cause, and the nearer one; not of a run that has next to nothing of the output.
     worth = not lags or min(ratios.values(), default=0.0) > POOR
     rest = (*lags, *(causes(model, longest, (*fed, *levels), but=known) if worth else ()))
-    return (*_told_beside_constants(model, ratios), *fed.values(), *levels.values(), *known.values(), *rest)
+    told = _told_beside_constants(model, ratios, uncertainty)
+    return (*told, *fed.values(), *levels.values(), *known.values(), *rest)
 
 
 def _beside_constants(runs: Sequence[FreeRun]) -> dict[int, float]:
@@ -293,17 +302,23 @@ def _beside_constants(runs: Sequence[FreeRun]) -> dict[int, float]:
         }
 
 
-def _told_beside_constants(model: AbstractModel, ratios: Dict[int, float]) -> list[str]:
+def _told_beside_constants(
+    model: AbstractModel, ratios: Dict[int, float], uncertainty: Uncertainty | None
+) -> list[str]:
     told = []
+    bounded = uncertainty is not None and bool(np.isfinite(uncertainty.standard_deviations).any())
     for i, ratio in ratios.items():
         name = model.mapping.outputs[i]
         if not ratio <= HARDLY:
             lost = not ratio < DIVERGED
             fit = "it diverges" if lost else f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %"
-            how = "hardly better" if ratio <= WORSE else "worse"
+            worse = not ratio <= WORSE
+            how = "worse" if worse else "hardly better"
             told.append(
                 f"Over the records that were fitted the free run of {name} is {how} "
                 f"than a constant ({fit}). Try other orders, more starts, a fit of the free run (loop: closed, noise: "
                 f"false, OE) or more iterations; or the inputs say little of {name}."
+                + NO_INTERVALS
+                * (worse and bounded)
             )
     return told

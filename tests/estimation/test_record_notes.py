@@ -106,8 +106,12 @@ def test_a_free_run_that_a_constant_beats_is_told() -> None:
     (other_way,) = sysid.data((u, -y), sample_time=1.0)
     told, *_ = contradicted(fit.model, [other_way], Start())
     assert told.startswith("Over the records that were fitted the free run of y is worse than a constant")
+    assert "intervals" not in told
+    told, *_ = contradicted(fit.model, [other_way], Start(), uncertainty=fit.uncertainty)
+    assert "intervals of its parameters mean nothing" in told
     (drowned,) = sysid.data((u, y + 20.0 * y.std() * np.random.default_rng(5).standard_normal(N)), sample_time=1.0)
-    told, *_ = contradicted(fit.model, [drowned], Start())
+    told, *_ = contradicted(fit.model, [drowned], Start(), uncertainty=fit.uncertainty)
+    assert "intervals" not in told
     assert told.startswith("Over the records that were fitted the free run of y is hardly better than a constant")
     (as_it_is,) = sysid.data((u, y), sample_time=1.0)
     assert contradicted(fit.model, [as_it_is], Start()) == ()

@@ -44,7 +44,7 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.named import Named, named_of
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import Choice, choose
-from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
+from sysid.estimation.networks.multistart_result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
@@ -247,10 +247,10 @@ def fit_equations(
     done = finished(ready, choice.chosen, training, until=multistart.until, stopped=multistart.stop.is_set())
     candidates = [done.candidate if one is choice.chosen else one for one in candidates]
     choice = replace(choice, chosen=done.candidate)
-    records = [(e.inputs, e.history) for e in experiments]
-    status = multistart_status(done.candidate, candidates, records, interrupted=multistart.stop.is_set())
+    left = left_on(done.candidate.model, [t.name for t in data[0]], [(e.inputs, e.history) for e in experiments])
+    status = multistart_status(done.candidate, candidates, left, interrupted=multistart.stop.is_set())
     seconds = multistart.checkpoints.earlier_s + now() - began
-    found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
+    found = with_note(multistart_result(choice, candidates, training, status, seconds, left=left), windows)
     return _told(found, done, data, ready.named)
 
 

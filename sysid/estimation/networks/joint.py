@@ -22,6 +22,7 @@ from sysid.estimation.networks.joint_layout import JointLayout
 from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.joint_provider import CascadeProvider
 from sysid.estimation.networks.multistart import INITIAL_ALPHA
+from sysid.estimation.networks.multistart_result import left_told
 from sysid.estimation.networks.training import FitProgress
 from sysid.estimation.result import Status
 from sysid.estimation.uncertainty import Uncertainty
@@ -203,10 +204,11 @@ class Joint:
         chosen = min(seen, key=lambda one: _last(one.score if self.selection else one.loss))
         curve = chosen.solution.curve if chosen.solution else ()
         uncertainty, warnings = self._known(chosen.solution)
+        left = self._left(chosen.model)
         how = "by the selection traces" if self.selection else "by its loss on the estimation traces"
         return CascadeFit(
             model=chosen.model,
-            status=self._status(chosen, seen, interrupted=interrupted),
+            status=self._status(chosen, seen, left, interrupted=interrupted),
             errors=dict(self.provider.errors),
             history={
                 "iteration": np.array([entry.iteration for entry in curve], dtype=np.float64),
@@ -221,7 +223,7 @@ class Joint:
                 f"Chosen {how} among {len(seen)} states: {chosen.sentence}.",
                 *_others([one for one in seen if one is not chosen]),
             ),
-            warnings=warnings,
+            warnings=(*warnings, *left_told(left)),
             attempts=tuple(one.attempt(chosen=one is chosen) for one in seen),
             uncertainty=uncertainty,
             solution=chosen.solution,
@@ -237,12 +239,17 @@ class Joint:
         findings = Findings.of(with_evidence(solution, n), self.layout, named)
         return findings.uncertainty(2.0 * solution.at.loss / max(n - len(solution.theta), 1)), findings.warnings
 
-    def _status(self, chosen: _Candidate, seen: Sequence[_Candidate], *, interrupted: bool) -> Status:
+    def _left(self, model: Cascade) -> tuple[str, ...]:
+        """Names of the records over which the free run leaves its bounds."""
+        traces = (*self.provider.traces, *self.selection)
+        runs = [(trace.name, model.simulate_trace(trace, rest=self.provider.begins(trace))) for trace in traces]
+        return tuple(name for name, run in runs if any(one.lost for one in run.activity.values()))
+
+    @staticmethod
+    def _status(chosen: _Candidate, seen: Sequence[_Candidate], left: Sequence[str], *, interrupted: bool) -> Status:
         if interrupted:
             return Status.INTERRUPTED
-        traces = (*self.provider.traces, *self.selection)
-        runs = [chosen.model.simulate_trace(trace, rest=self.provider.begins(trace)) for trace in traces]
-        if any(activity.lost for run in runs for activity in run.activity.values()):
+        if left:
             return Status.UNSTABLE
         if chosen.solution is None:
             return Status.NOT_IMPROVED

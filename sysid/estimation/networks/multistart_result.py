@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,14 @@ from sysid.estimation.networks.training import Training
 from sysid.estimation.result import FitResult, Status
 from sysid.models import History
 
+MOST_NAMES = 3
+"""Records that a sentence names."""
+
 
 def multistart_status(
     chosen: starts.Candidate,
     candidates: Sequence[starts.Candidate],
-    records: Sequence[tuple[NDArray[np.float64], History | None]],
+    left: Sequence[str],
     *,
     interrupted: bool,
 ) -> Status:
@@ -27,7 +30,7 @@ def multistart_status(
     Args:
         chosen: The candidate chosen.
         candidates: All of them.
-        records: Inputs and history of each record over which the free run must stay within its bounds.
+        left: Names of the records over which its free run leaves its bounds.
         interrupted: Whether it was.
 
     Returns:
@@ -35,7 +38,7 @@ def multistart_status(
     """
     if interrupted:
         return Status.INTERRUPTED
-    if any(_leaves_its_bounds(chosen.model, inputs, history) for inputs, history in records):
+    if left:
         return Status.UNSTABLE
     status = chosen.solution.status
     # Of a start that was given up for others its iterations did not run out: they were not wanted.
@@ -47,9 +50,44 @@ def multistart_status(
     return Status.STOPPED_EARLY if later else status
 
 
-def _leaves_its_bounds(model: starts.Network, inputs: NDArray[np.float64], history: History | None) -> bool:
-    scaled = model.scaling.scale_output(model.simulate(inputs, history))
-    return not bool(np.all(np.abs(scaled) < model.clamp * (1.0 - 1e-9)))
+def left_on(
+    model: starts.Network, names: Iterable[str], runs: Iterable[tuple[NDArray[np.float64], History | None]]
+) -> tuple[str, ...]:
+    """The records over which a free run leaves its bounds.
+
+    Args:
+        model: The model.
+        names: Of the records.
+        runs: Inputs and history of each.
+
+    Returns:
+        The names of those over which it does.
+    """
+
+    def lost(inputs: NDArray[np.float64], history: History | None) -> bool:
+        scaled = model.scaling.scale_output(model.simulate(inputs, history))
+        return not bool(np.all(np.abs(scaled) < model.clamp * (1.0 - 1e-9)))
+
+    return tuple(dict.fromkeys(name for name, run in zip(names, runs, strict=True) if lost(*run)))
+
+
+def left_told(left: Sequence[str]) -> tuple[str, ...]:
+    """What a fit says of records over which its free run leaves its bounds, whatever random sequences say of it.
+
+    Args:
+        left: Their names.
+
+    Returns:
+        None, or a sentence.
+    """
+    if not left:
+        return ()
+    names = ", ".join(left[:MOST_NAMES]) + (f" and {len(left) - MOST_NAMES} more" if len(left) > MOST_NAMES else "")
+    one = len(left) == 1
+    return (
+        f"Unstable: over the record{'s' * (not one)} {names}, which {'was' if one else 'were'} given to the fit, its "
+        "free run leaves its bounds.",
+    )
 
 
 def multistart_result(
@@ -58,6 +96,8 @@ def multistart_result(
     training: Training,
     status: Status,
     seconds: float,
+    *,
+    left: Sequence[str] = (),
 ) -> FitResult:
     """What a multistart found.
 
@@ -67,6 +107,7 @@ def multistart_result(
         training: How they were trained.
         status: How it ended.
         seconds: Wall time.
+        left: Names of the records over which the free run leaves its bounds.
 
     Returns:
         The result.
@@ -88,7 +129,8 @@ def multistart_result(
         seed=chosen.seed,
         evidence=chosen.solution.evidence,
         attempts=_attempts(choice, candidates),
-        notes=_notes(choice, candidates, training),
+        notes=(*_notes(choice, candidates, training), *left_told(left)),
+        warnings=left_told(left),
     )
 
 

@@ -22,7 +22,7 @@ from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.networks.choosing import Choice, choose
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
-from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
+from sysid.estimation.networks.multistart_result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.posterior import calibrate, laplace
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import RecursionProvider
@@ -113,9 +113,12 @@ def fit_narx(
         choice = _over_all(multistart, windows, choice, tasks[race])
         tasks = dict(zip(in_place(list(tasks), race, choice.chosen), tasks.values(), strict=True))
     chosen = choice.chosen
-    records: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
-    records += [(t.columns(mapping.inputs), None) for t in selection]
-    status = multistart_status(chosen, list(tasks), records, interrupted=multistart.stop.is_set())
+    runs: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
+    runs += [(t.columns(mapping.inputs), None) for t in selection]
+    # Copies with other offsets stand behind the records that they are of.
+    names = [t.name for t in traces] * (len(experiments) // len(traces)) + [t.name for t in selection]
+    left = left_on(chosen.model, names, runs)
+    status = multistart_status(chosen, list(tasks), left, interrupted=multistart.stop.is_set())
     posterior = laplace(
         chosen.solution.state,
         chosen.model,
@@ -129,7 +132,7 @@ def fit_narx(
             posterior, chosen.model, [Experiment.for_model(t, chosen.model, start) for t in selection]
         )
     seconds = multistart.checkpoints.earlier_s + now() - began
-    fit = with_note(multistart_result(choice, list(tasks), training, status, seconds), windows)
+    fit = with_note(multistart_result(choice, list(tasks), training, status, seconds, left=left), windows)
     # All of them have the template's limits.
     held = (told(template.between, mapping.output, template.output_unit),) if template.limits else ()
     return replace(fit, posterior=posterior, notes=(*fit.notes, *held))

@@ -20,7 +20,7 @@ from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
-from sysid.estimation.networks.multistart_result import multistart_result, multistart_status
+from sysid.estimation.networks.multistart_result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.neural_ensemble import United, united
 from sysid.estimation.networks.neural_map import learnt_map
 from sysid.estimation.networks.neural_provider import NeuralProvider
@@ -293,15 +293,12 @@ def _fit(
         told = [*shown_note(provider.shown), *other_note(unmended)]
         choice, candidates = replace(choice, chosen=chosen), in_place(candidates, before, chosen)
     others = experiments_of(records.selection, template.mapping, records.start, template.resting)
-    status = multistart_status(
-        choice.chosen,
-        candidates,
-        [(e.inputs, e.history) for e in (*experiments, *others)],
-        interrupted=multistart.stop.is_set(),
-    )
+    names = [trace.name for trace in (*records.traces, *records.selection)]
+    left = left_on(choice.chosen.model, names, [(e.inputs, e.history) for e in (*experiments, *others)])
+    status = multistart_status(choice.chosen, candidates, left, interrupted=multistart.stop.is_set())
     posterior = _posterior(choice.chosen, provider, records, whole)
     seconds = multistart.checkpoints.earlier_s + now() - began
-    found = with_note(multistart_result(choice, candidates, training, status, seconds), windows)
+    found = with_note(multistart_result(choice, candidates, training, status, seconds, left=left), windows)
     notes = (*told, *(() if whole is None else whole.notes(choice)))
     return replace(found, posterior=posterior, notes=(*found.notes, *notes))
 

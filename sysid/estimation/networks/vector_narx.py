@@ -175,7 +175,8 @@ def _result(fit: CascadeFit) -> FitResult:
         seed=fit.seed,
         evidence=fit.evidence,
         attempts=fit.attempts,
-        notes=(*fit.notes, f"Errors that count as one: {sizes}."),
+        notes=(*fit.notes, *fit.warnings, f"Errors that count as one: {sizes}."),
+        warnings=fit.warnings,
     )
 
 
