@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, stacked
 from sysid.estimation.held_output import held_for, straight_for
-from sysid.estimation.record_drift import trend_of
+from sysid.estimation.record_drift import sums_up, trend_of
 from sysid.estimation.wrapped import jumping, period_of
 from sysid.traces.converter import coarse_step, converter_step
 
@@ -18,7 +18,8 @@ COARSE = 0.1
 """Of a channel's standard deviation: a step of its converter that is larger is coarse."""
 FEW_LEVELS = 20
 """A channel with fewer different values is a command and has no resolution of its own."""
-SPIKE_FACTOR, MOST_SPIKES = 4.0, 0.005
+SPIKE_FACTOR, MOST_SPIKES = 4.0, 0.02
+"""How much further than all others a spike jumps away and back, and the most samples of a channel that do."""
 AT_END, LONG_STAY, VERY_LONG_STAY, STANDING = 0.002, 3, 10, 0.1
 """Part of a channel's span that counts as its end, samples in a row there that are a stay (and where the channel stands
 still elsewhere too), and part of its usual roughness that it has at a limit."""
@@ -176,7 +177,11 @@ def _spikes(
             code="channel.spikes",
             verdict=Verdict.LOOK,
             subject=(name,),
-            figures={"count": count, "largest": float(height.max()), "usual": float(np.quantile(height, 0.995))},
+            figures={
+                "count": count,
+                "largest": float(height.max()),
+                "usual": float(np.quantile(height, 1.0 - MOST_SPIKES)),
+            },
         )
 
 
@@ -190,20 +195,27 @@ def _trends(record: Record) -> Iterator[Finding]:
         parts = [(one.left, one) for one in record.residuals] if not isinstance(known, str) and known.settled else []
         factor = record.slowed[1]
         for left, one in parts:
-            yield from _trend(record, left, (one.segment.trace, one.first, factor), size)
+            by = sums_up(left, one.segment.inputs[-len(left) :])
+            summed = () if by is None else (record.moving[by],)
+            yield from _trend(record, left, (one.segment.trace, one.first, factor), size, summed)
     else:
         for segment in record.segments:
             yield from _trend(record, segment.output, (segment.trace, segment.first, 1), size)
 
 
-def _trend(record: Record, part: NDArray[np.float64], place: tuple[str, int, int], size: float) -> Iterator[Finding]:
+def _trend(
+    record: Record,
+    part: NDArray[np.float64],
+    place: tuple[str, int, int],
+    size: float,
+    summed: tuple[str, ...] = (),
+) -> Iterator[Finding]:
     (trace, first, factor), found = place, trend_of(part, size)
     if found is None:
         return
     figures = {"size": found.size, "share": abs(found.size) / size}
     if found.at is not None:
         figures["seconds"] = (first + found.at * factor) * record.sample_time
-    yield Finding(
-        topic=Topic.CHANNELS, code="output.drift" if found.at is None else "output.jump", verdict=Verdict.LOOK,
-        subject=(record.mapping.output, trace), figures=figures,
-    )  # fmt: skip
+    code = "output.jump" if found.at is not None else "output.sums" if summed else "output.drift"
+    subject = (*summed, *([] if summed else [record.mapping.output]), trace)
+    yield Finding(topic=Topic.CHANNELS, code=code, verdict=Verdict.LOOK, subject=subject, figures=figures)

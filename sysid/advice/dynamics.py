@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.advice.finding import Finding, Topic, Verdict
-from sysid.advice.record import Record
+from sysid.advice.record import BARELY, Record, stacked
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 
 INTEGRATES = "settling.integrates"
@@ -17,8 +17,9 @@ TOO_FAST, FAR_TOO_FAST, TOO_SLOW, GOOD = 30.0, 100.0, 1.5, 8.0
 """Samples from 10 to 90 % of a step response: above and below which the rate is not good, and what it should be."""
 VISIBLE = 0.05
 """Part of its peak from which a response is seen with the naked eye."""
-BARELY = 0.3
-"""Share of the output that a linear response explains, below which nothing is built on it."""
+RINGS = 0.3
+"""Damping ratio below which a response is told to ring."""
+AWAY = "the plant runs away by itself, and what is seen is the loop"
 QUIET, LOUD = 20.0, 5.0
 """Signal-to-noise ratios in decibel from which a record is quiet, and below which it is loud."""
 
@@ -39,8 +40,16 @@ def check_dynamics(record: Record) -> Iterator[Finding]:
         return
     whole = record.slowed[0].impulse
     assert isinstance(whole, ImpulseResponse)  # noqa: S101 - it is slowed only where there is one
+    if record.runs_away:
+        yield _runs_away(record)
+        return
+    if record.lasts:
+        yield _lasts(record, whole)
     for j, name in enumerate(found.mapping.inputs):
         dead = found.dead_times[j]
+        if name in record.shared:
+            yield Finding(topic=Topic.DYNAMICS, code="effect.shared", verdict=Verdict.UNKNOWN, subject=(name,))
+            continue
         if not dead.acts and not whole.dead_times[j].acts:
             figures = {"odds": dead.odds}
             yield Finding(
@@ -49,6 +58,32 @@ def check_dynamics(record: Record) -> Iterator[Finding]:
             continue
         yield _dead_time(found, j, name)
         yield _settling(record, whole, j, name)
+
+
+def _runs_away(record: Record) -> Finding:
+    """Dead times and gains of a plant that a controller holds would be those of the loop."""
+    assert record.equation is not None  # noqa: S101 - by which it is known
+    size = abs(record.equation.pole)
+    figures = {"pole": size, "seconds": record.sample_time / np.log(size)}
+    code, subject = "dynamics.runs_away", (record.mapping.output,)
+    return Finding(topic=Topic.DYNAMICS, code=code, verdict=Verdict.LOOK, subject=subject, figures=figures)
+
+
+def _lasts(record: Record, whole: ImpulseResponse) -> Finding:
+    """What rings or is slow beyond the lags that are looked at."""
+    assert record.equation is not None  # noqa: S101 - by which it is known
+    rate = np.log(record.equation.pole or 1e-300) / record.sample_time
+    figures = {
+        "explained": record.equation.explained,
+        "response": max(whole.explained, 0.0),
+        "lags_seconds": float(whole.time[-1]),
+        "hertz": float(abs(rate.imag) / (2.0 * np.pi)),
+        "damping": float(-rate.real / abs(rate)),
+        "seconds": float(-1.0 / rate.real),
+    }
+    code = "dynamics.rings" if figures["damping"] < RINGS else "dynamics.lasts"
+    subject = (record.mapping.output,)
+    return Finding(topic=Topic.DYNAMICS, code=code, verdict=Verdict.NOTE, subject=subject, figures=figures)
 
 
 def _dead_time(found: ImpulseResponse, j: int, name: str) -> Finding:
@@ -82,7 +117,7 @@ def _settling(record: Record, whole: ImpulseResponse, j: int, name: str) -> Find
         code, verdict = INTEGRATES, Verdict.NOTE
     elif whole.explained < BARELY:
         code, verdict = "settling.unknown", Verdict.UNKNOWN
-    elif not whole.settled:
+    elif not whole.settled or record.lasts:
         code, verdict = "settling.never", Verdict.LOOK
     elif figures["length"] < 10.0:
         code, verdict = "settling.short_record", Verdict.LOOK
@@ -120,9 +155,10 @@ def check_sampling(record: Record) -> Iterator[Finding]:
     """
     slow, factor = record.slowed
     found = slow.impulse
-    if isinstance(found, str) or found.explained < BARELY:
+    if isinstance(found, str) or found.explained < BARELY or record.runs_away:
         if record.moving:
             reason = found if isinstance(found, str) else "a linear response explains too little of the output"
+            reason = AWAY if record.runs_away else reason
             yield Finding(topic=Topic.SAMPLING, code="sampling.unknown", verdict=Verdict.UNKNOWN, reason=reason)
         return
     spread = [np.sqrt(np.mean([np.var(s.inputs[:, j]) for s in slow.some.segments])) for j in range(len(found.values))]
@@ -157,17 +193,22 @@ def check_noise(record: Record) -> Iterator[Finding]:
     """
     slow, factor = record.slowed
     found = slow.impulse
-    if isinstance(found, str) or not record.residuals:
+    if isinstance(found, str) or not record.residuals or record.runs_away:
         reason = found if isinstance(found, str) else "the stretches are shorter than the response"
+        reason = AWAY if record.runs_away else reason
         if record.moving:
             yield Finding(topic=Topic.NOISE, code="noise.unknown", verdict=Verdict.UNKNOWN, reason=reason)
         return
-    rest = max(1.0 - found.explained, 1e-16)
-    ratio = 10.0 * np.log10(max(found.explained, 1e-16) / rest)
+    lasts = record.lasts and record.equation is not None
+    explained = record.equation.explained if record.equation is not None and lasts else found.explained
+    rest, left = max(1.0 - explained, 1e-16), np.mean([np.var(one.left) for one in record.residuals])
+    if lasts:
+        left = rest * np.var(stacked(record.values(record.mapping.output)))
+    ratio = 10.0 * np.log10(max(explained, 1e-16) / rest)
     figures = {
-        "explained": max(found.explained, 0.0),
+        "explained": max(explained, 0.0),
         "decibel": float(ratio),
-        "deviation": float(np.sqrt(np.mean([np.var(one.left) for one in record.residuals]))),
+        "deviation": float(np.sqrt(left)),
         "order": len(found.noise_ar),
         "factor": factor,
     }

@@ -35,6 +35,8 @@ def check_feedback(record: Record) -> Iterator[Finding]:
         if exchanged:
             return
         code, verdict = "feedback.found", Verdict.LOOK
+    elif record.runs_away:
+        code, verdict = "feedback.holds", Verdict.LOOK
     elif found.slight:
         code, verdict = "feedback.slight", Verdict.NOTE
     else:

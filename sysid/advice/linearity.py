@@ -17,9 +17,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.advice.dynamics import BARELY
+from sysid.advice.dynamics import AWAY
 from sysid.advice.finding import Finding, Topic, Verdict
-from sysid.advice.record import Record, Residual
+from sysid.advice.record import BARELY, Record, Residual
 from sysid.estimation.informative import beyond_chance, by_chance
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
@@ -50,6 +50,7 @@ def check_linearity(record: Record) -> Iterator[Finding]:
         return
     periodic = _periodic(record)
     yield periodic if periodic is not None else _curvature(record)
+    yield from _changed(record)
     yield from _coherence(record)
 
 
@@ -155,12 +156,15 @@ def _curvature(record: Record) -> Finding:
     found = slow.impulse
     if isinstance(found, str):
         return _unknown(found)
+    if record.runs_away:
+        return _unknown(AWAY)
+    if record.lasts:
+        return _unknown("the response lasts longer than the lags by which it is judged")
     if found.explained < BARELY:
         figures = {"explained": max(found.explained, 0.0)}
         return Finding(topic=Topic.LINEARITY, code="linearity.nothing_explained", verdict=Verdict.LOOK, figures=figures)
-    records = [one for one in record.residuals if len(one.left) > 40]
-    rows = sum(len(one.left) for one in records)
-    if rows < 100:
+    records = _long_enough(record)
+    if not records:
         return _unknown("the record is too short")
     total = float(np.sum([np.var(one.segment.output) * len(one.left) for one in records]))
     rest = float(np.sum([np.var(one.left) * len(one.left) for one in records]))
@@ -169,9 +173,7 @@ def _curvature(record: Record) -> Finding:
             topic=Topic.LINEARITY, code="linearity.exact", verdict=Verdict.FINE, figures={"left": rest / total}
         )
     features = _moving([_features(one, found) for one in records])
-    plain = _explained(features, [one.left for one in records], np.ones(1))
-    whiten = whitener([one.left - one.left.mean() for one in records], min(8, rows // 40))
-    share, p = _tested(features, [one.left for one in records], whiten)
+    plain, share, p = _asked(features, records)
     figures = {"share": plain, "p": p, "left": rest / total}
     if p < SURE and plain > CLEAR:
         code, verdict = "linearity.curved", Verdict.LOOK
@@ -184,12 +186,77 @@ def _curvature(record: Record) -> Finding:
     return Finding(topic=Topic.LINEARITY, code=code, verdict=verdict, figures=figures)
 
 
+def _long_enough(record: Record) -> list[Residual]:
+    """What a response leaves, where it is long enough to ask what explains it."""
+    records = [one for one in record.residuals if len(one.left) > 40]
+    return records if sum(len(one.left) for one in records) >= 100 else []
+
+
+def _asked(features: list[NDArray[np.float64]], records: list[Residual]) -> tuple[float, float, float]:
+    """Share that the features explain of what is left, the same whitened, and the probability of that by chance."""
+    left = [one.left for one in records]
+    whiten = whitener([y - y.mean() for y in left], min(8, sum(map(len, left)) // 40))
+    return (_explained(features, left, np.ones(1)), *_tested(features, left, whiten))
+
+
+def _changed(record: Record) -> Iterator[Finding]:
+    """What changes the response: an input that does nothing by itself, or the time."""
+    found, records = record.slowed[0].impulse, _long_enough(record)
+    if isinstance(found, str) or found.explained < BARELY or record.runs_away or record.lasts or not records:
+        return
+    for j, name in enumerate(found.mapping.inputs):
+        if not found.dead_times[j].acts and len(found.mapping.inputs) > 1:
+            features = _moving([_products(one, found, j) for one in records])
+            share, _, p = _asked(features, records) if features[0].shape[1] else (0.0, 0.0, 1.0)
+            if p < SURE and share > SLIGHT:
+                yield Finding(
+                    topic=Topic.LINEARITY, code="effect.by_product", verdict=Verdict.LOOK, subject=(name,),
+                    figures={"share": share, "p": p},
+                )  # fmt: skip
+    times = np.split(np.linspace(-1.0, 1.0, n := sum(len(one.left) for one in records)), _ends(records))
+    features = [
+        (one.simulated - one.simulated.mean())[:, None] * np.column_stack([t, 1.5 * t**2 - 0.5, 2.5 * t**3 - 1.5 * t])
+        for one, t in zip(records, times, strict=True)
+    ]
+    share, _, p = _asked(features, records)
+    if p < SURE and share > CLEAR and n:
+        yield _of_strength(features, records, np.concatenate(times), share)
+
+
+def _ends(records: list[Residual]) -> NDArray[np.intp]:
+    return np.cumsum([len(one.left) for one in records])[:-1]
+
+
+def _of_strength(
+    features: list[NDArray[np.float64]], records: list[Residual], t: NDArray[np.float64], share: float
+) -> Finding:
+    """How the strength of the response goes over the record, as a share of its mean."""
+    left = np.concatenate([one.left - one.left.mean() for one in records])
+    c = np.linalg.lstsq(np.vstack(features), left, rcond=None)[0]
+    strength = 1.0 + np.column_stack([t, 1.5 * t**2 - 0.5, 2.5 * t**3 - 1.5 * t]) @ c
+    figures = {"share": share, "low": float(strength.min()), "high": float(strength.max())}
+    return Finding(topic=Topic.LINEARITY, code="response.varies", verdict=Verdict.LOOK, figures=figures)
+
+
+def _late(w: NDArray[np.float64], found: ImpulseResponse) -> NDArray[np.float64]:
+    """A signal some time before, a sixth of what it takes to settle."""
+    step = max(int(max(found.settling()) // 6), 1)
+    return np.concatenate([np.full(min(step, len(w)), w[0]), w[: max(len(w) - step, 0)]])
+
+
+def _products(one: Residual, found: ImpulseResponse, j: int) -> NDArray[np.float64]:
+    """The response, now and before, times an input: what it makes stronger, quicker or later."""
+    w, u = one.simulated - one.simulated.mean(), one.segment.inputs[int(found.lags[-1]) :, j]
+    w, x = w / (w.std() or 1.0), (u - u.mean()) / (u.std() or 1.0)
+    late = _late(w, found)
+    return np.column_stack([w * x, late * x, w * _late(x, found), late * _late(x, found)])
+
+
 def _features(one: Residual, found: ImpulseResponse) -> NDArray[np.float64]:
     """Squares and cubes, orthogonal enough to a linear response to be told from it."""
     w = one.simulated - one.simulated.mean()
     w = w / (w.std() or 1.0)
-    step = max(int(max(found.settling()) // 6), 1)
-    late = np.concatenate([np.full(min(step, len(w)), w[0]), w[: max(len(w) - step, 0)]])
+    late = _late(w, found)
     columns = [w**2, w**3 - 3 * w, w * late, late**2, late**3 - 3 * late, w**2 * late, w * late**2]
     deepest = int(found.lags[-1])
     for j in range(one.segment.inputs.shape[1]):

@@ -9,8 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.advice.equation import Equation, least_bic
 from sysid.advice.integrators import SAMPLES, integrates
 from sysid.errors import UserError
+from sysid.estimation.informative import own_part
 from sysid.estimation.nonparametric.feedback import Feedback, find_feedback
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.remembered import remembered_response
@@ -24,6 +26,12 @@ SEEN = 20_000
 LONGEST_RESPONSE, LAGS_IN_ALL, LEAST_LAGS = 128, 192, 32
 """Lags of a response at most, of all inputs together, and of one in any case: the price grows with their third power. A
 response that has not settled then is looked at more slowly."""
+BARELY = 0.3
+"""Share of the output that a linear response explains, below which nothing is built on it."""
+HARDLY_OWN = 0.01
+"""Part of an input's movement that is its own, below which what it does is not told from what others do."""
+LONGER = 0.1
+"""Share of the output that an equation must explain, beyond what the response does, to be told to last longer."""
 SLOWER, FEWEST_BLOCKS = (4, 16, 64, 256), 200
 """How many times slower a record with a longer response is looked at, and how many samples that must leave."""
 
@@ -53,6 +61,16 @@ class Record:
             if any(np.ptp(segment.inputs[:, j]) > 0.0 for segment in self.segments):
                 found.append(name)
         return tuple(found)
+
+    @cached_property
+    def shared(self) -> frozenset[str]:
+        """Inputs that move as others do, so that nobody can tell what each of them brings."""
+        if len(self.moving) < 2:
+            return frozenset()
+        inputs = np.concatenate([segment.inputs for segment in self.some.segments])
+        others = [np.delete(inputs, j, axis=1) for j in range(inputs.shape[1])]
+        each = zip(self.moving, inputs.T, others, strict=True)
+        return frozenset(name for name, own, rest in each if own_part(own, rest) < HARDLY_OWN)
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
@@ -99,6 +117,31 @@ class Record:
             return error.what
 
     @cached_property
+    def equation(self) -> Equation | None:
+        """The ARX model of least BIC of the inputs that move; ``None`` where they are not seen to act."""
+        if self.some is not self:
+            return self.some.equation
+        impulse = self.impulse
+        dead = () if isinstance(impulse, str) else impulse.dead_times
+        if self.mapping.inputs and (isinstance(impulse, str) or not _seen(impulse)):
+            return None
+        at_once = not isinstance(self.feedback, str) and self.feedback.at_once
+        return least_bic(self.traces, self.mapping, [one.best for one in dead], at_once=at_once)
+
+    @property
+    def runs_away(self) -> bool:
+        """Whether the plant by itself does, so that something holds it."""
+        return bool(self.moving) and self.equation is not None and self.equation.grows
+
+    @property
+    def lasts(self) -> bool:
+        """Whether a linear model explains much that a response over some lags does not: what rings, or is slow."""
+        found = self.slowed[0].impulse
+        if isinstance(found, str) or self.equation is None or self.runs_away:
+            return False
+        return self.equation.explained > max(found.explained, 0.0) + LONGER
+
+    @cached_property
     def response(self) -> FrequencyResponse | str:
         """The frequency response at the rate at which the impulse response settles, or why there is none."""
         slow = self.slowed[0].some
@@ -111,27 +154,34 @@ class Record:
     def slowed(self) -> tuple[Record, int]:
         """The record at a rate at which its response settles within the lags that are looked at, and how much slower.
 
-        Means over blocks of samples; as it is where it settles, or where no rate helps.
+        Means over blocks of samples; as it is where it settles, or where no rate helps. Where none is slow enough, the
+        one at which most is explained.
         """
         found = self.impulse
-        if isinstance(found, str) or found.settled:
+        if isinstance(found, str) or (found.settled and _seen(found)):
             return self.some, 1
+        seen, most, explained = _seen(found), (self.some, 1), found.explained
         for factor in SLOWER:
             slow = _blocks(self.traces, factor)
             if sum(map(len, slow)) < FEWEST_BLOCKS:
                 break
             other = Record(traces=slow, mapping=self.some.mapping)
             slowly = other.impulse
-            if not isinstance(slowly, str) and slowly.settled:
+            if isinstance(slowly, str) or not (seen or _seen(slowly)):
+                continue
+            if slowly.settled:
                 # What is fast is gone from means over blocks: they are no view of a record that lives of it.
-                return (other, factor) if slowly.explained > found.explained - 0.02 else (self.some, 1)
-        return self.some, 1
+                return (other, factor) if slowly.explained > found.explained - 0.02 else most
+            # Sampled so fast that a sample brings less than its noise, an input hardly seems to act.
+            if slowly.explained > explained + LONGER:
+                most, explained = (other, factor), slowly.explained
+        return most
 
     @cached_property
     def integrates(self) -> bool:
         """Whether the plant adds up what its inputs bring; see :mod:`sysid.advice.integrators`."""
         found = self.impulse
-        if isinstance(found, str) or found.settled:
+        if isinstance(found, str) or (found.settled and not self.lasts):
             return False
         factor = -(-sum(map(len, self.some.traces)) // SAMPLES)
         return integrates(_blocks(self.some.traces, factor), self.some.mapping)
@@ -157,6 +207,11 @@ class Record:
                     )
                 )
         return made
+
+
+def _seen(found: ImpulseResponse) -> bool:
+    """Whether any input is seen to act, or all of them do together."""
+    return any(one.acts for one in found.dead_times) or found.explained > BARELY
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -24,6 +24,9 @@ MOST_CORRELATED = 0.999
 LAGS, SLOW = 128, 1.0 - 1.0 / 256
 """Samples within which the output must have answered its inputs: what answers longer may as well be a plant that
 integrates; and the pole of a model that answers longer all the same, as it has made the drift its own."""
+WITH_SUM, AS_STEEP = 0.6, 0.5
+"""Part of what a drift does about its line that the sum of an input must explain, and how well it must explain the
+line, too."""
 BY_LINE = 0.5
 """Part of a drift that the error of a free run must have: any other model that follows it has said it."""
 
@@ -86,6 +89,37 @@ def _jump(x: Array) -> tuple[int, float, float]:
     return best, high - low, float(x @ x - gain.max())
 
 
+def sums_up(left: Array, inputs: Array) -> int | None:
+    """Which input a drift is the sum of, as the charge of a battery is: then the plant adds up, and nothing drifts.
+
+    A sum moves about its own line in time, and the drift moves with it there; by chance two slow signals may do so,
+    too, but not as strongly as the line itself asks for.
+
+    Args:
+        left: What a quick response leaves of an output, shape ``(n_samples,)``.
+        inputs: At the same samples, in units counted from where nothing is added, shape ``(n_samples, n_inputs)``.
+
+    Returns:
+        The place of the input; ``None`` where none does it.
+    """
+    t = np.column_stack([np.ones(len(left)), np.linspace(-0.5, 0.5, len(left))])
+    off, slope = _off_line(t, left)
+    for j, u in enumerate(inputs.T):
+        moved, drawn = _off_line(t, np.cumsum(u))
+        size = float(moved @ moved)
+        strength = float(off @ moved) / size if size > 1e-24 * float(np.sum(np.cumsum(u) ** 2)) else 0.0
+        with_sum = strength * float(off @ moved) >= WITH_SUM * float(off @ off) > 0.0
+        if with_sum and AS_STEEP * abs(slope) <= strength * drawn * np.sign(slope) <= abs(slope) / AS_STEEP:
+            return j
+    return None
+
+
+def _off_line(t: Array, x: Array) -> tuple[Array, float]:
+    """What a line in time leaves of a signal, and how far the line goes."""
+    line = np.linalg.lstsq(t, x, rcond=None)[0]
+    return x - t @ line, float(line[1])
+
+
 def drifts_told(model: AbstractModel, traces: Sequence[Trace], runs: Sequence[FreeRun]) -> dict[int, str]:
     """Which outputs drift, as the zero of a sensor does.
 
@@ -146,5 +180,6 @@ def _drifts(traces: Sequence[Trace], mapping: Mapping, spread: float) -> list[fl
         left = trace[mapping.output] - response.simulate(trace.columns(mapping.inputs))
         seen = trace.usable_samples & (np.arange(len(trace)) >= response.lags[-1])
         found = trend_of(left[seen], spread)
-        sizes += [found.size] if found is not None and found.at is None else []
+        if found is not None and found.at is None and sums_up(left[seen], trace.columns(mapping.inputs)[seen]) is None:
+            sizes.append(found.size)
     return sizes

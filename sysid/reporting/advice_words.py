@@ -89,6 +89,11 @@ SAID: Final[dict[str, Words]] = {
         "{who}: the output drifts by {size:.3g} {unit} over the stretch, and no input does it.",
         "Take it off (repairs: {{drift: {{{channel}: line}}}}), or add its cause as an input; or the plant integrates.",
     ),
+    "output.sums": Words(
+        "{who}: the output drifts by {size:.3g} over the stretch with the sum of that input: beside its quick answer"
+        " the plant adds up what comes in, as the charge of a battery or the level of a tank.",
+        "Do not take it off: fit what adds up exactly (NSS with integrators: 1), or equations.",
+    ),
     "excitation.low": Words(
         "{who} is exciting of order {order:.0f} only: too few frequencies, or too slow.",
         "Move it more and faster: sysid excite prbs or multisine. With this record only a gain, or one time constant.",
@@ -136,11 +141,48 @@ SAID: Final[dict[str, Words]] = {
         " between samples.",
         "Nothing for a first model. Are the inputs held constant between samples?",
     ),
+    "feedback.holds": Words(
+        "No noise goes round that would show it, but the plant by itself runs away, and its output does not: something"
+        " holds it, as a controller that sets {who}.",
+        "Record the set point as well, and model the loop from there; or predict some steps ahead (ARX, loop: open).",
+    ),
     "feedback.none": Words("No sign that the output acts on the inputs (p = {p:.2g})."),
     "feedback.unknown": Words("Whether the output acts on the inputs: {why}."),
     "dynamics.unknown": Words("How the output answers: {why}."),
     "effect.none": Words(
-        "{who} has no effect that can be measured.", "Leave it out, or move it more than the noise hides."
+        "{who} has no effect of its own that can be measured.",
+        "Leave it out, unless it changes what other inputs do; or move it more than the noise hides.",
+    ),
+    "effect.shared": Words(
+        "What {who} does: it moves as other inputs do, and nobody can tell what each of them brings.",
+        "Leave out what is made of others, or move it independently.",
+    ),
+    "effect.by_product": Words(
+        "{who} changes what other inputs do: its products with their response explain {share:.0%} of what a linear"
+        " response leaves.",
+        "Keep it: a network, or equations, can use it (a flow that sets a dead time, a speed, a mode).",
+    ),
+    "response.varies": Words(
+        "The response changes over the record, from {low:.2g} to {high:.2g} times its mean: that explains {share:.0%}"
+        " of what a linear response leaves.",
+        "Wear, temperature, an operating point? Give what changed as an input, or cut the record: one model is a mean.",
+    ),
+    "dynamics.runs_away": Words(
+        "By itself {who} runs away: the ARX model of least BIC has a pole of magnitude {pole:.4g}, which grows e-fold"
+        " in {seconds:.3g} s.",
+        "A free run from these inputs is lost by then, whatever the model, and gains and settling would be those of the"
+        " loop. Model the loop from its set point, or judge some steps ahead.",
+    ),
+    "dynamics.rings": Words(
+        "{who} rings for longer than the {lags_seconds:.3g} s of the response: at {hertz:.4g} Hz, damping"
+        " {damping:.2g}. An equation with past outputs explains {explained:.1%} in free run, the response"
+        " {response:.1%}.",
+        "Fit what has poles (a transfer function, a linear state space, ARX), and judge it in free run.",
+    ),
+    "dynamics.lasts": Words(
+        "{who} answers for longer than the {lags_seconds:.3g} s of the response: its slowest pole has {seconds:.3g} s."
+        " An equation with past outputs explains {explained:.1%} in free run, the response {response:.1%}.",
+        "Fit what has poles (a transfer function, a linear state space, ARX), and judge it in free run.",
     ),
     "dead_time": Words(
         "{who} acts after {best:.0f} samples ({seconds:.3g} s); from sample {visible:.0f} on it is plain to see."
@@ -313,7 +355,7 @@ def said(finding: Told, units: Mapping[str, str]) -> tuple[str, str]:
     }
     figures = _Figures(dict(finding.figures) | others)
     says = re.sub(r"\b1 (sample|time)s\b", r"1 \1", words.says.format_map(figures))
-    return " ".join(says.split()).replace(" ,", ","), words.do.format_map(figures)
+    return " ".join(says.split()).replace(" ,", ",").replace(" .", "."), words.do.format_map(figures)
 
 
 class _Figures(dict[str, object]):

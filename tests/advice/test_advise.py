@@ -336,3 +336,76 @@ def test_an_input_that_stands_in_one_of_several_records_is_no_fault() -> None:
     y = lfilter([0.0, 0.1], [1.0, -0.9], u) + 0.005 * rng.standard_normal(len(u))
     traces = sysid.data([(u[:600], y[:600]), (u[600:], y[600:])], sample_time=0.1)
     assert "linearity.none_seen" in [one.code for one in sysid.advise(traces, "u -> y").findings]
+
+
+def test_a_record_sampled_far_too_fast_is_looked_at_more_slowly() -> None:
+    u = steps(5000, 3, hold=200)
+    y = lfilter([1.0 / 1000.0], [1.0, -(1.0 - 1.0 / 1000.0)], u) + noise(5000, 3, 0.05)
+    found = look(trace(u, y))
+    assert not codes(found) & {"effect.none", "output.drift", "linearity.nothing_explained"}
+    assert finding(found, "sampling.fast").verdict is Verdict.LOOK
+
+
+def held_by_a_controller(n: int, seed: int) -> tuple[Array, Array]:
+    """A plant with a pole at 1.05 under proportional control, without noise that goes round."""
+    r, x = steps(n, seed, hold=40), 0.0
+    u, y = np.zeros(n), np.zeros(n)
+    for k in range(n):
+        u[k], y[k] = 3.0 * (r[k] - x), x
+        x = 1.05 * x + 0.05 * u[k]
+    return u, y + noise(n, seed, 0.01)
+
+
+def test_a_plant_that_a_controller_holds_is_told_by_its_pole() -> None:
+    found = look(trace(*held_by_a_controller(800, 5)))
+    assert {"feedback.holds", "dynamics.runs_away"} <= looks(found)
+    assert finding(found, "dynamics.runs_away").figures["pole"] == pytest.approx(1.05, abs=0.02)
+    assert not codes(found) & {"settling", "feedback.none", "noise.loud"}
+    assert [type(one.structure) for one in found.suggestions] == [ARX]
+
+
+def test_what_rings_longer_than_the_lags_is_linear_and_no_network_is_asked_for() -> None:
+    pole, u = 0.998 * np.exp(0.3j), steps(2500, 1, hold=3)
+    y = lfilter([1.0], np.real(np.poly([pole, pole.conj()])), u)
+    found = look(trace(u, y + noise(2500, 1, 0.001 * float(y.std()))))
+    told = finding(found, "dynamics.rings").figures
+    assert told["hertz"] == pytest.approx(0.3 / np.pi, rel=0.02)
+    assert told["explained"] > 0.9
+    assert not codes(found) & {"linearity.nothing_explained", "noise.loud"}
+    assert not any(isinstance(one.structure, NARX) for one in found.suggestions)
+
+
+def test_inputs_that_move_together_are_not_said_to_do_nothing() -> None:
+    u = steps(800, 2)
+    found = look(trace(np.column_stack([u, 10.0 * u + 3.0]), plant(u) + noise(800, 2, 0.02)), mapping="u1+u2 -> y")
+    assert [one.subject for one in found.findings if one.code == "effect.shared"] == [("u1",), ("u2",)]
+    assert not codes(found) & {"effect.none", "settling"}
+
+
+def test_spikes_in_one_of_a_hundred_samples_are_seen() -> None:
+    u = steps(1000, 4)
+    y = plant(u) + noise(1000, 4, 0.02)
+    y[np.random.default_rng(1).choice(1000, 10, replace=False)] += 8.0
+    assert finding(look(trace(u, y)), "channel.spikes", "y").figures["count"] >= 9
+
+
+def test_an_input_that_only_changes_what_another_does_is_kept() -> None:
+    u, flow = steps(600, 6), steps(600, 7, hold=30)
+    y = plant(u) * (1.0 + 0.4 * flow) + noise(600, 6, 0.02)
+    found = look(trace(np.column_stack([u, flow]), y), mapping="u1+u2 -> y")
+    assert finding(found, "effect.by_product", "u2").figures["share"] > 0.5
+
+
+def test_a_response_that_changes_over_the_record_is_told() -> None:
+    u = steps(1500, 8)
+    strength = np.linspace(0.6, 1.4, 1500)
+    told = finding(look(trace(u, plant(u) * strength + noise(1500, 8, 0.02))), "response.varies").figures
+    assert (told["low"], told["high"]) == pytest.approx((0.6, 1.4), abs=0.1)
+
+
+def test_a_drift_that_is_the_sum_of_an_input_is_no_drift() -> None:
+    u = steps(2000, 9, hold=30) + 0.4
+    charge = 0.002 * np.cumsum(u)
+    found = look(trace(u, plant(u) + charge + noise(2000, 9, 0.02)))
+    assert finding(found, "output.sums", "u1").figures["size"] == pytest.approx(charge[-1] - charge[0], rel=0.2)
+    assert "output.drift" not in codes(found)
