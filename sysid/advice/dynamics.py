@@ -43,7 +43,7 @@ def check_dynamics(record: Record) -> Iterator[Finding]:
     if record.runs_away:
         yield _runs_away(record)
         return
-    if record.lasts:
+    if record.lasts and not record.integrates:
         yield _lasts(record, whole)
     for j, name in enumerate(found.mapping.inputs):
         dead = found.dead_times[j]
@@ -72,7 +72,9 @@ def _runs_away(record: Record) -> Finding:
 def _lasts(record: Record, whole: ImpulseResponse) -> Finding:
     """What rings or is slow beyond the lags that are looked at."""
     assert record.equation is not None  # noqa: S101 - by which it is known
-    rate = np.log(record.equation.pole or 1e-300) / record.sample_time
+    # A pole on the circle, which is not known to lie beyond it, is as slow as the record is long at least.
+    slowest = np.log(min(max(abs(record.equation.pole), 1e-300), 1.0 - 1.0 / sum(map(len, record.segments))))
+    rate = complex(slowest, np.angle(record.equation.pole)) / record.sample_time
     figures = {
         "explained": record.equation.explained,
         "response": max(whole.explained, 0.0),
