@@ -42,9 +42,7 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         yield draft
     except OSError as error:
-        # A write that fails names no file, or the draft, which nobody knows.
-        if error.filename in {None, str(draft)}:
-            error.filename = str(path)
+        _name(error, draft, path)
         raise
     else:
         # mkstemp keeps others out; the finished file has the permissions that any other would have.
@@ -72,9 +70,9 @@ def replacing_folder(path: Path) -> Iterator[Path]:
         OSError: What the system refuses, with the name of ``path`` for that of the draft, which nobody knows.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = f".{path.name}."
+    workplace = str(path.parent)
     try:
-        with tempfile.TemporaryDirectory(prefix=beside, dir=path.parent) as workplace:
+        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as workplace:
             draft, old = Path(workplace) / "new", Path(workplace) / "old"
             draft.mkdir()
             yield draft
@@ -88,8 +86,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
                 raise
             shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
-        if error.filename is None or any(part.startswith(beside) for part in Path(str(error.filename)).parts):
-            error.filename = str(path)
+        _name(error, Path(workplace), path)
         raise
     for left in path.parent.glob(".*"):
         if left.is_dir() and _is_left(left, of=path.name):
@@ -116,6 +113,13 @@ def _is_left(draft: Path, of: str | None = None) -> bool:
         return time.time() - draft.stat().st_mtime > LEFT_S
     except OSError:  # gone meanwhile
         return False
+
+
+def _name(error: OSError, draft: Path, path: Path) -> None:
+    """Have an error name what was to be written: it names nothing, or the draft, which nobody knows."""
+    named = [Path(str(name)) for name in (error.filename, error.filename2) if name is not None]
+    if not named or any(one.is_relative_to(draft) for one in named):
+        error.filename, error.filename2 = str(path), None
 
 
 def _draft(path: Path) -> Path:

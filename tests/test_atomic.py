@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 import time
 from pathlib import Path
@@ -92,3 +93,23 @@ def test_what_killed_processes_left_goes_and_what_is_being_written_stays(tmp_pat
     with replacing_folder(tmp_path / "a"):
         pass
     assert (left.exists(), begun.exists(), other.exists()) == (False, True, True)
+
+
+@pytest.mark.parametrize("inside", [True, False], ids=["a folder", "a file"])
+def test_a_copy_that_fails_names_what_was_to_be_written(
+    inside: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target = tmp_path / "source.txt", tmp_path / "a"
+    source.write_text("whole")
+
+    def full(_: object, place: Path) -> None:
+        raise OSError(28, "No space left on device", str(source), None, str(place))
+
+    monkeypatch.setattr("shutil.copyfile", full)
+    with (
+        pytest.raises(OSError, match="No space") as error,
+        (replacing_folder if inside else replacing)(target) as draft,
+    ):
+        shutil.copyfile(source, draft / "b.txt" if inside else draft)
+    assert (error.value.filename, error.value.filename2) == (str(target), None)
+    assert [file.name for file in tmp_path.iterdir()] == ["source.txt"]

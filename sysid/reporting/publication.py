@@ -76,7 +76,7 @@ def publish_run(
         text = _page(document, chosen, command, draft)
         for left in frozen:
             if left.is_dir():
-                shutil.copytree(left, draft / BUNDLE)
+                _copy(left, draft / BUNDLE)
                 text += FROZEN
             else:
                 shutil.copyfile(left, draft / LINE)
@@ -85,6 +85,16 @@ def publish_run(
         if scores:
             write_scores(draft, scores)
     return target / PAGE
+
+
+def _copy(folder: Path, target: Path) -> None:
+    """Copy a folder; what the system refuses is raised as it is, which ``shutil.copytree`` makes a list of texts of."""
+    target.mkdir()
+    for file in sorted(folder.iterdir()):
+        if file.is_dir():
+            _copy(file, target / file.name)
+        else:
+            shutil.copyfile(file, target / file.name)
 
 
 def _frozen(run_folder: Path) -> list[Path]:

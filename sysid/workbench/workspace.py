@@ -46,15 +46,10 @@ def make_workspace(folder: Path) -> list[Path]:
             got=", ".join(str(file.relative_to(folder)) for file in taken),
             remedy="name another folder; nothing was changed",
         )
-    try:
-        for source, target in zip(templates, targets, strict=True):
-            with replacing(target) as draft:
-                shutil.copyfile(source, draft)
-        schemas = write_schemas(folder)
-    except OSError as error:
-        raise ConfigError(
-            "the workspace cannot be written", where=folder, got=error, remedy="name another folder"
-        ) from error
+    for source, target in zip(templates, targets, strict=True):
+        with replacing(target) as draft:
+            shutil.copyfile(source, draft)
+    schemas = write_schemas(folder)
     for file, name in records.items():
         if not file.exists():
             write_csv(tank(name), file)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -81,6 +84,27 @@ def test_a_folder_of_somebody_else_is_left_alone(page: tuple[Path, Path], tmp_pa
     with pytest.raises(ConfigError, match="something else where the report would go"):
         publish_run(page[0], tmp_path, name="mine")
     assert (tmp_path / "mine" / "README.md").read_text(encoding="utf-8") == "# My own words\n"
+
+
+def test_a_bundle_that_there_is_no_room_for_is_named_and_leaves_the_page_of_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bundle, page = tmp_path / "bundle", tmp_path / "reports" / "tank" / "README.md"
+    for file in (bundle / "verify" / "worst.csv", page):
+        file.parent.mkdir(parents=True)
+        file.write_text(MARK)
+
+    def full(source: object, target: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(source), None, str(target))
+
+    parts = {"run_document": SimpleNamespace(results=SimpleNamespace(pipeline="tank")), "_frozen": [bundle]}
+    for name, value in (parts | {"read_run": None, "run_scores": [], "_page": ""}).items():
+        monkeypatch.setattr(f"sysid.reporting.publication.{name}", lambda *_, value=value, **__: value)
+    monkeypatch.setattr("shutil.copyfile", full)
+    with pytest.raises(OSError, match="No space") as error:
+        publish_run(tmp_path, tmp_path / "reports", bundle=True)
+    assert (error.value.errno, error.value.filename) == (errno.ENOSPC, str(page.parent))
+    assert [file.name for file in page.parent.parent.rglob("*")] == ["tank", "README.md"]
 
 
 def test_what_a_judge_said_is_published_in_the_same_way(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.workbench import workspace
+from sysid.workbench.cli import run_cli
 from sysid.workbench.workspace import make_workspace
 
 
@@ -56,3 +57,19 @@ def test_nothing_that_is_there_is_written_over(tmp_path: Path) -> None:
     assert str(error.value.got) == str(files[0].relative_to(tmp_path))
     shutil.rmtree(tmp_path / "datasets")
     assert files[0].read_text() == "mine"
+
+
+def test_a_full_disk_is_named_and_the_same_call_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(source: object, target: object) -> None:
+        raise OSError(28, "No space left on device", str(source), None, str(target))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "copyfile", full)
+        assert run_cli(["init", str(tmp_path / "ours")]) == 2
+    told = capsys.readouterr().err
+    assert "the disk is full" in told
+    assert "ours" in told
+    assert "template" not in told
+    assert run_cli(["init", str(tmp_path / "ours")]) == 0
