@@ -110,10 +110,10 @@ def looked_at_once() -> Iterator[None]:
     found: dict[str, list[dict[str, Any]]] = {}
     look = steps.look
 
-    def once(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
-        key = steps.advice_key(config, data)
+    def once(config: PipelineConfig, data: Data, *, suggest: bool = True) -> list[dict[str, Any]]:
+        key = steps.advice_key(config, data, suggest=suggest)
         if key not in found:
-            found[key] = look(config, data)
+            found[key] = look(config, data, suggest=suggest)
         return copy.deepcopy(found[key])
 
     with pytest.MonkeyPatch.context() as patch:

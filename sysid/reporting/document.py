@@ -69,10 +69,11 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     sections = [overview_section(results, signals), _accuracy(results, published)]
     sections += [one for one in (warnings_section(results), beginnings_section(results)) if one is not None]
     sections += [*sweep_sections(folder, published)]
-    columns = _columns(results)
+    columns, most = _columns(results), results.drawn
     for index, best in enumerate(results.best_fits):
         suffix = f"-{index + 1}" if index else ""
-        sections.append(_best(best, signals[best.slug], instants[best.name], columns, suffix))
+        shown = _best(best, signals[best.slug], instants[best.name], suffix, columns=columns, most=most)
+        sections.append(shown)
         seen = {name: signals[best.slug][name] for name in scored_cases(best) or best.cases}
         by_level = amplitude_section(best, seen, suffix=suffix)
         sections += [] if by_level is None else [by_level]
@@ -132,10 +133,10 @@ def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
 
 
 def _best(
-    fit: FitRecord, signals: Dict[str, CaseSignals], instants: list[Instant], columns: int, suffix: str
+    fit: FitRecord, signals: Dict[str, CaseSignals], instants: list[Instant], suffix: str, *, columns: int, most: int
 ) -> Section:
     parts: list[Part] = [*_quality(fit)]
-    parts += _case_pictures(fit, signals, columns)
+    parts += _case_pictures(fit, signals, columns, most)
     output = output_side(fit.mapping)
     if instants:
         title = f"{fit.name}: the {len(instants)} worst instants"
@@ -158,12 +159,12 @@ def _quality(fit: FitRecord) -> list[Table]:
 
 def _columns(results: Results) -> int:
     """How finely time plots are drawn, so that a page with many of them stays under three megabytes."""
-    pictures = sum(len(drawn_cases(fit)) for fit in results.fits)
+    pictures = sum(len(drawn_cases(fit, results.drawn)) for fit in results.fits)
     return max(60, min(450, 450 * 30 // pictures))
 
 
-def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int) -> list[Part]:
-    output, drawn = output_side(fit.mapping), drawn_cases(fit)
+def _case_pictures(fit: FitRecord, signals: Dict[str, CaseSignals], columns: int, most: int) -> list[Part]:
+    output, drawn = output_side(fit.mapping), drawn_cases(fit, most)
     parts: list[Part] = [*told_of_drawn(len(drawn), len(fit.cases))]
     for index, (name, case) in enumerate(fit.cases.items()):
         if name not in drawn:
@@ -277,7 +278,7 @@ def _others(results: Results, signals: Dict[str, Dict[str, CaseSignals]], column
             title=f"Every case: {fit.name}",
             parts=(
                 *_quality(fit),
-                *_case_pictures(fit, signals[fit.slug], columns),
+                *_case_pictures(fit, signals[fit.slug], columns, results.drawn),
             ),
         )
         for fit in results.fits

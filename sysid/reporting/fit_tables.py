@@ -16,23 +16,24 @@ SCORED = (Role.VALIDATION, Role.TEST)
 """Roles of the cases that a verdict rests on: nothing was fitted to them or chosen on them."""
 
 
-DRAWN, DRAWN_SCORED = 12, 8
-"""Cases that are drawn one by one, and how many of them at least are such as a verdict rests on, where there are so
-many: drawing all takes longer than a fit, and nobody looks through them."""
+DRAWN, OF_SCORED = 12, 2 / 3
+"""Cases that are drawn one by one, and the share of them at least that a verdict rests on, where there are so many:
+drawing all takes longer than a fit, and nobody looks through them."""
 
 
-def drawn_cases(fit: FitRecord) -> list[str]:
+def drawn_cases(fit: FitRecord, most: int) -> list[str]:
     """The cases of a fit that are drawn: all where they are few, else the worst of those that a verdict rests on.
 
     Where these leave room, the worst of the others stand beside them.
 
     Args:
         fit: The fit.
+        most: How many at most.
 
     Returns:
         Their names, in the order of the file.
     """
-    if len(fit.cases) <= DRAWN:
+    if len(fit.cases) <= most:
         return list(fit.cases)
 
     def worst(names: Collection[str]) -> list[str]:
@@ -40,8 +41,8 @@ def drawn_cases(fit: FitRecord) -> list[str]:
 
     scored = worst(scored_cases(fit))
     rest = worst([name for name in fit.cases if name not in scored])
-    first = scored[: max(DRAWN_SCORED, DRAWN - len(rest))]
-    kept = {*first, *rest[: DRAWN - len(first)]}
+    first = scored[: max(math.ceil(OF_SCORED * most), most - len(rest))]
+    kept = {*first, *rest[: most - len(first)]}
     return [name for name in fit.cases if name in kept]
 
 

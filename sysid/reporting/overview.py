@@ -35,14 +35,21 @@ def overview_section(results: Results, signals: Dict[str, Dict[str, CaseSignals]
         shown = _shown(fits)
         if len(shown) < len(fits):
             parts.append(f"{mapping}: the {MOST} best of {len(fits)} models on the traces that choose.")
-        parts += told_of_drawn(len(overview_cases(fits)), len(case_columns(fits)))
-        parts.append(_gallery(mapping, shown, signals, f"overview-{index}"))
+        cases = overview_cases(fits, results.drawn)
+        parts += told_of_drawn(len(cases), len(case_columns(fits)))
+        parts.append(_gallery(mapping, shown, cases, signals, f"overview-{index}"))
     return Section(anchor="overview", title="All models over the measured output", parts=tuple(parts))
 
 
-def _gallery(mapping: str, fits: list[FitRecord], signals: Dict[str, Dict[str, CaseSignals]], name: str) -> Gallery:
+def _gallery(
+    mapping: str,
+    fits: list[FitRecord],
+    cases: list[str],
+    signals: Dict[str, Dict[str, CaseSignals]],
+    name: str,
+) -> Gallery:
     output, unit = mapping.rpartition("->")[2].strip(), fits[0].unit
-    roles, cases = case_columns(fits), overview_cases(fits)
+    roles = case_columns(fits)
     columns = max(40, min(300, POINTS // ((len(fits) + 1) * len(cases))))
     pictures = []
     for number, case in enumerate(cases):
@@ -69,18 +76,19 @@ def _gallery(mapping: str, fits: list[FitRecord], signals: Dict[str, Dict[str, C
     )
 
 
-def overview_cases(fits: list[FitRecord]) -> list[str]:
+def overview_cases(fits: list[FitRecord], most: int) -> list[str]:
     """The cases of a mapping in the order of its pictures: what nothing was fitted to comes first.
 
     Args:
         fits: Of one mapping.
+        most: How many of the best are drawn at most.
 
     Returns:
         Names of the cases that are drawn.
     """
     roles, shown = case_columns(fits), _shown(fits)
     # Those of the best, and the worst of each other.
-    drawn = {*drawn_cases(shown[0]), *(worst_case(fit) for fit in shown)}
+    drawn = {*drawn_cases(shown[0], most), *(worst_case(fit) for fit in shown)}
     return sorted((case for case in roles if case in drawn), key=lambda case: roles[case] not in SCORED)
 
 

@@ -149,5 +149,7 @@ def _belongs(drawing: str, results: RunResults) -> bool:
     if best is None:
         return drawing.startswith("overview-") and drawing.endswith("-0")
     worst = worst_case(best)
-    cases = overview_cases(results.mappings()[best.mapping]) if drawing.startswith("overview-") else list(best.cases)
+    cases = list(best.cases)
+    if drawing.startswith("overview-"):
+        cases = overview_cases(results.mappings()[best.mapping], results.drawn)
     return drawing.endswith(f"-{cases.index(worst) if worst in cases else 0}")

@@ -344,6 +344,7 @@ class Results(RunResults):
     linearity: LinearityRecord | None = Field(default=None, description="Whether a linear model is enough.")
     advice: list[AdviceRecord] = Field(default=[], description="What is in the traces, output by output.")
     published: str | None = Field(default=None, description="Reference table to set beside ours.")
+    drawn: int = Field(default=12, ge=1, description="Cases of each fit that are drawn at most.")
     sweep: SweepSummary | None = Field(default=None, description="How the fits were found, where a sweep found them.")
 
     @property

@@ -15,7 +15,7 @@ Automatica 49).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,11 +40,13 @@ class Triangle:
         R: Of the columns, shape ``(n_rows, n_columns)``, no more rows than columns and one.
         z: Of the target, shape ``(n_rows,)``.
         samples: Rows of the regression, less those that unregularised columns have used up.
+        floor: What rounding leaves of the target, squared, where it was once longer; 0 where it was not.
     """
 
     R: NDArray[np.float64]
     z: NDArray[np.float64]
     samples: int
+    floor: float = 0.0
 
     @cached_property
     def gram(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
@@ -62,10 +64,38 @@ class Triangle:
         """
         if kept.all():
             return self
-        some = Triangle(R=self.R[:, kept], z=self.z, samples=self.samples)
+        some = replace(self, R=self.R[:, kept])
         both, target, size = self.gram
         some.__dict__["gram"] = (both[np.ix_(kept, kept)], target[kept], size)
         return some
+
+    @property
+    def least(self) -> float:
+        """What rounding leaves of the target, squared: of noise-free data it must not become an infinite reward."""
+        return max(self.floor, float(np.finfo(np.float64).eps ** 2 * max(self.gram[2], np.finfo(np.float64).tiny)))
+
+    def beside(self, others: NDArray[np.bool_], L: NDArray[np.float64]) -> tuple[Triangle, float]:
+        """What is left for some columns once others and their prior have had their part.
+
+        Where only those columns change, the evidence of all is that of what is left, less a constant: it costs what
+        few columns cost.
+
+        Args:
+            others: Which, shape ``(n_columns,)``.
+            L: The factor of their prior, as for :func:`factored`.
+
+        Returns:
+            The rest of the regression on all other columns, and the constant.
+        """
+        n = L.shape[1]
+        if n == 0:
+            return self, 0.0
+        top = np.column_stack([self.R[:, others] @ L, self.R[:, ~others], self.z])
+        R = linalg.qr(np.concatenate([top, np.eye(n, top.shape[1])]), mode="r", check_finite=False, overwrite_a=True)[0]
+        determinant = float(np.sum(np.log(np.abs(np.diag(R)[:n]))))
+        size = self.R.shape[1] + 1
+        left = Triangle(R=R[n:size, n:-1], z=R[n:size, -1], samples=self.samples, floor=self.least)
+        return left, determinant
 
 
 def triangle(blocks: Iterable[NDArray[np.float64]], *, free: int) -> Triangle:
@@ -151,9 +181,8 @@ def factored(data: Triangle, L: NDArray[np.float64]) -> Factored:
     top = np.column_stack([data.R @ L, data.z])
     stacked = np.concatenate([top, np.eye(n, n + 1)])
     R = linalg.qr(stacked, mode="r", check_finite=False, overwrite_a=True)[0]
-    # Of noise-free data the rest is rounding: it must not become an infinite reward.
-    floor = np.finfo(np.float64).eps ** 2 * max(float(data.z @ data.z), np.finfo(np.float64).tiny)
-    return Factored(R=R[:n, :n], z=R[:n, n], rest=max(float(np.sum(R[n:, n] ** 2)), floor), samples=data.samples)
+    rest = max(float(np.sum(R[n:, n] ** 2)), data.least)
+    return Factored(R=R[:n, :n], z=R[:n, n], rest=rest, samples=data.samples)
 
 
 def _from_products(data: Triangle, L: NDArray[np.float64]) -> Factored | None:
@@ -166,7 +195,8 @@ def _from_products(data: Triangle, L: NDArray[np.float64]) -> Factored | None:
     R = linalg.cholesky(M, overwrite_a=True, check_finite=False)
     z = linalg.solve_triangular(R, L.T @ target, trans="T", check_finite=False)
     rest = size - float(z @ z)
-    return Factored(R=R, z=z, rest=rest, samples=data.samples) if rest > LEFT * size else None
+    seen = rest > max(LEFT * size, data.floor)
+    return Factored(R=R, z=z, rest=rest, samples=data.samples) if seen else None
 
 
 def from_the_left(L: NDArray[np.float64], both: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.informative import beyond_chance, by_chance, informative
 from sysid.estimation.nonparametric.evidence import triangle
+from sysid.estimation.nonparametric.memory import Memory, key_of
 from sysid.estimation.nonparametric.segments import Segment, columns_of_lags, segments_of
 from sysid.models import Mapping
 from sysid.traces import Trace
@@ -24,6 +25,10 @@ MOST_SAMPLES = 20_000
 NOISELESS = 1e-7
 """Part of the output's variance below which what is left is rounding and nothing can be told from it."""
 
+
+MOST = 64
+"""Answers that a process remembers."""
+_memory = Memory["Feedback | str"](MOST)
 
 EXACT = (
     "inputs and output of one sample tell each other without a rest. Either the output answers at once and without "
@@ -73,7 +78,11 @@ def find_feedback(segments: Sequence[Segment]) -> Feedback | str:
     Returns:
         What was found, or why nothing can be said.
     """
-    segments = _first(segments)
+    some = _first(segments)
+    return _memory.get(key_of(some), lambda: _found(some))
+
+
+def _found(segments: Sequence[Segment]) -> Feedback | str:
     m, longest = segments[0].inputs.shape[1] if segments else 0, max(map(len, segments), default=0)
     total = sum(map(len, segments))
     past = min(PAST, total // (8 * (m + 1)), longest // 4)
@@ -141,19 +150,17 @@ def _at_once(segments: Sequence[Segment], past: int) -> float:
     belong together.
     """
     found, m = 0.0, segments[0].inputs.shape[1]
-    count = past * m
-    for j in range(m):
-        blocks = []
-        for s in segments:
-            if len(s) > past + 1:
-                at = slice(past, len(s))
-                inputs = [columns_of_lags(u, range(1, past + 1), at) for u in s.inputs.T]
-                output = columns_of_lags(s.output, range(past + 1), at)
-                # Last but one: the output of this sample; last: the input of this sample.
-                block = np.column_stack([*inputs, output[:, 1:], output[:, 0], s.inputs[at, j]])
-                blocks.append(block - block.mean(axis=0))
-        data = triangle(blocks, free=0)
-        z, rows = data.z**2, sum(map(len, blocks))
+    count, blocks = past * m, []
+    for s in segments:
+        if len(s) > past + 1:
+            at = slice(past, len(s))
+            inputs = [columns_of_lags(u, range(1, past + 1), at) for u in s.inputs.T]
+            output = columns_of_lags(s.output, range(past + 1), at)
+            # After what is known: the output of this sample, and the inputs of it, each asked by itself.
+            block = np.column_stack([*inputs, output[:, 1:], output[:, 0], s.inputs[at]])
+            blocks.append(block - block.mean(axis=0))
+    data, rows = triangle(blocks, free=0), sum(map(len, blocks))
+    for z in (np.column_stack([data.R, data.z]) ** 2).T[count + past + 1 :]:
         whole, known, with_past, with_now = (float(z[k:].sum()) for k in (0, count, count + past, count + past + 1))
         if with_now <= NOISELESS * whole:
             continue

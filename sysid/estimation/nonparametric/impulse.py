@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.nonparametric.dead_time import shares
-from sysid.estimation.nonparametric.evidence import Posterior, posterior
+from sysid.estimation.nonparametric.evidence import Posterior, Triangle, posterior
 from sysid.estimation.nonparametric.feedback import find_feedback
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse, settled
 from sysid.estimation.nonparametric.kernels import Kernel
@@ -41,6 +41,8 @@ FIRST_LENGTH, LONGEST, MOST_COLUMNS = 32, 512, 512
 CLEARLY = 1.5
 """How much more of the output a late response must explain than an early one, for more lags to be tried first."""
 FEWEST_ROWS, MOST_ASKED = 8, 4096
+ROUNDING = 1e-18
+"""Part of the output's square that is left where it is rounding and no noise: a billionth of its size."""
 SEEN = 2.5
 """Standard deviations that a response is away from nothing where it is seen to begin."""
 
@@ -194,6 +196,7 @@ def _reach(segments: Sequence[Segment], m: int, most: int) -> int:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Fitted:
     problem: Regression
+    data: Triangle
     posterior: Posterior
     prior: Prior
     dead: tuple[DeadTime, ...]
@@ -218,9 +221,13 @@ def _whitened(
     problem = found.problem
     if noise_order == 0:
         return found
-    rows = problem.count(found.whiten)[0]
+    rows, left = problem.count(found.whiten)[0], problem.residuals(found.response)
+    if noise_order is None and sum(float(part @ part) for part in left) <= ROUNDING * float(
+        found.data.z @ found.data.z
+    ):
+        return found  # of a simulation that it explains whole: what is left has no colour
     most = noise_order if noise_order is not None else min(12, rows // 20)
-    whiten = whitener(problem.residuals(found.response), most, exact=noise_order is not None)
+    whiten = whitener(left, most, exact=noise_order is not None)
     if len(whiten) == 1 or problem.count(whiten)[0] < FEWEST_ROWS:
         return found
     return _stage(problem, whiten, given, kernels, found.prior)
@@ -245,6 +252,7 @@ def _stage(
     prior = tuned(data, n, prior.dead, kernels, start=prior)
     return _Fitted(
         problem=problem,
+        data=data,
         posterior=posterior(data.columns(prior.kept), prior.factor()),
         prior=prior,
         dead=found,
@@ -256,8 +264,7 @@ def _doubted(found: _Fitted) -> _Fitted:
     """The same responses, their bands wider by what is not known of the prior."""
     if not found.prior.kept.any():
         return found
-    data = found.problem.triangle(found.whiten)
-    return replace(found, posterior=with_doubt(data, found.prior))
+    return replace(found, posterior=with_doubt(found.data, found.prior))
 
 
 def _seen(fitted: _Fitted) -> tuple[DeadTime, ...]:

@@ -213,10 +213,15 @@ def dead_times(data: Triangle, prior: Prior, *, most: int, rounds: int = 2) -> t
 def _scanned(data: Triangle, prior: Prior, j: int, most: int, *, everywhere: bool) -> DeadTime:
     """The dead time of one input: at places all over if asked, and about the best of them at every sample."""
     values = dict[int, float]()
+    without, own = prior.shifted(j, prior.length), np.repeat(np.arange(len(prior.dead)) == j, prior.length)
+    left, constant = data.beside(without.kept, without.factor()) if (~own).any() else (data, 0.0)
+    # Columns before the dead times of other inputs are in no prior.
+    left = left.columns(own[~without.kept])
+    alone = replace(prior, dead=prior.dead[j : j + 1], theta=prior.theta.reshape(len(prior.dead), -1)[j])
 
     def value(k: int) -> float:
         if k not in values:
-            values[k] = _value(data, prior.shifted(j, k))
+            values[k] = _value(left, alone.shifted(0, k)) - constant
         return values[k]
 
     step = max(1, most // PLACES)
@@ -237,9 +242,7 @@ def _scanned(data: Triangle, prior: Prior, j: int, most: int, *, everywhere: boo
         low -= 1
     while high + 1 in near:
         high += 1
-    return DeadTime(
-        best=best, low=low, high=high, odds=float(values[best] - _value(data, prior.shifted(j, prior.length)))
-    )
+    return DeadTime(best=best, low=low, high=high, odds=values[best] - value(prior.length))
 
 
 def _value(data: Triangle, prior: Prior) -> float:

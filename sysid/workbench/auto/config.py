@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from sysid.field_checks import FieldError
 from sysid.models import AbstractStructure, Start, StartKind
+from sysid.workbench.auto.finish import drawn_in
 from sysid.workbench.fields import MappingField, StartField
 from sysid.workbench.fits.config import ExportConfig, ReportConfig
 from sysid.workbench.old_words import STRICT
@@ -88,7 +89,9 @@ class AutoConfig(BaseModel):
             Its configuration.
         """
         names = ("name", "description", "data", "selection", "mapping", "start", "rest", "seed", "workers")
-        given: dict[str, Any] = {name: getattr(self, name) for name in (*names, "stability", "export", "report")}
+        given: dict[str, Any] = {name: getattr(self, name) for name in (*names, "stability", "export")}
+        drawn = self.report.drawn or drawn_in(self.wall_s, len(self.mapping.outputs))
+        given["report"] = self.report.model_copy(update={"drawn": drawn})
         return SweepConfig(kind="sweep", structure=(structure.to_dict(),), objectives=OBJECTIVES, **given)
 
 

@@ -10,16 +10,38 @@ FINISHING_S, PICTURE_S = 15.0, 0.25
 """Processor seconds that scores, export and what has to be loaded for them take, and each picture of the report."""
 PAGE_S = 4.0
 """Of that, what the page alone takes beside its pictures."""
+PAGE_SHARE, FEWEST = 0.15, 3
+"""Share of the time of a search that pictures of single cases may take, and cases that are drawn in any case."""
 PROBE_S, MOST = 0.2, 20.0
 """Processor seconds for which the machine is looked at, and how much slower it may be found at most."""
 
 
-def finish_s(records: int, outputs: int, *, slowed: float | None = None) -> float:
+def drawn_in(wall_s: float | None, outputs: int) -> int:
+    """How many cases are drawn: of five outputs all pictures would take longer than a search of a minute.
+
+    Args:
+        wall_s: Seconds of the search; ``None`` where iterations are counted.
+        outputs: Of each record.
+
+    Returns:
+        Cases of each output, :data:`FEWEST` to :data:`~sysid.reporting.fit_tables.DRAWN`.
+
+    Example:
+        >>> drawn_in(30.0, 1), drawn_in(30.0, 5), drawn_in(300.0, 5)
+        (9, 3, 12)
+    """
+    if wall_s is None:
+        return DRAWN
+    return int(min(max(PAGE_SHARE * wall_s / (2.0 * PICTURE_S * outputs), FEWEST), DRAWN))
+
+
+def finish_s(records: int, outputs: int, wall_s: float | None = None, *, slowed: float | None = None) -> float:
     """About how long scores, export and report take.
 
     Args:
-        records: Of the data; the report draws :data:`~sysid.reporting.fit_tables.DRAWN` of them at most.
+        records: Of the data; the report draws so many of them as :func:`drawn_in` says.
         outputs: Of each.
+        wall_s: Seconds of the search; ``None`` where iterations are counted.
         slowed: How many times as long a second of work takes; measured now by default.
 
     Returns:
@@ -29,25 +51,26 @@ def finish_s(records: int, outputs: int, *, slowed: float | None = None) -> floa
         >>> finish_s(20, 2, slowed=1.0)
         27.0
     """
-    return (slowness() if slowed is None else slowed) * (FINISHING_S + _pictures_s(records, outputs))
+    return (slowness() if slowed is None else slowed) * (FINISHING_S + _pictures_s(records, outputs, wall_s))
 
 
-def page_s(records: int, outputs: int) -> float:
+def page_s(records: int, outputs: int, wall_s: float | None = None) -> float:
     """About how long the report takes, beside what else the machine does now.
 
     Args:
         records: As for :func:`finish_s`.
         outputs: Likewise.
+        wall_s: Likewise.
 
     Returns:
         Seconds by the clock.
     """
-    return slowness() * (PAGE_S + _pictures_s(records, outputs))
+    return slowness() * (PAGE_S + _pictures_s(records, outputs, wall_s))
 
 
-def _pictures_s(records: int, outputs: int) -> float:
+def _pictures_s(records: int, outputs: int, wall_s: float | None) -> float:
     """Processor seconds of a gallery of all models, and of each model by itself."""
-    return PICTURE_S * 2.0 * min(records, DRAWN) * outputs
+    return PICTURE_S * 2.0 * min(records, drawn_in(wall_s, outputs)) * outputs
 
 
 def slowness() -> float:

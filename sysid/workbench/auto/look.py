@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sysid.advice import Verdict
+from sysid.advice import Advice, Verdict, advise
 from sysid.advice.dynamics import INTEGRATES
-from sysid.api.looking import Advice, SystemAdvice, advise
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
 from sysid.estimation.output_ends import found_ends
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind
+from sysid.reporting.advice_record import AdviceRecord
 from sysid.reporting.advice_words import lines
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.parts import ends_held_out
@@ -82,9 +82,8 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         What was found.
     """
     known = _set(data, data.estimation, data.selection)
-    found = advise(known, mapping)
-    advice = list(found.outputs.values()) if isinstance(found, SystemAdvice) else [found]
-    integrators = sum(any(finding.code == INTEGRATES for finding in one.record.findings) for one in advice)
+    advice = [advise(known, one, suggest=is_suggested(mapping)) for one in mapping.each]
+    integrators = sum(any(finding.code == INTEGRATES for finding in one.findings) for one in advice)
     # A line that adds up would not explain a stop: what stands at its least was left there.
     ends = {} if integrators else at_ends(data.estimation, mapping)
     return Looked(
@@ -92,13 +91,25 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         n_outputs=len(mapping.outputs),
         orders=_orders(data, mapping, start),
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
-        suggested=tuple(one.structure for one in advice[0].suggestions) if len(advice) == 1 else (),
+        suggested=tuple(suggestion.structure for one in advice for suggestion in one.suggestions),
         cautions=tuple(_cautions(advice)),
         ends=any(ends.values()),
         all_end=bool(ends) and all(ends.values()),
         integrators=integrators,
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
     )
+
+
+def is_suggested(mapping: Mapping) -> bool:
+    """Whether a look suggests structures: what it suggests is for one output, and a search has no use for it else.
+
+    Args:
+        mapping: Inputs and outputs.
+
+    Returns:
+        Whether there is one output.
+    """
+    return len(mapping.outputs) == 1
 
 
 def in_motion(traces: Sequence[Trace], mapping: Mapping) -> dict[str, float]:
@@ -169,7 +180,8 @@ def _cautions(advice: Sequence[Advice]) -> list[str]:
     found = []
     for one in advice:
         output = f"{one.mapping.output}: " if len(advice) > 1 else ""
-        found += [f"{output}{says} {do}".strip() for _, verdict, says, do in lines(one.record) if verdict == LOOK]
+        record = AdviceRecord.model_validate(one.to_dict())
+        found += [f"{output}{says} {do}".strip() for _, verdict, says, do in lines(record) if verdict == LOOK]
     return list(dict.fromkeys(found))
 
 

@@ -42,6 +42,7 @@ class AutoSearch:
         linear: The best linear one; the same as ``fit`` where no network does better.
         why: Why this one, in words.
         notes: What chose, and what in the record asks to be looked at.
+        hurried: Of these, that there was no search, as the time was up before structures were compared; else empty.
         record: Every trial.
     """
 
@@ -49,6 +50,7 @@ class AutoSearch:
     linear: Fit | SystemFit | None
     why: str
     notes: tuple[str, ...]
+    hurried: str
     record: SweepRecord
 
     def to_frame(self) -> pd.DataFrame:
@@ -141,8 +143,9 @@ def auto(
     if best is None:
         raise ConfigError("the chosen fit has gone from the folder", where=folder, remedy="run the search again")
     return AutoSearch(
-        fit=best, linear=fits[LINEAR] or best, why=found.record.chosen_by, notes=found.told, record=found.record
-    )
+        fit=best, linear=fits[LINEAR] or best, why=found.record.chosen_by, notes=found.told, hurried=found.hurried,
+        record=found.record,
+    )  # fmt: skip
 
 
 def _fit(name: str, found: Searched, start: Start, folder: Path, traces: TraceSet) -> Fit | SystemFit | None:

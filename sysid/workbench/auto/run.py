@@ -18,6 +18,7 @@ from sysid.models.store import structure_from_dict
 from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord, write_sweep
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.look import is_suggested
 from sysid.workbench.auto.parts import FURTHER, LAST
 from sysid.workbench.auto.race import trains_on
 from sysid.workbench.auto.refit import refitted
@@ -90,11 +91,13 @@ class Searched:
         record: Every trial.
         results: The contents of ``results.json``: what was chosen, and the best linear model beside it.
         told: What a reader has to know: what chose, and what is wrong with the record.
+        hurried: Of that, that there was no search, as the time was up before structures were compared; empty elsewhere.
     """
 
     record: SweepRecord
     results: Results
     told: tuple[str, ...]
+    hurried: str
 
 
 def auto_of(config: AutoConfig, *, load: Callable[[], Data] | None = None, page: bool = True) -> Auto:
@@ -250,7 +253,8 @@ class _AutoSteps:
                 given[model.fit.name] = self._again(model, made, loaded.value, further=further) if last else made
         choice = Choice(name=FOUND, chosen_by=found.record.chosen_by)
         work = FitSteps(
-            pipeline=pipeline, given=given, chosen=choice, page=self.auto.page, before_page=self.auto.before_page
+            pipeline=pipeline, given=given, chosen=choice, page=self.auto.page, before_page=self.auto.before_page,
+            suggest=is_suggested(self.config.mapping),
         )  # fmt: skip
         results = work.run(run, loaded)
         ready = events.SweepReady(
@@ -258,7 +262,8 @@ class _AutoSteps:
             seed=self.config.seed,
         )  # fmt: skip
         run.then(lambda: run.tell(ready))
-        return Searched(record=found.record, results=results, told=tuple(dict.fromkeys(told)))
+        told = list(dict.fromkeys(told))
+        return Searched(record=found.record, results=results, told=tuple(told), hurried=found.hurried)
 
     @property
     def _estimate(self) -> Estimate:

@@ -41,8 +41,6 @@ BUSY = 1.5
 LAST_FITS, LINEAR_LAST, RIPENING = 0.9, 0.25, 3
 """Share of the time that is left which the last fits may train, as they do more than that; of it, that of the best
 linear model; and iterations of a network below which it is not begun."""
-HURRIED = "The time was up before structures were compared"
-"""How it is said that a search was none."""
 LEAST_SHARE = 0.1
 """Share of the time of a search in which trials can be made at least."""
 CHECKED = 50
@@ -89,6 +87,7 @@ class Found:
         ends_s: Seconds by the clock by which the last fit has to be over; infinite where iterations are counted.
         slowed: Seconds by the clock that a second of training takes.
         told: What a reader has to know.
+        hurried: Of that, that there was no search, as the time was up before structures were compared; empty elsewhere.
         done_now: Trials that this session has done itself.
     """
 
@@ -101,6 +100,7 @@ class Found:
     ends_s: float
     slowed: float
     told: tuple[str, ...]
+    hurried: str
     done_now: int
 
     def last_fits_s(self, spent_s: float, samples: int) -> dict[str, float]:
@@ -225,7 +225,7 @@ class Search:
             refit=refit_share(self.parts),
             trial=TRIAL_OF_MANY if self.parts.trained_on else TRIAL,
             kept=FINAL if again else 0.0,
-            finishing_s=finish_s(len(self.data.traces), self._n_outputs, slowed=1.0),
+            finishing_s=finish_s(len(self.data.traces), self._n_outputs, self.config.wall_s, slowed=1.0),
         )
         training = {**self.parts.training, **budget.limits(budget.trial / len(self.parts.folds))}
         if self.parts.trained_on and self.config.tolerance is not None:
@@ -265,7 +265,7 @@ class Search:
             plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance,
             goes_on=lambda trial: self.parts.trained_on and trains_on(structure_from_dict(trial.structure)),
         )  # fmt: skip
-        shown = {FOUND: choice.chosen}
+        shown, hurried = {FOUND: choice.chosen}, _hurried(plan, choice.chosen, clock.total)
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear
         return Found(
@@ -279,11 +279,12 @@ class Search:
             slowed=1.0 if self.config.wall_s is None else plan.budget.slowed,
             told=(
                 *self.parts.told,
-                *_hurried(plan, choice.chosen, clock.total),
+                *([hurried] if hurried else []),
                 *_busy(plan),
                 *_left_out(plan),
                 *(f"Look at the data: {one}" for one in self.looked.cautions),
             ),
+            hurried=hurried,
             done_now=trials.done_now,
         )
 
@@ -321,19 +322,19 @@ class Search:
         )
 
 
-def _hurried(plan: Plan, chosen: Trial, spent_s: float) -> list[str]:
-    """That the time was up before there was anything to compare, and about how long a search takes."""
+def _hurried(plan: Plan, chosen: Trial, spent_s: float) -> str:
+    """That the time was up before there was anything to compare, and about how long a search takes; else nothing."""
     if not plan.hurried:
-        return []
+        return ""
     wall_s = plan.budget.wall_s
     if wall_s is None:
-        return [f"The budget was spent before structures were compared: {chosen.label} is the least that there is."]
+        return f"The budget was spent before structures were compared: {chosen.label} is the least that there is."
     need = max(2.0 * wall_s, spent_s / max(1.0 - MOST_KEPT - plan.budget.refit, LEAST_SHARE))
-    return [
-        f"{HURRIED}: {chosen.label} is the least that there is, fitted once, "
+    return (
+        f"The time was up before structures were compared: {chosen.label} is the least that there is, fitted once, "
         f"whatever it is worth. Of {span(wall_s)}, looking at the record and one fit took {span(spent_s)}, and scores, "
         f"export and report are still to come; a search that compares takes {span(need)} at least."
-    ]
+    )
 
 
 def _busy(plan: Plan) -> list[str]:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from sysid.references.described import Wish
 
 commands = typer.Typer()
 
@@ -58,9 +61,9 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
     What was killed goes on where it was.
     """
     began = time.monotonic()  # what is imported counts
-    from sysid.workbench.commands.surrogate import surrogate_command, wish_of
+    from sysid.workbench.commands.surrogate import surrogate_command
 
-    wish = wish_of(span or [], parameter or [], output or [], sample_time=sample_time, duration=duration)
+    wish = _wish(span, parameter, output, sample_time, duration)
     raise typer.Exit(
         surrogate_command(
             source,
@@ -75,6 +78,16 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
             began=began,
         )
     )
+
+
+def _wish(
+    ranges: list[str] | None, parameters: list[str] | None, outputs: list[str] | None, sample_time: float | None,
+    duration: float | None,
+) -> Wish:  # fmt: skip
+    from sysid.workbench.surrogates.asked import pairs, wish_of
+
+    inputs, varied = pairs(ranges or [], "--range"), pairs(parameters or [], "--parameter")
+    return wish_of(inputs, varied, outputs or [], sample_time=sample_time, duration=duration)
 
 
 @commands.command(epilog="Example: sysid init mine  sysid init mine --reference cylinder.fmu --range valve=-10:10")
@@ -95,7 +108,6 @@ def init(  # noqa: PLR0917 - one parameter an option, by name on the command lin
 ) -> None:
     """Make a workspace: folders for data sets, pipelines and reports, with a first pipeline that runs in seconds."""
     from sysid.workbench.commands.init import init_command
-    from sysid.workbench.commands.surrogate import wish_of
 
-    wish = wish_of(span or [], parameter or [], output or [], sample_time=sample_time, duration=duration)
+    wish = _wish(span, parameter, output, sample_time, duration)
     init_command(folder, reference=reference, wish=wish)

@@ -45,7 +45,7 @@ def auto_command(source: str, *, given: Mapping[str, Any], fresh: bool, out: Pat
     config = check(AutoConfig, {"kind": "auto", "name": name, "data": source, **options}, where="sysid auto")
     data = data_of(traces, config.mapping)
     if config.wall_s is not None:
-        finish = finish_s(len(data.traces), len(config.mapping.outputs))
+        finish = finish_s(len(data.traces), len(config.mapping.outputs), config.wall_s)
         said = f"Time: {span(config.wall_s)} at most, about {span(finish)} of it for scores, export and report."
         console().print(said, soft_wrap=True, markup=False)
     words = [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from sysid.references.described import Wish
 from sysid.references.sources import source_of
-from sysid.workbench.commands.surrogate import no_options
 from sysid.workbench.runner.console import console
+from sysid.workbench.surrogates.asked import no_options
 from sysid.workbench.workspace import make_workspace
 
 

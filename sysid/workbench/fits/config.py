@@ -110,11 +110,14 @@ class ReportConfig(BaseModel):
 
     Args:
         published: Name of a table of published figures.
+        drawn: Cases of each fit that are drawn at most, the worst of those that were not fitted first; 12 by default,
+            and fewer where a search has little time.
     """
 
     model_config = STRICT
 
     published: str | None = None
+    drawn: int | None = Field(default=None, ge=1)
 
 
 def _as_list(value: object) -> object:

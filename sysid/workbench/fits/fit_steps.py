@@ -79,6 +79,7 @@ class FitSteps:
         chosen: The fit that comes first, where it was chosen elsewhere.
         page: Whether a page is made of the results, and the traces are looked at for it.
         before_page: Writes what the page shows beside the results, once these and the bundle are there.
+        suggest: Whether the page suggests structures.
     """
 
     pipeline: Pipeline
@@ -86,6 +87,7 @@ class FitSteps:
     chosen: Choice | None = None
     page: bool = True
     before_page: Callable[[], object] | None = None
+    suggest: bool = True
 
     @property
     def config(self) -> PipelineConfig:
@@ -303,8 +305,8 @@ class FitSteps:
         return Step(
             name=LOOKING.name,
             title=LOOKING.title,
-            make=lambda _: steps.look(self.config, loaded.value),
-            key=lambda: steps.advice_key(self.config, loaded.value),
+            make=lambda _: steps.look(self.config, loaded.value, suggest=self.suggest),
+            key=lambda: steps.advice_key(self.config, loaded.value, suggest=self.suggest),
             write=write,
             read=lambda _: read_json(file),
             outcome=_looked,

@@ -13,6 +13,7 @@ import numpy as np
 from sysid.estimation import CascadeFit, FitResult, Posterior, Status
 from sysid.models import Mapping as Mapped
 from sysid.reporting.curves import CURVES_FILE
+from sysid.reporting.fit_tables import DRAWN
 from sysid.reporting.records import SCHEMA_VERSION
 from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import Role, TraceSet
@@ -271,6 +272,7 @@ def results_document(
         "linearity": linearity(fits, choice.name if choice else None),
         "advice": list(advice),
         "published": config.report.published,
+        "drawn": config.report.drawn or DRAWN,
         "sweep": None if sweep is None else sweep.summary.model_dump(),
     }
 

@@ -40,31 +40,34 @@ CONFIGURATION = ("sysid.workbench.fits.config", "sysid.workbench.fits.data", "sy
 """How a YAML is read is no code that a result depends on: what was read is among the terms of its key."""
 
 
-def advice_key(config: PipelineConfig, data: Data) -> str:
+def advice_key(config: PipelineConfig, data: Data, *, suggest: bool = True) -> str:
     """Digest of everything that the first look at the traces depends on.
 
     Args:
         config: The pipeline.
         data: The traces.
+        suggest: As for :func:`look`.
 
     Returns:
         64 hexadecimal digits.
     """
     code = code_digest("sysid.advice:advise")
-    return digest({"mapping": str(config.mapping), "traces": data.traces.digest, "code": code})
+    terms = {"mapping": str(config.mapping), "traces": data.traces.digest, "code": code}
+    return digest(terms if suggest else {**terms, "suggest": False})
 
 
-def look(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
+def look(config: PipelineConfig, data: Data, *, suggest: bool = True) -> list[dict[str, Any]]:
     """The first look at the traces, output by output: what is in them, before anything is fitted.
 
     Args:
         config: The pipeline.
         data: The traces.
+        suggest: Whether structures are suggested.
 
     Returns:
         JSON values, one object an output.
     """
-    return [advise(data.traces, one).to_dict() for one in config.mapping.each]
+    return [advise(data.traces, one, suggest=suggest).to_dict() for one in config.mapping.each]
 
 
 def fit_code(structure: AbstractStructure) -> str:

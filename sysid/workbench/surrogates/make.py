@@ -35,7 +35,6 @@ from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import MOVED, in_motion, span_of
 from sysid.workbench.auto.run import Searched, auto_of
 from sysid.workbench.auto.run import program_of as search_program
-from sysid.workbench.auto.search import HURRIED
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
 from sysid.workbench.experiments.run import DATASET, Experimented, Experiments
 from sysid.workbench.experiments.run import program_of as experiment_program
@@ -80,13 +79,17 @@ class Made:
         report: The page.
         proof: How it does on new experiments.
         notes: What a reader has to know.
+        pipeline: What was run, as a file; of a reference the one that was proposed.
+        proposed: What of it was taken from where.
     """
 
     bundle: Path
     fmu: Path | None
     report: Path
     proof: Proof
-    notes: Sequence[str] = ()
+    notes: Sequence[str]
+    pipeline: Path
+    proposed: Sequence[str] = ()
 
 
 def make_surrogate(
@@ -163,7 +166,7 @@ def make_surrogate(
     seconds_left = _kept(folder / TIMES, plan.search) - (0.0 if growth is None else GROWING * plan.whole)
     proving = _Proving(
         reference=reference, design=config.experiment, taught=found.traces, count=count, workers=config.workers,
-        ends=inf if proof or iterations else began + plan.whole, say=say,
+        ends=inf if proof or iterations else began + plan.whole, search_s=seconds_left, say=say,
     )  # fmt: skip
     place = folder / "model"
     if config.fits:
@@ -171,7 +174,7 @@ def make_surrogate(
     else:
         before_page = partial(proving, place) if growth is None else None
         searched = work.searched(found, seconds_left / 60.0, before_page)
-        notes += [one for one in searched.told if one.startswith(HURRIED)]
+        notes += [searched.hurried] if searched.hurried else []
         if growth is not None:
             ground = Ground(config=config, reference=reference, found=found, folder=folder)
             seconds = None if iterations else GROWING * 60.0 * minutes
@@ -186,7 +189,7 @@ def make_surrogate(
     if fmu is not None:
         fmu = Path(shutil.copyfile(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu"))
     notes += _short_of_time(shown, plan, count, took=time.monotonic() - began, asked=bool(proof or iterations))
-    return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes)
+    return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes, pipeline=pipeline)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -214,7 +217,8 @@ class _Work:
 
     def planned(self, found: Experimented, *, minutes: float, spent: float, proof: int | None) -> tuple[Times, int]:
         """How the time is spent, and of how many experiments the proof is."""
-        workers, finish = self.config.workers, finish_s(len(found.traces), len(self.mapping.outputs))
+        whole = None if self.iterations else 60.0 * minutes
+        workers, finish = self.config.workers, finish_s(len(found.traces), len(self.mapping.outputs), whole)
         with ReferenceRuns(config=self.reference) as runs:
             each = runs.seconds_each()[0]
         each = self.reference.time_limit if each is None else max(each, 1e-3)
@@ -264,12 +268,15 @@ class _Proving:
     count: int
     workers: int
     ends: float
+    search_s: float
     say: Callable[[str], None]
     done: dict[Path, Proof] = field(default_factory=dict)
 
     def __call__(self, place: Path) -> Proof:
         """Prove the bundle in a folder; what time the page takes, which comes after it, is seen now."""
-        until = self.ends - page_s(len(self.taught), len(self.reference.outputs)) if np.isfinite(self.ends) else inf
+        until = inf
+        if np.isfinite(self.ends):
+            until = self.ends - page_s(len(self.taught), len(self.reference.outputs), self.search_s)
         proof, section = prove(
             read_bundle(place / "bundle"), self.reference, self.design, self.taught, count=self.count,
             workers=self.workers, tolerance=TOLERANCE, until=until, progress=self._progress,

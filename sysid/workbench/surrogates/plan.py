@@ -11,7 +11,6 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.field_checks import check
-from sysid.ingest.headers import parse_header
 from sysid.names import slug
 from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish
@@ -212,57 +211,3 @@ def times(each: float, *, minutes: float, spent: float, experiments: int, worker
         120.0
     """
     return Times(whole=60.0 * minutes, spent=spent, proof=experiments * each / workers, finish=finish)
-
-
-def pairs(options: Sequence[str], flag: str) -> dict[str, tuple[tuple[float, float], dict[str, str]]]:
-    """Ranges as they are typed, ``NAME=LOW:HIGH`` or ``NAME [UNIT]=LOW:HIGH``.
-
-    Args:
-        options: As typed.
-        flag: For errors.
-
-    Returns:
-        By name the range, and what is said of the unit.
-
-    Raises:
-        ConfigError: If one is not of that form.
-
-    Example:
-        >>> pairs(["u=0:10", "p [bar gauge]=0:5"], "--range")
-        {'u': ((0.0, 10.0), {}), 'p': ((0.0, 5.0), {'unit': 'bar', 'reference': 'gauge'})}
-    """
-    found = {}
-    for text in options:
-        head, _, span = text.rpartition("=")
-        try:
-            low, high = (float(part) for part in span.split(":"))
-        except ValueError:
-            head = ""
-        if not head or not low < high:
-            raise ConfigError(
-                f"{flag} is not a range", where="the command line", expected="NAME=LOW:HIGH, as valve=0:10", got=text,
-                remedy="write the name, and two rising numbers",
-            )  # fmt: skip
-        name, unit = named(head)
-        found[name] = (low, high), unit
-    return found
-
-
-def named(text: str) -> tuple[str, dict[str, str]]:
-    """A port as it is typed, ``NAME`` or ``NAME [UNIT]``, as in the header of a table.
-
-    Args:
-        text: As typed.
-
-    Returns:
-        Its name, and what is said of its unit.
-
-    Example:
-        >>> named("position [mm]"), named("x[3]")
-        (('position', {'unit': 'mm'}), ('x[3]', {}))
-    """
-    if not text.endswith("]") or " [" not in text:
-        return text, {}
-    header = parse_header(text)
-    told = {"unit": header.unit, "reference": None if header.reference is None else header.reference.value}
-    return header.name, {name: value for name, value in told.items() if value}

@@ -8,7 +8,10 @@ from scipy.signal import lfilter
 
 import sysid
 from sysid.advice import Verdict
+from sysid.estimation.nonparametric import feedback
+from sysid.estimation.nonparametric.evidence import Triangle, triangle
 from sysid.estimation.nonparametric.feedback import EXACT, find_feedback
+from sysid.estimation.nonparametric.memory import Memory
 from sysid.estimation.nonparametric.segments import Segment
 
 GAIN, POLE = 0.5, 0.8
@@ -96,3 +99,23 @@ def test_a_strong_controller_that_a_test_signal_moves_more_is_told_beside_a_bias
         u[k] = dither[k] - 5.0 * y[k] - total
     fit = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.OE(nb=1, nf=1, nk=1))
     assert any("closed loop" in note for note in fit.warnings)
+
+
+def test_the_same_stretches_are_asked_once_and_each_input_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All inputs are asked of one factor: a second one that is not set from the output changes nothing of the first."""
+    made = list[int]()
+
+    def counted(blocks: list[np.ndarray], **options: int) -> Triangle:
+        made.append(blocks[0].shape[1])
+        return triangle(blocks, **options)
+
+    monkeypatch.setattr(feedback, "triangle", counted)
+    monkeypatch.setattr(feedback, "_memory", Memory(4))
+    u, y = closed_loop(0)
+    other = np.random.default_rng(9).standard_normal((N, 2))
+    one, three = found(u, y), find_feedback([Segment(inputs=np.column_stack([other, u]), output=y)])
+    assert one.at_once and three.at_once
+    assert three.share_at_once == pytest.approx(one.share_at_once, rel=0.1)
+    assert len(made) == 4
+    assert found(u, y) is one
+    assert len(made) == 4

@@ -13,7 +13,7 @@ from sysid.estimation.nonparametric.evidence import Triangle, factored, posterio
 from sysid.estimation.nonparametric.impulse import estimate_impulse_response
 from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
 from sysid.estimation.nonparametric.noise import whitener
-from sysid.estimation.nonparametric.prior import _Search
+from sysid.estimation.nonparametric.prior import Prior, _Search
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
 
@@ -226,3 +226,30 @@ def test_white_residuals_have_no_colour_and_growing_ones_a_stable_one() -> None:
     rng = np.random.default_rng(0)
     assert whitener([rng.standard_normal(500)], 6).tolist() == [1.0]
     assert np.abs(np.roots(whitener([1.05 ** np.arange(100)], 1, exact=True))).max() < 1.0
+
+
+@pytest.mark.parametrize("noise", [1.0, 0.0], ids=["noisy", "exact"])
+def test_the_evidence_beside_what_other_inputs_explain_is_that_of_all(noise: float) -> None:
+    """Where dead times of one input are looked at, the others are factored once."""
+    rng = np.random.default_rng(2)
+    a, n = rng.standard_normal((200, 24)), 8
+    y = a[:, 3:24] @ rng.standard_normal(21) + noise * rng.standard_normal(200)
+    data = triangle([np.column_stack([a, y])], free=0)
+    rows = np.log([[2.0, 3.0], [5.0, 2.0], [1.0, 4.0]])
+    whole = Prior(kernel=Kernel.TC, length=n, dead=np.array([2, 0, 1]), theta=rows.ravel())
+    without, own = whole.shifted(1, n), np.repeat([False, True, False], n)
+    left, constant = data.beside(without.kept, without.factor())
+    for dead in (0, 3, 7):
+        moved = whole.shifted(1, dead)
+        alone = Prior(kernel=Kernel.TC, length=n, dead=moved.dead[1:2], theta=rows[1])
+        part = factored(left.columns(own[~without.kept]).columns(alone.kept), alone.factor())
+        expected = factored(data.columns(moved.kept), moved.factor()).log_evidence
+        assert part.log_evidence - constant == pytest.approx(expected, rel=1e-9)
+
+
+def test_what_a_simulation_leaves_is_rounding_and_has_no_colour() -> None:
+    u = np.random.default_rng(1).standard_normal((300, 2))
+    exact = estimate_impulse_response([trace(u, lfilter([0.0, 2.0], [1.0], u[:, 0]))], TWO)
+    assert exact.noise_ar == ()
+    np.testing.assert_allclose(exact.values[0, :3], [0.0, 2.0, 0.0], atol=1e-9)
+    assert [one.acts for one in exact.dead_times] == [True, False]

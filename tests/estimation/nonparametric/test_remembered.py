@@ -12,6 +12,7 @@ from sysid.errors import TraceError
 from sysid.estimation.nonparametric import remembered
 from sysid.estimation.nonparametric.impulse import estimate_impulse_response
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
+from sysid.estimation.nonparametric.memory import Memory
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
 
@@ -36,7 +37,7 @@ def estimates(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
         return estimate_impulse_response(traces, *args, **options)
 
     monkeypatch.setattr(remembered, "estimate_impulse_response", counted)
-    monkeypatch.setattr(remembered, "_known", {})
+    monkeypatch.setattr(remembered, "_memory", Memory[ImpulseResponse](remembered.MOST))
     return made
 
 
@@ -81,11 +82,11 @@ def test_anything_else_is_another_question(estimates: list[Trace]) -> None:
 def test_what_was_asked_last_is_kept_no_more_than_said_and_no_error(
     estimates: list[Trace], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(remembered, "MOST", 2)
+    monkeypatch.setattr(remembered, "_memory", Memory[ImpulseResponse](2))
     for longest, estimated in ((4, 1), (5, 2), (4, 2), (6, 3), (4, 3), (5, 4)):
         remembered.remembered_response([record()], MAPPING, longest=longest)
         assert len(estimates) == estimated
-    assert len(remembered._known) == 2
+    assert len(remembered._memory) == 2
     still = record().values * [0.0, 1.0, 1.0]
     for _ in range(2):
         with pytest.raises(TraceError, match="never changes"):

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sysid.advice import Advice
 from sysid.models import Mapping, NeuralStateSpace, Start, StartKind
-from sysid.traces import Role, Trace
+from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.families import FAMILIES
 from sysid.workbench.auto.look import Looked, at_ends, in_motion, look
 from tests.workbench.auto.conftest import data, record
@@ -60,10 +61,8 @@ def test_traces_that_only_score_have_no_say(looked: Looked) -> None:
 
 def test_a_sensor_that_may_not_tell_a_sign_is_known_but_for_its_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sysid.workbench.auto.look._orders", lambda *_: ())
-    monkeypatch.setattr("sysid.workbench.auto.look.advise", lambda *_: replaced)
-    nothing = type("Record", (), {"findings": ()})
-    replaced = type("Advice", (), {"suggestions": (), "record": nothing, "mapping": MAPPING})
-    monkeypatch.setattr("sysid.workbench.auto.look.lines", lambda _: [])
+    nothing = Advice(data="rig", mapping=MAPPING, sample_time=0.1, units={}, findings=(), suggestions=())
+    monkeypatch.setattr("sysid.workbench.auto.look.advise", lambda *_, **__: nothing)
     lowest = float(record("a", 200)["y"].min())
     for by, one_sign in ((0.0, False), (-lowest, True), (-lowest - 0.005, True), (-lowest - 0.1, False)):
         assert look(data(shifted(record("a", 200), by)), MAPPING, ESTIMATED).never_negative is one_sign
@@ -77,3 +76,19 @@ def test_what_adds_up_is_known(monkeypatch: pytest.MonkeyPatch, looked: Looked) 
     assert (looked.integrators, found.integrators) == (0, 1)
     first = next(family for family in FAMILIES if family.kind == NeuralStateSpace.kind).first(found)
     assert {one.structure.to_dict().get("integrators") for one in first} == {1}
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_orders_that_nobody_tries_are_not_looked_for(monkeypatch: pytest.MonkeyPatch, outputs: int) -> None:
+    """What is suggested is for one output: of several it took most of the time of a look, and was dropped."""
+    asked: list[bool] = []
+
+    def counted(known: TraceSet, mapping: Mapping, *, suggest: bool) -> Advice:
+        asked.append(suggest)
+        return Advice(data=known.name, mapping=mapping, sample_time=0.1, units={}, findings=(), suggestions=())
+
+    monkeypatch.setattr("sysid.workbench.auto.look._orders", lambda *_: ())
+    monkeypatch.setattr("sysid.workbench.auto.look.advise", counted)
+    names = ("y",) if outputs == 1 else ("y1", "y2")
+    look(data(record("a", 60, outputs=outputs)), Mapping(inputs=("u",), outputs=names), ESTIMATED)
+    assert asked == [outputs == 1] * outputs

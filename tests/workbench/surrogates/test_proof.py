@@ -30,7 +30,7 @@ from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.experiments.run import Experimented, Experiments
 from sysid.workbench.surrogates import make
 from sysid.workbench.surrogates.make import beginning_of, restless
-from sysid.workbench.surrogates.plan import pairs, times, written
+from sysid.workbench.surrogates.plan import times, written
 from sysid.workbench.surrogates.proof import Proof, _begun_until, fmu_of, prove
 from sysid.yaml_files import read_yaml
 
@@ -232,12 +232,6 @@ def test_what_would_be_passed_over_is_refused(tmp_path: Path, capsys: pytest.Cap
         assert run_cli(words) != 0
         assert said in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "ws").exists()
-
-
-@pytest.mark.parametrize("text", ["u", "u=3:1", "=1:2", "u=a:b"])
-def test_a_range_that_is_none_is_refused(text: str) -> None:
-    with pytest.raises(ConfigError, match="is not a range"):
-        pairs([text], "--range")
 
 
 def test_what_does_not_begin_at_rest_is_told() -> None:

@@ -1,0 +1,33 @@
+"""What comes after a search has a place in its time: in a short one fewer cases are drawn."""
+
+from __future__ import annotations
+
+import pytest
+
+from sysid.field_checks import check
+from sysid.models import ARX
+from sysid.reporting.fit_tables import DRAWN
+from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.finish import FEWEST, PICTURE_S, finish_s
+
+SEARCH = {"kind": "auto", "name": "a", "data": "rig", "mapping": "u -> a+b+c+d+e"}
+STRUCTURE = ARX(na=1, nb=(1,), nk=(1,))
+
+
+@pytest.mark.parametrize(
+    ("given", "drawn"),
+    [
+        ({"minutes": 0.5}, FEWEST),
+        ({"minutes": 10.0}, DRAWN),
+        ({"iterations": 100}, DRAWN),
+        ({"minutes": 0.5, "report": {"drawn": 7}}, 7),
+    ],
+)
+def test_how_many_cases_are_drawn_is_decided_by_the_time_or_said(given: dict[str, object], drawn: int) -> None:
+    config = check(AutoConfig, {**SEARCH, **given}, where="here")
+    assert config.sweep(STRUCTURE).report.drawn == drawn
+
+
+def test_pictures_that_are_not_drawn_take_no_time() -> None:
+    long, short = finish_s(40, 5, slowed=1.0), finish_s(40, 5, 30.0, slowed=1.0)
+    assert long - short == 2.0 * PICTURE_S * 5 * (DRAWN - FEWEST)
