@@ -185,6 +185,8 @@ class Estimator:
         structure: AbstractStructure,
         training: Options | None,
         stability: StabilityOptions | None,
+        *,
+        remarks: bool = True,
         **given: Any,
     ) -> FitResult:
         """Fit and check; see :func:`fit`.
@@ -195,15 +197,16 @@ class Estimator:
             structure: What is fitted.
             training: Its options; ``None`` for the defaults.
             stability: How the free run is checked; ``None`` checks nothing.
+            remarks: Whether posterior and notes are made; see :meth:`remarked`.
             given: What else a fit may be given, by name.
 
         Returns:
             The fit.
         """
-        lost = () if self.each else hidden(traces, mapping)
+        whole, chooses = traces, given.get("selection", ())
         traces = [trace.seen_by(mapping.channels, each=self.each) for trace in traces]
-        if given.get("selection"):
-            given["selection"] = [one.seen_by(mapping.channels, each=self.each) for one in given["selection"]]
+        if chooses:
+            given["selection"] = [one.seen_by(mapping.channels, each=self.each) for one in chooses]
         options = self.options(None, seed=0) if training is None else training
         checked = NoCheck() if stability is None else self.stability.of(stability, mapping, traces)
         chosen = () if self.training is None else (options,)
@@ -212,25 +215,54 @@ class Estimator:
         def noted(*args: Any, **named: Any) -> FitResult:
             """The fit with what its records say of how they begin, before what its check says."""
             found = self.fit(*args, **named)
-            found = self.with_posterior(found, traces, named["start"], given.get("selection", ()))
-            told = () if found.posterior is not None else (f"No interval of the output: {self._unsure(options)}.",)
-            off = equilibrium_notes(found.model, traces, named["start"])
-            against = contradicted(found.model, traces, named["start"], options, uncertainty=found.uncertainty)
-            few = (*outnumbered(found.model, traces), *underexcited(found.model, traces), *held(found.model, traces))
-            switches, levels = between_levels(found.model, traces)
-            warned = (
-                *undetermined(traces, mapping),
-                *lost,
-                *few,
-                *against,
-                *off,
-                *levels,
-            )
-            told = (*told, *switches)
-            return replace(found, notes=(*found.notes, *told, *warned), warnings=(*found.warnings, *warned))
+            if not remarks:
+                return found
+            return self.remarked(found, whole, mapping, options, start=named["start"], selection=chooses)
 
         with one_blas_thread():
             return checked.fitted(noted, traces, mapping, structure, *chosen, **known)
+
+    @one_blas_thread()
+    def remarked(
+        self,
+        found: FitResult,
+        traces: Sequence[Trace],
+        mapping: Mapping,
+        options: object,
+        *,
+        start: Start,
+        selection: Sequence[Trace] = (),
+    ) -> FitResult:
+        """A fit with its posterior, and with what its records say of it.
+
+        Of the many fits of a search one is looked at: these take longer than most of them, and are made of that one.
+
+        Args:
+            found: The fit.
+            traces: Estimation traces.
+            mapping: Which channels go in, which comes out.
+            options: How it was fitted.
+            start: What stands before each.
+            selection: Traces that widen its intervals to the errors on them.
+
+        Returns:
+            The fit; notes of a check of its free run, which it may have had, stay last.
+        """
+        lost = () if self.each else hidden(traces, mapping)
+        traces, selection = (
+            [trace.seen_by(mapping.channels, each=self.each) for trace in some] for some in (traces, selection)
+        )
+        last = len(found.notes) - (found.stability is not None)  # what a check says comes last
+        own, checked = found.notes[:last], found.notes[last:]
+        found = self.with_posterior(found, traces, start, selection)
+        told = () if found.posterior is not None else (f"No interval of the output: {self._unsure(options)}.",)
+        off = equilibrium_notes(found.model, traces, start)
+        against = contradicted(found.model, traces, start, options, uncertainty=found.uncertainty)
+        few = (*outnumbered(found.model, traces), *underexcited(found.model, traces), *held(found.model, traces))
+        switches, levels = between_levels(found.model, traces)
+        warned = (*undetermined(traces, mapping), *lost, *few, *against, *off, *levels)
+        notes = (*own, *told, *switches, *warned, *checked)
+        return replace(found, notes=notes, warnings=(*found.warnings, *warned))
 
     def _unsure(self, options: Any) -> str:
         """Why a fit has no posterior."""

@@ -310,6 +310,7 @@ def fit(
     initial: FitResult | None = None,
     stability: StabilityOptions | None = StabilityOptions(),  # noqa: B008 - frozen
     resume: Checkpoint | None = None,
+    remarks: bool = True,
     on_checkpoint: Callable[[Checkpoint], None] = lambda _: None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> FitResult:
@@ -326,6 +327,8 @@ def fit(
         initial: A fit to start from: of the same structure, a smaller one, or an ARX model over its lags.
         stability: How the free run is checked, by default over 1,000 random sequences; ``None`` checks nothing.
         resume: Where the fit of a single start was put aside; it goes on as if it had not been.
+        remarks: Whether the posterior of a linear fit is made, and what the records say of the fit is told; the
+            estimator's ``remarked`` makes them of a fit that has none.
         on_checkpoint: Given the checkpoint from which the chosen start can go on; never called where there is none.
         on_progress: Called after every iteration, from the threads that train.
 
@@ -355,6 +358,7 @@ def fit(
         selection=selection,
         initial=initial,
         resume=resume,
+        remarks=remarks,
         on_checkpoint=on_checkpoint,
         on_progress=on_progress,
     )

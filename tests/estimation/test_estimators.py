@@ -10,7 +10,7 @@ import pytest
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Status, Training, fit_arx
 from sysid.estimation.estimators import ESTIMATORS, JOINING, estimator_of, fit, with_stability
-from sysid.models import ARX, NARX, Mapping
+from sysid.models import ARX, NARX, Mapping, Start
 from sysid.traces import Channel, Trace
 
 MAPPING = Mapping.parse("u -> y")
@@ -82,3 +82,17 @@ def test_a_fit_without_intervals_says_which_reason_it_has() -> None:
     reasons = [[note for note in found.notes if note.startswith("No interval")] for found in (short, given)]
     assert "training ended before there was evidence" in reasons[0][0]
     assert reasons[1] == ["No interval of the output: regularisation: 0.1 was given, not found by the evidence."]
+
+
+@pytest.mark.parametrize(("structure", "training"), [(ORDERS, None), (NETWORK, Training(max_iterations=5, starts=1))])
+def test_remarks_that_are_made_of_the_chosen_fit_alone_are_those_that_any_fit_has(
+    structure: ARX | NARX, training: Training | None
+) -> None:
+    """Of many fits one is looked at; what its records say of it takes longer than most fits."""
+    checked = StabilityOptions(count=5)
+    whole = fit([trace()], MAPPING, structure, training, stability=checked)
+    bare = fit([trace()], MAPPING, structure, training, stability=checked, remarks=False)
+    assert set(bare.notes) < set(whole.notes)
+    found = estimator_of(structure).remarked(bare, [trace()], MAPPING, training, start=Start())
+    assert (found.notes, found.warnings, found.status) == (whole.notes, whole.warnings, whole.status)
+    assert (found.posterior is None) == (whole.posterior is None)

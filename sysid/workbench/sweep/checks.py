@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,10 @@ from sysid.workbench.runner.steps import Work
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.store import TrialStore
-from sysid.workbench.sweep.trial import Bench, stored_models, train
+from sysid.workbench.sweep.trial import Bench, fit_of, stored_models, train
+
+if TYPE_CHECKING:
+    from sysid.estimation.networks.posterior import Posterior
 
 FOLDER = "checked"
 """Beside the trials: those whose free run was checked."""
@@ -122,12 +125,18 @@ class Checks:
         return self.found[trial.number]
 
     def _whole(self, trial: Trial, fits: Sequence[FitResult], number: int) -> FitResult:
-        """The fit with its posterior, which is too large to be kept of every trial: made from where training ended."""
-        job, outcome, fit = self.driver.last[trial.number], self._outcome(trial), fits[number]
-        row = estimator_of(fit.model.structure)
-        if row.training is not Training:
-            estimation, start = self.bench.traces.with_role(Role.ESTIMATION), self.bench.start
-            return row.with_posterior(fit, estimation, start, self.bench.selection)
+        """The fit with its posterior, which is too large to be kept of every trial, and with what is told of it."""
+        job, fit = self.driver.last[trial.number], fits[number]
+        row, mapping, bench = estimator_of(fit.model.structure), fit.model.mapping, self.bench
+        if row.training is Training:
+            fit = replace(fit, posterior=self._posterior(trial, fit, number))
+        options = fit_of(job).training_options(bench.seed)
+        estimation = bench.traces.with_role(Role.ESTIMATION)
+        return row.remarked(fit, estimation, mapping, options, start=bench.start, selection=bench.selection)
+
+    def _posterior(self, trial: Trial, fit: FitResult, number: int) -> Posterior | None:
+        """What training knew of a network's parameters: made from where it ended."""
+        job, outcome = self.driver.last[trial.number], self._outcome(trial)
         again = None
         if all(one["checkpoint"] is not None for one in stored_models(outcome)):
             training = {**job.training, "starts": 1, "ensemble": 1, "input_subsets": ()}
@@ -136,4 +145,4 @@ class Checks:
             # Hidden states have no checkpoint, and an ensemble is no single start's: all of the trial is done again.
             before = None if job.after is None else self.driver.store.read(job.after)
             again, _ = train(self.bench, job, before)[number]
-        return replace(fit, posterior=again.posterior)
+        return again.posterior

@@ -81,6 +81,11 @@ class Bench:
         return PipelineConfig.model_validate(dict(self.pipeline)).start
 
     @property
+    def seed(self) -> int:
+        """Of what has none of its own."""
+        return PipelineConfig.model_validate(dict(self.pipeline)).seed
+
+    @property
     def stability(self) -> StabilityOptions:
         """How the free run is checked."""
         return PipelineConfig.model_validate(dict(self.pipeline)).stability.options(self.sequences)
@@ -231,7 +236,7 @@ def train(
     Raises:
         SysidError: If it cannot be fitted.
     """
-    fit = FitConfig.model_validate({"name": "trial", "structure": dict(job.structure), "training": _options(job)})
+    fit = fit_of(job)
     config = PipelineConfig.model_validate(dict(bench.pipeline))
     data = Data(traces=_shortened(bench.traces, job.record), selection=bench.selection)
     training = fit.training_options(config.seed)
@@ -254,11 +259,24 @@ def train(
             initial=FitResult.from_dict(stood[number]["fit"]) if stood and not job.resume else None,
             stability=_checked(bench, estimator_of(model.fit.structure), training),
             resume=Checkpoint(fields=stood[number]["checkpoint"]) if stood and job.resume else None,
+            remarks=False,  # who is chosen gets them
             on_checkpoint=kept.append,
             on_progress=on_progress if len(models) == 1 else part_of(on_progress, str(model.config.mapping)),
         )
         found.append((result, kept[-1] if kept else None))
     return found
+
+
+def fit_of(job: Job) -> FitConfig:
+    """What a job fits.
+
+    Args:
+        job: The job.
+
+    Returns:
+        The fields of a fit.
+    """
+    return FitConfig.model_validate({"name": "trial", "structure": dict(job.structure), "training": _options(job)})
 
 
 def stored_models(outcome: Mapping[str, Any]) -> list[Mapping[str, Any]]:
