@@ -119,7 +119,8 @@ def _name(error: OSError, draft: Path, path: Path) -> None:
     """Have an error name what was to be written: it names nothing, or the draft, which nobody knows."""
     named = [Path(str(name)) for name in (error.filename, error.filename2) if name is not None]
     if not named or any(one.is_relative_to(draft) for one in named):
-        error.filename, error.filename2 = str(path), None
+        error.filename = str(path)
+        del error.filename2  # a None would be told as a name
 
 
 def _draft(path: Path) -> Path:
