@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
+from functools import partial
 from typing import Any
 
 from sysid.errors import ConfigError, shortened
@@ -45,7 +46,7 @@ from sysid.estimation.networks.neural_state_space import (
     fit_neural_state_space,
     fit_vector_neural_state_space,
 )
-from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.networks.training import FitProgress, Training, check_shooting
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial
 from sysid.estimation.result import FitResult
@@ -100,6 +101,7 @@ ESTIMATORS: dict[str, Estimator] = {
             name="a NARX network",
             fit=fit_narx,
             training=Training,
+            check_training=partial(check_shooting, "a NARX network"),
             initial=check_initial,
             no_posterior=ENDED,
             joins=True,

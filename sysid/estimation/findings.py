@@ -125,6 +125,9 @@ class Findings:
         at = ["scale" if built and one.parameter.prior is not None else s for one, s in zip(named, at, strict=True)]
         held = np.zeros(len(solution.theta), dtype=np.bool_)
         held[places] = [bool(side) for side in at]
+        if not solution.at.finite:  # sensitivities that explode say nothing of any parameter
+            covariance = np.full((len(named), len(named)), np.nan)
+            return cls(named=named, values=theta * scale, covariance=covariance, bound=tuple(at))
         H = prior.beta * solution.at.gauss_newton + np.diag(prior.precision)
         free = np.flatnonzero(~held)
         root = np.sqrt(np.diag(H)[free])

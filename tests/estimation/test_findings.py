@@ -1,9 +1,18 @@
 """What the records leave open, on matrices whose null space is known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from sysid.estimation.findings import TOGETHER, _lost
+from sysid.estimation.findings import TOGETHER, Findings, _lost
+from sysid.estimation.least_squares.damping import DAMPINGS
+from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.least_squares.levenberg_marquardt import Solution, State
+from sysid.estimation.least_squares.provider import Linearisation
+from sysid.estimation.named import Named
+from sysid.estimation.result import Status
+from sysid.models.declared import Parameter
 
 FLAT = 1e-8
 
@@ -63,3 +72,17 @@ def test_a_direction_that_is_rounding_is_open_however_far_from_the_prior() -> No
     unseen = np.diag(1e-6 / FLAT * null.T @ null)
     assert not _lost(C, np.full(4, FLAT), np.zeros(4)).any()
     assert _lost(C, np.full(4, FLAT), unseen).any()
+
+
+def test_sensitivities_that_explode_say_nothing_and_end_no_fit() -> None:
+    groups = (Group(name="parameters", members=np.arange(1), known=True),)
+    prior = Prior(centre=np.zeros(1), groups=groups, alphas=np.array([1e-10]), beta=1.0)
+    at = Linearisation(loss=1.0, gradient=np.ones(1), gauss_newton=np.array([[np.inf]]))
+    state = State(theta=np.ones(1), at=at, damping=DAMPINGS["marquardt"](), prior=prior)
+    named = (Named(parameter=Parameter(name="k", start=2.0), place=0),)
+    found = Findings.of(
+        Solution(state=state, status=Status.NOT_IMPROVED), SimpleNamespace(bounds=None, scale=np.full(1, 2.0)), named
+    )
+    assert found.values.tolist() == [2.0]
+    assert np.isnan(found.covariance).all()
+    assert any("do not determine the parameter k" in one for one in found.warnings)

@@ -15,7 +15,8 @@ from sysid.errors import FitDivergedError
 from sysid.estimation.blocks.selection import Chosen, choose_terms
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of
-from sysid.estimation.grey_box.fit import built_template, fit_equations
+from sysid.estimation.grey_box.fit import fit_equations
+from sysid.estimation.grey_box.readying import built_template
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import nothing_in_a_row
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states

@@ -13,7 +13,8 @@ from sysid.estimation.grey_box.finishing import noise_of
 from sysid.estimation.grey_box.layout import EquationLayout
 from sysid.estimation.grey_box.preparing import WINDOW, provider_for
 from sysid.estimation.grey_box.profile import LEVEL, TERMS, Profile, Profiler
-from sysid.estimation.grey_box.provider import EquationProvider, Record
+from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.grey_box.record import Record
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
 from sysid.estimation.named import named_of

@@ -109,9 +109,9 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, unti
     """
     provider, solution, stepping = ready.provider, chosen.solution, ready.stepping
     softened = float("nan")
-    scored = None if stopped else provider.as_scored(solution.theta)
+    scored = None if stopped else _as_scored(provider, solution)
     if scored is not None:
-        provider = scored
+        provider, solution = scored
         solution = _gone_on(provider, solution, training, until, iterations=training.max_iterations)
     if provider.form.n_outputs > 1 and not stopped:
         provider, solution = _weighed(provider, solution, training, until)
@@ -142,6 +142,24 @@ def finished(ready: Ready, chosen: starts.Candidate, training: Training, *, unti
     )
     candidate = settled(replace(chosen, solution=solution, model=model), provider)
     return Done(candidate=candidate, provider=provider, stepping=stepping, softened=softened)
+
+
+def _as_scored(provider: EquationProvider, solution: Solution) -> tuple[EquationProvider, Solution] | None:
+    """Records begun as where runs are scored, where these would be others; and the fit, its states in their terms.
+
+    What first samples show of a state depends on what it ranges over: at the parameters that were found, as the model
+    will have it, which may be far from where it ranged at the declared start.
+    """
+    if not any(record.n_first for record in provider.records):
+        return None
+    seen, begun = seen_terms(provider, solution.theta)
+    state, ranged = solution.state, provider.with_form(seen)
+    theta = ranged.with_states(state.theta, begun)
+    scored = ranged.as_scored(theta)
+    if scored is None:
+        return None
+    prior = replace(state.prior, centre=ranged.with_states(state.prior.centre, begun))
+    return scored, replace(solution, state=replace(state, theta=theta, prior=prior))
 
 
 def _weighed(

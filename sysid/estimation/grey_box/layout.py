@@ -55,6 +55,7 @@ class EquationLayout(AbstractLayout):
         begun: What is trained where the fit starts: declared starts, networks that do nothing, and initial states.
         begins: Where the first starts begin, in place of the declared one.
         scattered: Names of the parameters around which the starts after these are drawn; ``None`` for all.
+        declared: Starts at the declared one.
     """
 
     named: tuple[Named, ...]
@@ -64,6 +65,7 @@ class EquationLayout(AbstractLayout):
     begun: Array
     begins: tuple[Begun, ...] = ()
     scattered: frozenset[str] | None = None
+    declared: int = 1
 
     def centre(self) -> Array:
         """What the prior draws the model's parameters to: the declared starts, and networks that do nothing."""
@@ -141,7 +143,7 @@ class EquationLayout(AbstractLayout):
         begun = self.draw(rng, self.begun)
         if number < len(self.begins):
             return self._begun(self.begins[number], begun)
-        if number == 0:
+        if number < self.declared:
             return begun, self.begun
         for _ in range(TRIES):
             theta = self._scattered(begun, rng)

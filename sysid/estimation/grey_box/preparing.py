@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.grey_box.provider import EquationProvider, Record
+from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.grey_box.record import Record
 from sysid.estimation.grey_box.stepping import STEPPED
 from sysid.estimation.named import named_of
 from sysid.models.equation_form import EquationForm

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.first_samples import is_another, moves_of_shown
+from sysid.estimation.grey_box.record import Record
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.kernels.arrays import forget_what_has_died_away
@@ -19,94 +19,6 @@ Array = NDArray[np.float64]
 
 BLOCK = 2_000
 """Samples whose Jacobian is in memory at the same time."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Record:
-    """One record as equations are run over it, the samples of its history included.
-
-    Args:
-        u: What the programs read, shape ``(n_samples, n_lagged)``.
-        output: In units, shape ``(n_samples, n_outputs)``.
-        roots: Roots of the weights, shape ``(n_samples, 1)``, or one an output; ``None`` for all ones.
-        rest: What the programs read and the outputs of a system that has stood before the record.
-        free: Whether its initial state is estimated; otherwise it is at rest.
-        name: Of the record.
-        n_first: Samples on which its initial state is estimated when a run is scored; 0 where none is.
-        shows: Which of these are not masked, where it begins at the state that they show, and they do not count;
-            ``None`` where it begins at one of its own.
-    """
-
-    u: Array
-    output: Array
-    roots: Array | None
-    rest: tuple[Array, Array]
-    free: bool
-    name: str = ""
-    n_first: int = 0
-    shows: NDArray[np.bool_] | None = None
-
-    @classmethod
-    def of(cls, experiment: Experiment, form: EquationForm) -> Record:
-        """An experiment as a record.
-
-        Args:
-            experiment: Of one output or several.
-            form: What is run over it.
-
-        Returns:
-            The record. Samples of a measured history count like the others; one alone is a system that has stood there.
-        """
-        first, history = experiment, experiment.history
-        stood = len(history.output) == 1 and (first.past is None or bool(first.past.any()))
-        n_past = len(history.output) if not stood and first.past is not None and first.past.any() else 0
-        inputs = np.concatenate([history.inputs[:n_past], first.inputs])
-        output = np.concatenate([history.output[:n_past], first.output])
-        before, roots = first.past_weights[:n_past], None
-        if first.weights is not None or not before.all():
-            weights = np.ones(len(first.output)) if first.weights is None else first.weights
-            each = weights[:, None] if first.each is None else first.each
-            roots = np.sqrt(np.concatenate([np.repeat(before[:, None], each.shape[1], axis=1), each]))
-        return cls(
-            u=form.given(inputs, history.inputs[:1] if n_past else history.inputs),
-            output=np.ascontiguousarray(output.reshape(len(output), -1)),
-            roots=roots,
-            rest=(
-                form.given(history.inputs[:1], history.inputs[:1])[0],
-                np.atleast_1d(history.output[0]),
-            ),
-            free=first.free and not stood,
-            name=history.case,
-            n_first=first.n_first if first.free and not stood else 0,
-        )
-
-    def from_shown(self) -> Record:
-        """The same record, begun at the state that its first samples show."""
-        roots = np.ones((len(self.output), 1)) if self.roots is None else self.roots.copy()
-        roots[: self.n_first] = 0.0
-        return replace(self, roots=roots, shows=self.known[: self.n_first])
-
-    @property
-    def known(self) -> NDArray[np.bool_]:
-        """Which samples count, in all outputs."""
-        if self.roots is None:
-            return np.ones(len(self.output), dtype=np.bool_)
-        return np.asarray((self.roots > 0.0).all(axis=1))
-
-    @property
-    def counted(self) -> int:
-        """How many residuals count, of all outputs."""
-        if self.roots is None:
-            return self.output.size
-        return int(np.count_nonzero(np.broadcast_to(self.roots, self.output.shape)))
-
-    def errors(self, y: Array, scale: Array, rows: slice = slice(None)) -> Array:
-        """Weighted errors of some rows over the outputs' scales; zero where nothing counts, whatever stands there."""
-        away = (y - self.output[rows]) / scale
-        if self.roots is None:
-            return np.asarray(away)
-        roots = self.roots[rows]
-        return np.where(roots > 0.0, away * roots, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -282,8 +194,9 @@ class EquationProvider(AbstractProvider):
             form, known = self.of_record(shared, theta, i), record.known
             states = (self._shown(form, record, known[: record.n_first]), self.begin(form, theta, i))
             with np.errstate(over="ignore", invalid="ignore"):
-                shown, trained = (record.errors(form.run(record.u, x), self.unit)[record.n_first :] for x in states)
-            if is_another(shown, trained):
+                shown, trained = (record.errors(form.run(record.u, x), self.unit) for x in states)
+            n = record.n_first  # of which a state that is shown leaves less than others, or it was not found
+            if is_another(shown[n:], trained[n:]) and not is_another(shown[:n], trained[:n]):
                 records[i] = record.from_shown()
         same = all(one is other for one, other in zip(records, self.records, strict=True))
         return None if same else replace(self, records=tuple(records))
@@ -304,11 +217,12 @@ class EquationProvider(AbstractProvider):
             return self._linearised(theta)
 
     def _linearised(self, theta: Array) -> Linearisation:
-        gradient, matrix = np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
+        gradient, matrix, shared = np.zeros(len(theta)), np.zeros((len(theta), len(theta))), self.at(theta)
         loss = correlated = samples = 0.0
         for number in range(len(self.records)):
-            errors = []
-            for error, J, places in self._blocks(theta, number):
+            errors, form = [], self.of_record(shared, theta, number)
+            x, S, places = self.begun_moves(form, theta, number)
+            for error, J in self.blocks(form, number, x, S, self.scales_of(places)):
                 flat = J.reshape(J.shape[0] * J.shape[1], J.shape[2])  # of none, too
                 loss += 0.5 * float(np.vdot(error, error))
                 gradient[places] += flat.T @ error.ravel()
@@ -321,21 +235,49 @@ class EquationProvider(AbstractProvider):
             loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / max(samples, 1.0)
         )
 
-    def _blocks(self, theta: Array, number: int) -> Iterator[tuple[Array, Array, NDArray[np.int64]]]:
-        """Weighted errors and their derivatives by some of what is trained, and which."""
-        form, record, p = self.of_record(self.at(theta), theta, number), self.records[number], self.n_of_form
+    def begun_moves(self, form: EquationForm, theta: Array, number: int) -> tuple[Array, Array, NDArray[np.int64]]:
+        """The state before a record and how it moves.
+
+        Args:
+            form: With the record's parameters.
+            theta: What is trained.
+            number: Which record.
+
+        Returns:
+            Shapes ``(n_states,)`` and ``(n_states, n_columns)``, in units, parameters being in theirs; and where the
+            columns stand in what is trained.
+        """
+        record, p = self.records[number], self.n_of_form
         if record.shows is not None:
-            x, S = self._shown_moves(form, record, record.shows)
-            places = self.columns(number)
-        elif record.free:
-            free = self.open_states
-            x, S = self.begin(form, theta, number), np.zeros((form.lowered.n_states, p + len(free)))
-            S[free, p + np.arange(len(free))] = form.terms.scale[free]
-            places = np.concatenate([self.columns(number), np.arange(len(theta))[self.places(number)]])
-        else:
-            x, S = form.resting_moves(*record.rest, p)
-            places = self.columns(number)
-        scale = np.concatenate([self.scale[places[:p]], np.ones(S.shape[1] - p)])
+            return *self._shown_moves(form, record, record.shows), self.columns(number)
+        if not record.free:
+            return *form.resting_moves(*record.rest, p), self.columns(number)
+        free = self.open_states
+        x, S = self.begin(form, theta, number), np.zeros((form.lowered.n_states, p + len(free)))
+        S[free, p + np.arange(len(free))] = form.terms.scale[free]
+        return x, S, np.concatenate([self.columns(number), np.arange(len(theta))[self.places(number)]])
+
+    def scales_of(self, places: NDArray[np.int64]) -> Array:
+        """What columns of :meth:`begun_moves` are multiplied by, to be by what is trained."""
+        p = self.n_of_form
+        return np.concatenate([self.scale[places[:p]], np.ones(len(places) - p)])
+
+    def blocks(
+        self, form: EquationForm, number: int, x: Array, S: Array, scale: Array
+    ) -> Iterator[tuple[Array, Array]]:
+        """Weighted errors of a record and their derivatives by some of what is trained.
+
+        Args:
+            form: With the record's parameters.
+            number: Which record.
+            x: The state before it; in the end that after it.
+            S: How it moves; likewise.
+            scale: What the derivatives are multiplied by.
+
+        Yields:
+            Errors and derivatives of some samples.
+        """
+        record, p = self.records[number], self.n_of_form
         for first in range(0, len(record.output), BLOCK):
             rows = slice(first, min(first + BLOCK, len(record.output)))
             y, J = form.moved(record.u[rows], x, S, p)
@@ -344,7 +286,7 @@ class EquationProvider(AbstractProvider):
             J /= self.unit[:, None]
             if record.roots is not None:
                 J = np.where(record.roots[rows, :, None] > 0.0, J * record.roots[rows, :, None], 0.0)
-            yield record.errors(y, self.unit, rows), J, places
+            yield record.errors(y, self.unit, rows), J
 
     def _shown_moves(self, form: EquationForm, record: Record, known: NDArray[np.bool_]) -> tuple[Array, Array]:
         """The state that the first samples of a record show, and how it moves with parameters and weights."""

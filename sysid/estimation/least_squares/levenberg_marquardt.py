@@ -157,12 +157,38 @@ NOTHING_LEFT = 1e-24
 """Mean squared error over the output's scale that is rounding."""
 
 
-def at_minimum(state: State, provider: AbstractProvider) -> bool:
+STANDS = 1e-6
+"""Over the loss of one sample: what a Newton step would take away where it would move no parameter by more than a
+thousandth of its standard deviation."""
+
+
+def stands(state: State, provider: AbstractProvider) -> bool:
+    """Whether a fit that goes on changes nothing but rounding: neither did its last step, nor would the next.
+
+    A decrease over many iterations says that some time after it is so. Where precisions of the prior are found on the
+    way, they may still move what a step would bring: such a fit does not stand.
+
+    Args:
+        state: Where it stands.
+        provider: Residuals and Jacobians.
+
+    Returns:
+        Whether it does.
+    """
+    if len(state.losses) < 2 or not all(group.known for group in state.prior.groups):
+        return False
+    share = STANDS / provider.n_samples
+    before, loss = state.losses[-2:]
+    return abs(before - loss) <= share * loss and at_minimum(state, provider, share)
+
+
+def at_minimum(state: State, provider: AbstractProvider, share: float = FLAT) -> bool:
     """Whether a fit that finds no better step stands where there is none: its gradient is zero to rounding.
 
     Args:
         state: Where it stands.
         provider: Residuals and Jacobians.
+        share: Of the loss, that one more Newton step may take away.
 
     Returns:
         Whether it does.
@@ -182,7 +208,7 @@ def at_minimum(state: State, provider: AbstractProvider) -> bool:
     root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
     scaled = g[free] / root
     step = np.linalg.lstsq(H[np.ix_(free, free)] / np.outer(root, root), scaled, rcond=1e-12)[0]
-    return bool(scaled @ step <= FLAT * at.loss)
+    return bool(scaled @ step <= share * at.loss)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,6 +278,8 @@ class LevenbergMarquardt:
                     status = self.termination.check(
                         iteration=state.iteration, elapsed=elapsed, losses=state.losses, damping=state.damping.factor
                     )
+                    if status is None and stands(state, provider):
+                        status = Status.CONVERGED
                     if status is None:
                         state = self._step(state, provider)
                         state = self._record(state, provider, before + now() - started)

@@ -98,6 +98,12 @@ class Multistart:
     learnt: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda theta: theta
     """From trained parameters to the same with those that no residual reads, such as a map to a state."""
     until: float = math.inf
+    alone: int = 0
+    """First starts that are looked at one after another before the others begin."""
+    enough: Callable[[Candidate], bool] = lambda _: False
+    """Whether one of them is so good that the others need not begin."""
+    prepared: Callable[[Multistart, int, NDArray[np.float64]], NDArray[np.float64]] = lambda _, __, theta: theta
+    """From where a start is drawn to where its training begins, by its number."""
     least: int = 1
     """Starts that are trained to their end, whoever is ahead: those that an ensemble unites."""
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
@@ -212,7 +218,14 @@ def run(multistart: Multistart) -> list[Candidate]:
         for rung, share in enumerate(rungs):
             before = rungs[rung - 1] if rung else 0.0
             seconds = training.max_time_s * (share - before) / total
-            reached = _rung(multistart, numbers, latest, share, seconds)
+            reached: dict[int, Candidate] = {}
+            for some in _one_by_one(multistart, numbers) if rung == 0 else [numbers]:
+                _rung(multistart, some, latest, (share, seconds), reached)
+                more = len(some) < len(numbers)
+                if multistart.stop.is_set() or (
+                    more and any(multistart.enough(reached[n]) for n in some if n in reached)
+                ):
+                    break
             if rung == 0:  # the time of those that were left out is the others'
                 total = turns(len(reached), rungs, training.workers, multistart.least)
             seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
@@ -224,11 +237,24 @@ def run(multistart: Multistart) -> list[Candidate]:
     return seen
 
 
+def _one_by_one(multistart: Multistart, numbers: Sequence[int]) -> list[Sequence[int]]:
+    """Starts in the order in which they are looked at first."""
+    alone = multistart.alone
+    return [one for one in (*([n] for n in numbers[:alone]), numbers[alone:]) if one]
+
+
 def _rung(
-    multistart: Multistart, numbers: Sequence[int], latest: dict[int, Candidate], share: float, seconds: float
-) -> dict[int, Candidate]:
-    """One rung of the multistart. Workers leave what they reach in a table: an interruption loses none of it."""
-    reached: dict[int, Candidate] = {}
+    multistart: Multistart,
+    numbers: Sequence[int],
+    latest: dict[int, Candidate],
+    limits: tuple[float, float],
+    reached: dict[int, Candidate],
+) -> None:
+    """One rung of the multistart, to a share of the iterations within some seconds.
+
+    Workers leave what they reach in a table: an interruption loses none of it.
+    """
+    share, seconds = limits
 
     def work(number: int) -> None:
         if not multistart.stop.is_set() and (latest or _in_time(multistart, reached, share, seconds)):
@@ -247,7 +273,6 @@ def _rung(
             raise
     if not reached and not latest:  # interrupted before anything had begun: the start as it is
         reached[numbers[0]] = _advance(multistart, numbers[0], None, share, seconds)
-    return reached
 
 
 def _in_time(multistart: Multistart, reached: dict[int, Candidate], share: float, seconds: float) -> bool:
@@ -276,6 +301,7 @@ def _advance(multistart: Multistart, number: int, before: Candidate | None, shar
         seed, theta, centre = _begin(multistart, number)
         if multistart.pretraining is not None and seed is not None:
             theta = _pretraining(multistart, multistart.pretraining, number, seed, centre)
+        theta = multistart.prepared(multistart, number, theta)
         prior = first_prior(training, multistart.layout, multistart.provider, theta, centre)
         solution = keep.minimise(run, in_time(), multistart.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:

@@ -15,6 +15,7 @@ CHOICES = {
     "choose_by": ("selection", "evidence"),
     "damping": tuple(DAMPINGS),
     "basis": ("incremental", "plain"),
+    "shooting": ("auto", "single", "multiple"),
 }
 """Options that are words, and what they may be; the first is a good example."""
 
@@ -101,6 +102,10 @@ class Training(TypedFields):
         input_subsets: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs
             and networks that do without each of the sets (``input_subsets.py``), for an ensemble whose members differ
             in what they rely on. All see everything by default.
+        shooting: How starts of a grey box begin: ``single`` by the free run of whole records, ``multiple`` by that of
+            short windows which are drawn together (``shooting.py``), which finds the minimum from parameters that are
+            further off. ``auto`` looks at the declared start by single shooting first, begins no other where it comes
+            down to the noise, and takes it by multiple shooting next.
     """
 
     loop: Loop = Loop.CLOSED
@@ -123,6 +128,7 @@ class Training(TypedFields):
     window: int | None = None
     ensemble: int = 1
     input_subsets: tuple[tuple[str, ...], ...] = ()
+    shooting: str = "auto"
 
     def __post_init__(self) -> None:
         check_choice("loop", getattr(self.loop, "value", self.loop), tuple(one.value for one in Loop))
@@ -221,13 +227,34 @@ LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_s
 """Options of a training that concern lagged regressors."""
 
 
-def check_hidden_states(name: str, training: Training, *, unites: bool = False) -> None:
+def check_shooting(name: str, training: Training) -> None:
+    """Refuse what is for grey boxes alone.
+
+    Args:
+        name: What is trained, with an article.
+        training: How to train.
+
+    Raises:
+        ConfigError: If it says how to shoot.
+    """
+    if training.shooting != Training().shooting:
+        raise ConfigError(
+            f"{name} has no equations to shoot with",
+            where="shooting",
+            expected="a grey box",
+            got=training.shooting,
+            remedy="leave shooting out: it is for parameters of equations that start far off",
+        )
+
+
+def check_hidden_states(name: str, training: Training, *, unites: bool = False, shoots: bool = False) -> None:
     """Refuse what does not apply to hidden states.
 
     Args:
         name: What is trained, with an article.
         training: How to train.
         unites: Whether its starts can be united.
+        shoots: Whether its starts can begin by multiple shooting.
 
     Raises:
         ConfigError: If it is for one step ahead, or has options that are for lagged regressors alone.
@@ -240,6 +267,8 @@ def check_hidden_states(name: str, training: Training, *, unites: bool = False) 
             got=training.loop.value,
             remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
         )
+    if not shoots:
+        check_shooting(name, training)
     strange = [option for option in LAGGED_ONLY if not (unites and option == "ensemble")]
     strangers = [option for option in strange if getattr(training, option) != getattr(Training(), option)]
     if strangers:

@@ -16,8 +16,8 @@ from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hamme
 from sysid.estimation.blocks.grown import grown, states_of
 from sysid.estimation.blocks.linear_start import LinearStart
 from sysid.estimation.blocks.sections import Pair, block_of
-from sysid.estimation.grey_box.fit import built_template
 from sysid.estimation.grey_box.layout import renormed
+from sysid.estimation.grey_box.readying import built_template
 from sysid.estimation.networks.training import Training
 from sysid.models import BuiltModel, HammersteinWiener, Mapping, Scaling, Start, WienerHammerstein
 from sysid.models.block_oriented import BlockStructure

@@ -275,3 +275,39 @@ def test_a_step_whose_promise_is_beyond_numbers_is_not_taken_and_no_warning() ->
     engine = LevenbergMarquardt(termination=Termination(max_iterations=1), evidence_after=None)
     solution = engine.minimise(_Steep(), np.zeros(1), flat_prior(1))
     assert solution.theta.tolist() == [0.0]
+
+
+def noisy_decay(known: bool) -> tuple[Residuals, Prior]:
+    t, rng = np.linspace(0.0, 4.0, 200), np.random.default_rng(3)
+    y = 2.0 * np.exp(-0.7 * t) + 0.05 * rng.standard_normal(200)
+    provider = Residuals(
+        function=lambda p: p[0] * np.exp(-p[1] * t) - y,
+        jacobian=lambda p: np.column_stack([np.exp(-p[1] * t), -p[0] * t * np.exp(-p[1] * t)]),
+        n_samples=200,
+    )
+    groups = (Group(name="all", members=np.arange(2), known=known),)
+    return provider, Prior(centre=np.zeros(2), groups=groups, alphas=np.array([1e-10]), beta=1.0)
+
+
+def test_a_fit_that_stands_at_its_minimum_does_not_wait_for_the_patience() -> None:
+    provider, prior = noisy_decay(known=True)
+    engine = LevenbergMarquardt(termination=Termination(max_iterations=200, patience=50, tolerance=1e-3))
+    found = engine.minimise(provider, np.array([0.3, 3.0]), prior)
+    assert found.status is Status.CONVERGED
+    assert found.state.iteration < 20
+    best = least_squares(provider.function, [2.0, 0.7], provider.jacobian, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    covariance = np.linalg.inv(best.jac.T @ best.jac) * 2.0 * best.cost / 200
+    assert (np.abs(found.theta - best.x) < 1e-3 * np.sqrt(np.diag(covariance))).all()
+
+
+def test_a_fit_whose_prior_is_still_sought_goes_on() -> None:
+    provider, prior = noisy_decay(known=False)
+    engine = LevenbergMarquardt(termination=Termination(max_iterations=200, patience=50, tolerance=1e-3))
+    assert engine.minimise(provider, np.array([0.3, 3.0]), prior).state.iteration >= 50
+
+
+def test_a_slow_way_through_a_valley_is_no_minimum() -> None:
+    groups = (Group(name="all", members=np.arange(2), known=True),)
+    prior = Prior(centre=np.zeros(2), groups=groups, alphas=np.array([1e-12]), beta=1.0)
+    engine = LevenbergMarquardt(termination=Termination(max_iterations=200, patience=200), evidence_after=None)
+    assert_allclose(engine.minimise(ROSENBROCK, np.array([-1.2, 1.0]), prior).theta, [1.0, 1.0], atol=1e-6)

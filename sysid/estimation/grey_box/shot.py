@@ -1,0 +1,202 @@
+"""Starts of a grey box that begin by multiple shooting: from windows that stand apart to one free run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.grey_box.at_noise import at_noise
+from sysid.estimation.grey_box.layout import Begun, EquationLayout
+from sysid.estimation.grey_box.provider import EquationProvider
+from sysid.estimation.grey_box.shooting import Shooting
+from sysid.estimation.least_squares.damping import DAMPINGS
+from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
+from sysid.estimation.least_squares.termination import Termination
+from sysid.estimation.least_squares.threads import one_blas_thread
+from sysid.estimation.named import FLAT_ALPHA, Named
+from sysid.estimation.networks.halving import planned_iterations
+from sysid.estimation.networks.multistart import PRETRAINED, Candidate, Multistart
+from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.result import FitResult
+from sysid.models.built_model import BuiltModel
+from sysid.models.grey_box_model import EquationModel
+
+Array = NDArray[np.float64]
+
+WEIGHTS = (0.1, 1.0, 10.0)
+"""Of what windows leave apart, one after another: at first an output's error of a hundredth of its range is worth ten
+hundredths of a state's, in the end a thousandth."""
+
+ITERATIONS, TOLERANCE, PATIENCE = 20, 1e-3, 6
+"""Of each: iterations at most; and the relative improvement over some of them below which the next one begins."""
+
+
+AUTO, SINGLE, MULTIPLE = "auto", "single", "multiple"
+
+
+def way_of(training: Training, template: EquationModel, begins: Sequence[Begun]) -> str:
+    """How the starts of a fit begin.
+
+    Args:
+        training: How it is trained.
+        template: The model before its fit.
+        begins: Starts that are given.
+
+    Returns:
+        As asked for; single shooting by default where starts are given or the equations were built of a structure,
+        which begin near a minimum, and where networks leave nothing known of what noise is.
+    """
+    if training.shooting != AUTO:
+        return training.shooting
+    return SINGLE if begins or isinstance(template, BuiltModel) or template.lowered.nets else AUTO
+
+
+def shooting_terms(way: str, provider: EquationProvider) -> dict[str, Any]:
+    """What a way asks of a multistart.
+
+    Args:
+        way: As of :func:`way_of`.
+        provider: The residuals.
+
+    Returns:
+        Fields of :class:`~sysid.estimation.networks.multistart.Multistart`.
+    """
+    if way == SINGLE:
+        return {}
+
+    def prepared(multistart: Multistart, number: int, theta: Array) -> Array:
+        return shot(multistart, number, theta) if way == MULTIPLE or number == 1 else theta
+
+    def enough(candidate: Candidate) -> bool:
+        return at_noise(provider, candidate.solution.theta)
+
+    return {"alone": 2, "enough": enough, "prepared": prepared}
+
+
+def with_starts_begun(training: Training, multistart: Multistart, candidates: Sequence[Candidate]) -> Training:
+    """The training with the starts that were begun, where others were not needed.
+
+    Args:
+        training: How a fit was trained.
+        multistart: What its starts have in common.
+        candidates: Every look at one of them.
+
+    Returns:
+        The training; as it is where all were begun, or there was no time for more.
+    """
+    begun = {one.number for one in candidates}
+    if len(begun) < training.n_starts and any(multistart.enough(one) for one in candidates):
+        return replace(training, starts=len(begun))
+    return training
+
+
+def with_way(found: FitResult, chosen: Candidate, way: str, begun: Training, asked: Training) -> FitResult:
+    """A fit that says which way the minimum was found.
+
+    Args:
+        found: The fit.
+        chosen: The start that was chosen, as it ended.
+        way: As of :func:`way_of`.
+        begun: The training with the starts that were begun.
+        asked: As it was asked for.
+
+    Returns:
+        The fit; as it is where nothing but single shooting was asked for.
+    """
+    if way == SINGLE:
+        return found
+    declared = chosen.number < (2 if way == AUTO else 1)
+    multiple = way == MULTIPLE or chosen.number == 1
+    note = (
+        f"The minimum was found by {MULTIPLE if multiple else SINGLE} shooting from "
+        f"{'the declared start' if declared else f'start {chosen.number + 1}'}"
+    )
+    if begun.n_starts < asked.n_starts:
+        note += f", and what it leaves is white: {begun.n_starts} of {asked.n_starts} starts were needed"
+    return replace(found, notes=(*found.notes, f"{note}."))
+
+
+def shot(multistart: Multistart, number: int, theta: Array) -> Array:
+    """A start after multiple shooting.
+
+    Args:
+        multistart: What the starts have in common, its residuals those of equations.
+        number: Which start.
+        theta: Where it begins.
+
+    Returns:
+        What is trained; as it began where the free run of what was found is none, or no window could be run.
+    """
+    whole, layout = multistart.provider, multistart.layout
+    assert isinstance(whole, EquationProvider)  # noqa: S101 - made for them
+    assert isinstance(layout, EquationLayout)  # noqa: S101 - likewise
+    windows, trained = Shooting.of(whole, theta).begun_at(whole, theta)
+    with one_blas_thread():
+        for weight in WEIGHTS:
+            windows = replace(windows, weight=weight)
+            if not np.isfinite(windows.loss(trained)):
+                return theta
+            name = f"{multistart.name}start {number + 1}, windows {weight:g}"
+            prior = _prior(windows, trained, layout.named)
+            solution = multistart.checkpoints.minimise(name, _engine(multistart, number, name), windows, trained, prior)
+            trained = solution.theta
+            if multistart.stop.is_set():
+                break
+    found = windows.ended(whole, trained, theta)
+    return found if np.isfinite(whole.loss(found)) else theta
+
+
+def _prior(windows: Shooting, trained: Array, named: tuple[Named, ...]) -> Prior:
+    """What is declared of parameters, and of the rest nothing; the noise as large as what is left."""
+    known = [one for one in named if one.parameter.prior is not None]
+    places = np.array([one.place for one in known], dtype=np.int64)
+    centre, alphas, groups = trained.copy(), [FLAT_ALPHA], list[Group]()
+    centre[: len(windows.begun)] = windows.begun
+    others = np.setdiff1d(np.arange(len(trained)), places)
+    groups.append(Group(name="all", members=others, known=True))
+    for one in known:
+        parameter = one.parameter
+        assert parameter.prior is not None  # noqa: S101 - chosen by it
+        size = parameter.start if windows.logs[one.place] else parameter.scale
+        groups.append(Group(name=one.name, members=np.array([one.place]), known=True))
+        alphas.append((size / parameter.prior) ** 2)
+    least = np.finfo(np.float64).tiny * windows.n_samples
+    beta = 0.5 * windows.n_samples / max(windows.loss(trained), least)
+    return Prior(centre=centre, groups=tuple(groups), alphas=np.array(alphas), beta=beta)
+
+
+def _engine(multistart: Multistart, number: int, name: str) -> LevenbergMarquardt:
+    training, scale = multistart.training, multistart.template.scaling.error_unit
+
+    def report(entry: Iteration) -> None:
+        multistart.on_progress(
+            FitProgress(
+                stage=f"multiple shooting, {name.rsplit(' ', 1)[-1]} of {WEIGHTS[-1]:g}",
+                start=number + 1,
+                starts=training.n_starts,
+                iteration=0,  # the free run's, which have not begun
+                max_iterations=training.max_iterations,
+                mse=entry.mse * scale,
+                elapsed_s=entry.elapsed_s,
+                fraction=min(1.0, sum(multistart.iterations.values()) / planned_iterations(training)),
+            )
+        )
+
+    seconds = PRETRAINED * training.max_time_s / training.n_starts / len(WEIGHTS)
+    return LevenbergMarquardt(
+        termination=Termination(
+            max_iterations=ITERATIONS,
+            max_time_s=min(seconds, multistart.left(name)),
+            tolerance=TOLERANCE,
+            patience=PATIENCE,
+        ),
+        damping=DAMPINGS[training.damping](),
+        evidence_after=None,
+        on_iteration=report,
+        should_stop=multistart.stop.is_set,
+    )
