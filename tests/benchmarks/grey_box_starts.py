@@ -179,17 +179,17 @@ def main() -> None:
         options: dict[str, Any] = {} if way == "before" else {"shooting": way}
         options |= {"starts": int(given["starts"])} if "starts" in given else {}
         for off in map(float, given.get("off", "3,10").split(",")):
-            every, total = [], 0.0
+            every, total = list[float](), 0.0
             for name in names:
                 ratios, seconds, iterations = measured(name, off, seeds, options)
                 every, total = every + ratios, total + sum(seconds)
                 each = ", ".join(f"{one:.3g}" for one in ratios)
-                share = 100.0 * np.mean(np.array(ratios) <= FOUND)
+                share = 100.0 * float(np.mean(np.array(ratios) <= FOUND))
                 found(f"{name}, starts up to {off:g} times off, {way}: found", share, "%",
                       note=f"errors over the noise's {each}; {np.median(seconds):.2f} s, "
                       f"{np.median(iterations):.0f} iterations")  # fmt: skip
             found(f"all systems, starts up to {off:g} times off, {way}: found",
-                  100.0 * np.mean(np.array(every) <= FOUND), "%",
+                  100.0 * float(np.mean(np.array(every) <= FOUND)), "%",
                   note=f"{len(every)} fits, {total:.1f} s of processor time")  # fmt: skip
 
 

@@ -36,8 +36,8 @@ Array = NDArray[np.float64]
 SHORTEST = 12
 """Samples of a window at least."""
 
-MOST = 240
-"""Initial states of all windows together, about."""
+WINDOWS, MOST = 32, 240
+"""Windows at most, each of which costs time of its own; and initial states of all together."""
 
 LARGEST_LOG = 30.0
 """By how many powers of e a parameter may grow."""
@@ -258,7 +258,7 @@ class Shooting(EquationProvider):
 def _samples(whole: EquationProvider) -> int:
     """Of a window, so that there are not too many states."""
     total = sum(len(record.output) for record in whole.records)
-    windows = max(MOST // max(whole.form.lowered.n_states, 1), 1)
+    windows = max(min(WINDOWS, MOST // max(whole.form.lowered.n_states, 1)), 1)
     return max(SHORTEST, -(-total // windows))
 
 

@@ -32,7 +32,7 @@ WEIGHTS = (0.1, 1.0, 10.0)
 """Of what windows leave apart, one after another: at first an output's error of a hundredth of its range is worth ten
 hundredths of a state's, in the end a thousandth."""
 
-ITERATIONS, TOLERANCE, PATIENCE = 40, 1e-3, 6
+ITERATIONS, TOLERANCE, PATIENCE = 40, 1e-2, 4
 """Of each: iterations at most; and the relative improvement over some of them below which the next one begins."""
 
 

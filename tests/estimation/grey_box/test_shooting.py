@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +16,10 @@ from sysid.estimation.grey_box import at_noise
 from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.readying import common, ready_for
+from sysid.estimation.grey_box.record import Record
 from sysid.estimation.grey_box.shooting import Shooting, cut
 from sysid.estimation.result import FitResult
-from sysid.models import NARX, GreyBox, GreyBoxModel, Mapping, NeuralStateSpace, Start, StartKind
+from sysid.models import NARX, AbstractStructure, GreyBox, GreyBoxModel, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Channel, Trace
 
 MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
@@ -46,7 +48,7 @@ def a_trace(n: int = 240, *, noise: float = 0.05, seed: int = 0, name: str = "re
     )
 
 
-def a_box(starts: dict[str, float], **fields: object) -> GreyBox:
+def a_box(starts: dict[str, float], **fields: Any) -> GreyBox:
     named = {name: {"start": value, "low": 0} for name, value in starts.items()}
     return GreyBox(equations=SWING, parameters=named, **({"initial": {"x": 0.8, "v": 0.3}} | fields))
 
@@ -63,7 +65,7 @@ def prepared(traces: list[Trace], grey: GreyBox) -> tuple[EquationProvider, np.n
     return ready.provider, ready.theta
 
 
-def fitted(begun: dict[str, float], **options: object) -> FitResult:
+def fitted(begun: dict[str, float], **options: Any) -> FitResult:
     return fit_grey_box([a_trace()], MAPPING, a_box(begun), sysid.Training(**options), start=ESTIMATED)
 
 
@@ -118,6 +120,7 @@ def test_a_record_is_cut_without_a_rest() -> None:
 def test_parameters_far_off_are_found_by_multiple_shooting_and_it_is_told() -> None:
     single, found = fitted(FAR, shooting="single", starts=1), fitted(FAR, starts=2)
     assert single.history["mse"][-1] > 100.0 * found.history["mse"][-1]
+    assert isinstance(found.model, GreyBoxModel)
     values = dict(zip(("m", "w", "b"), found.model.theta, strict=True))
     assert values == pytest.approx(TRUE, rel=0.05)
     assert any("found by multiple shooting from the declared start" in note for note in found.notes)
@@ -149,7 +152,7 @@ def test_noise_is_told_from_what_is_left_of_a_wrong_run() -> None:
     assert not at_noise.at_noise(short, true)
 
 
-def exact(whole: EquationProvider, theta: np.ndarray) -> object:
+def exact(whole: EquationProvider, theta: np.ndarray) -> Record:
     form = whole.at(theta)
     output = form.run(whole.records[0].u, whole.begin(form, theta, 0))
     return replace(whole.records[0], output=output)
@@ -160,7 +163,7 @@ def exact(whole: EquationProvider, theta: np.ndarray) -> object:
     [NARX(input_delays=(1,), output_delays=(1,), neurons=2), NeuralStateSpace(states=1, neurons=2)],
     ids=lambda one: one.kind,
 )
-def test_what_has_no_equations_is_not_shot(structure: object) -> None:
+def test_what_has_no_equations_is_not_shot(structure: AbstractStructure) -> None:
     with pytest.raises(ConfigError, match="no equations to shoot with"):
         estimators.estimator_of(structure).check_training(sysid.Training(shooting="multiple"))
     estimators.estimator_of(structure).check_training(sysid.Training())
