@@ -25,6 +25,11 @@ FIELDS = {"airbrake", "rail"}
 ONLY_IN = {"mlflow": "workbench/tracking/mlflow_store.py", "optuna": "workbench/sweep/sampler.py"}
 """Packages that one file alone may import."""
 
+HEAVY = ("scipy.signal", "scipy.stats", "scipy.optimize", "scipy.sparse", "pandas", "matplotlib", "mlflow", "torch")
+"""What has tens of MB: rooms that a fit needs read it where it is used, and no earlier."""
+
+FITTING = ("kernels", "equations", "models", "estimation", "composite", "validation")
+
 BRAKE_WORDS = re.compile(r"brak|abdx|railway|wagon|locomotive|dissertation", re.IGNORECASE)
 
 DIVIDED = re.compile(r"""["'\s]+""")
@@ -80,6 +85,25 @@ def longer_than(limit: int) -> dict[str, int]:
     """Files with more lines than that, and their lines."""
     counted = {name_of(file): len(file.read_text(encoding="utf-8").splitlines()) for file in FILES}
     return {name: lines for name, lines in counted.items() if lines > limit}
+
+
+def test_a_room_that_fits_loads_nothing_heavy() -> None:
+    """What a fit then calls is held to it in ``tests/estimation/test_estimators.py``."""
+    found = [
+        f"{name_of(file)}: {name}"
+        for file in FILES
+        if name_of(file).split("/")[0] in FITTING
+        for node in ast.parse(file.read_text(encoding="utf-8")).body
+        for name in _read_by(node)
+        if name.startswith(HEAVY)
+    ]
+    assert not found
+
+
+def _read_by(node: ast.stmt) -> list[str]:
+    if isinstance(node, ast.ImportFrom):
+        return [f"{node.module}.{alias.name}" for alias in node.names]
+    return [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
 
 
 def test_files_are_of_a_size_that_is_read() -> None:

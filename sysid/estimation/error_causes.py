@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.fitted_run import FreeRun
@@ -111,7 +110,9 @@ def _lone(y: Array, s: Array, usable: Mask) -> Mask:
 
 
 def _off_neighbours(x: Array) -> Array:
-    return np.asarray(x - scipy.signal.medfilt(x, 3), dtype=np.float64)
+    before, after = np.r_[0.0, x[:-1]], np.r_[x[1:], 0.0]
+    middle = np.maximum(np.minimum(before, x), np.minimum(np.maximum(before, x), after))
+    return np.asarray(x - middle, dtype=np.float64)
 
 
 def _of_lone(error: Array, lone: Mask, usable: Mask, name: str) -> str:
@@ -175,35 +176,31 @@ def _explained(columns: Array, target: Array, usable: Mask) -> float:
     halves = places[: len(places) // 2], places[len(places) // 2 :]
     best = 0.0
     for part, (least, in_each) in ((own, (EXPLAINED, IN_EACH)), (0.0, (PLAINLY, PLAINLY_IN_EACH))):
-        news = _news(columns, part), _news(centred, part)
-        found = [_of_half(*news, here, there) for here, there in (halves, halves[::-1])]
-        del news
+        found = [_of_half(columns, centred, part, here, there) for here, there in (halves, halves[::-1])]
         if min(found) >= in_each and np.mean(found) >= least:
             best = max(best, float(np.mean(found)))
     return best
 
 
-def _news(signals: Array, part: float) -> Array:
-    """Signals from their second sample on, less a part of the one before."""
-    if not part:
-        return signals[1:]
-    news: Array = -part * signals[:-1]
-    news += signals[1:]
+def _news(signals: Array, part: float, rows: NDArray[np.int64]) -> Array:
+    """Signals at the samples after some, less a part of these and their mean."""
+    news: Array = signals[rows + 1]
+    now, before = np.atleast_2d(news.T), np.atleast_2d(signals.T)
+    for j in range(len(now)):  # one after the other: of a long record each copy of all is many MB
+        now[j] -= part * before[j][rows]
+    news -= news.mean(axis=0)
     return news
 
 
-def _of_half(columns: Array, target: Array, here: NDArray[np.int64], there: NDArray[np.int64]) -> float:
-    own = columns[here]
-    own -= own.mean(axis=0)
-    chosen, weights = _pursued(own, target[here] - target[here].mean())
-    other = target[there] - target[there].mean()
-    taken = columns[there[:, np.newaxis], chosen]
-    left = other - (taken - taken.mean(axis=0)) @ weights
+def _of_half(columns: Array, target: Array, part: float, here: NDArray[np.int64], there: NDArray[np.int64]) -> float:
+    chosen, weights, _ = _pursued(_news(columns, part, here), _news(target, part, here))
+    other = _news(target, part, there)
+    left = other - _news(columns[:, chosen], part, there) @ weights
     return 1.0 - float(left @ left) / max(float(other @ other), 1e-300)
 
 
-def _pursued(columns: Array, target: Array) -> tuple[list[int], Array]:
-    """The few columns that explain a signal best, one after the other (orthogonal matching pursuit), and weights."""
+def _pursued(columns: Array, target: Array) -> tuple[list[int], Array, Array]:
+    """The few columns that explain a signal best (orthogonal matching pursuit), their weights, and what they leave."""
     lengths, chosen = np.maximum(np.sqrt(np.einsum("ij,ij->j", columns, columns)), TINY), list[int]()
     weights: Array = np.empty(0, dtype=np.float64)
     left: Array = target
@@ -213,7 +210,7 @@ def _pursued(columns: Array, target: Array) -> tuple[list[int], Array]:
         chosen.append(int(np.argmax(products)))
         weights = np.asarray(np.linalg.lstsq(columns[:, chosen], target, rcond=None)[0], dtype=np.float64)
         left = target - columns[:, chosen] @ weights
-    return chosen, weights
+    return chosen, weights, left
 
 
 def _moves_with(y: Array, s: Array, usable: Mask, parameters: int) -> bool:
@@ -248,17 +245,19 @@ def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[st
 
 def _drift(groups: dict[str, Array], y: Array, usable: Mask, name: str) -> str:
     """A sentence where a straight line in time is what the inputs leave of the output."""
-    columns = groups[CURVES][usable]
-    columns, target = columns - columns.mean(axis=0), y[usable] - y[usable].mean()
+    columns, target = groups[CURVES][usable], y[usable] - y[usable].mean()
+    columns -= columns.mean(axis=0)
     line = np.linspace(-0.5, 0.5, len(y))[usable]
     line = (line - line.mean()) / np.linalg.norm(line - line.mean())
-    without = _left(columns, target)
+    *_, without = _pursued(columns, target)
     flat = target - line * (line @ target)
-    within = _left(columns - np.outer(line, line @ columns), flat)
+    along = line @ columns
+    for j, part in enumerate(along):
+        columns[:, j] -= line * part
+    chosen, weights, within = _pursued(columns, flat)
     if not within @ within < STRAIGHT * (without @ without) or not np.std(without) > WORTH:
         return ""
-    chosen, weights = _pursued(columns - np.outer(line, line @ columns), flat)
-    slope = float(line @ (target - columns[:, chosen] @ weights)) * float(np.ptp(line))
+    slope = float(line @ target - along[chosen] @ weights) * float(np.ptp(line))
     if not abs(slope) > STEEP:
         return ""
     way = "rises" if slope > 0 else "falls"
@@ -268,11 +267,6 @@ def _drift(groups: dict[str, Array], y: Array, usable: Mask, name: str) -> str:
         f"(repairs: {{drift: {{{name}: line}}}}), or give its cause as an input; where it integrates an input, take a "
         "structure that does."
     )
-
-
-def _left(columns: Array, target: Array) -> Array:
-    chosen, weights = _pursued(columns, target)
-    return target - columns[:, chosen] @ weights
 
 
 def _lasting(error: Array, usable: Mask, name: str) -> list[str]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.informative import SAME, by_chance, informative, unit, with_past
+from sysid.estimation.least_squares.correlation import products
 from sysid.models import AbstractModel, GreyBox, TransferFunction
 from sysid.models.intersample import MOVING
 from sysid.models.orthonormal_basis import Domain
@@ -217,8 +217,7 @@ def _lag(
 
 def _shares(left: NDArray[np.float64], new: NDArray[np.float64], most: int) -> NDArray[np.float64]:
     """The part of a signal of length 1 that another explains at each lag."""
-    both = scipy.signal.correlate(left, new)
-    return np.asarray(both[len(left) - 1 : len(left) - 1 + most] ** 2)
+    return np.asarray(products(left, new, most) ** 2)
 
 
 def _innovations(x: NDArray[np.float64], whole: NDArray[np.bool_]) -> NDArray[np.float64]:

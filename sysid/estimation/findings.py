@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import Solution
@@ -272,6 +271,10 @@ def _lost(covariance: Array, precision: Array, unseen: Array) -> NDArray[np.bool
 def _together(names: Sequence[str], correlation: Array) -> list[str]:
     """One sentence for each group of parameters that can hardly be told apart, however many pairs it has."""
     near = np.triu(correlation > TOGETHER, 1)
+    if not near.any():
+        return []
+    from scipy.sparse.csgraph import connected_components  # 5 MB that most fits do without
+
     count, group = connected_components(near, directed=False)
     told = []
     for one in range(count):

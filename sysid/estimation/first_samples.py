@@ -41,7 +41,7 @@ def is_another(shown: NDArray[np.float64], trained: NDArray[np.float64]) -> bool
     Returns:
         Whether its mean square is so much larger.
     """
-    scored, own = float(np.sum(shown**2)), float(np.sum(trained**2))
+    scored, own = float(np.vdot(shown, shown)), float(np.vdot(trained, trained))
     return bool(np.isfinite(scored)) and scored > WORSE * own
 
 

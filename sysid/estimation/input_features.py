@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from sysid.kernels.linear import slowed
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ def features(inputs: Array, simulated: Array) -> dict[str, Array]:
     while memories[-1] * STEP <= len(u) / SLOWEST:
         memories.append(memories[-1] * STEP)
     # An integrator's output, but for the level from which it integrates.
-    linear, curves, plays = [u, _late(u), np.cumsum(_late(u), axis=0) / len(u)], [], []
+    linear, curves, plays = [u, _late(u), np.cumsum(_late(u), axis=0) / len(u)], list[Array](), list[Array]()
     bent = np.column_stack([*(_curves(one) for one in u.T), *_products(u)])
     held = np.column_stack([_play(one, width * float(np.ptp(one))) for one in u.T for width in WIDTHS])
     curves += [bent, _curves(simulated)]
@@ -50,8 +51,13 @@ def features(inputs: Array, simulated: Array) -> dict[str, Array]:
             linear.append(slow)
         curves += [_slowed(bent, memory), *(_curves(one) for one in _slowed(u, memory).T)]
         plays += [_slowed(held, memory)]
-    whole = np.column_stack([*linear, *curves, *plays])
     ends = np.cumsum([sum(part.shape[1] for part in parts) for parts in (linear, curves, plays)])
+    whole, at = np.empty((len(u), ends[-1])), 0
+    for parts in (linear, curves, plays):
+        while parts:  # none stands there twice for longer than it is copied
+            part = parts.pop(0)
+            whole[:, at : at + part.shape[1]] = part
+            at += part.shape[1]
     return {kind: whole[:, :end] for kind, end in zip((LINEAR, CURVES, PLAYS), ends, strict=True)}
 
 
@@ -63,8 +69,7 @@ def _slowed(x: Array, memory: float) -> Array:
     """What follows a signal with a time constant, from the next sample on, settled at its first value."""
     pole = float(np.exp(-1.0 / memory))
     late = _late(x)
-    out, _ = scipy.signal.lfilter([1.0 - pole], [1.0, -pole], late, axis=0, zi=pole * late[:1])
-    return np.asarray(out, dtype=np.float64)
+    return np.array([slowed(column, pole, float(column[0])) for column in late.T]).T
 
 
 def _curves(x: Array) -> Array:

@@ -37,6 +37,22 @@ def all_pole(x, c1, c2, past, v):
         v1 = new
 
 
+def slowed(x: NDArray[np.float64], pole: float, past: float) -> NDArray[np.float64]:
+    """What follows a record with a time constant: ``v(t) = (1 - pole) x(t) + pole v(t-1)``.
+
+    Args:
+        x: Shape ``(n_samples,)``.
+        pole: ``exp(-1 / time constant in samples)``; 0 follows at once.
+        past: Its value before the record.
+
+    Returns:
+        The same shape.
+    """
+    v = np.empty(len(x))
+    all_pole((1.0 - pole) * np.ascontiguousarray(x), -pole, 0.0, past, v)
+    return v
+
+
 def state_space(
     A: NDArray[np.float64],
     B: NDArray[np.float64],

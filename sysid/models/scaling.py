@@ -88,7 +88,9 @@ class Scaling:
 
     def scale_inputs(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Inputs in the model's numbers, shape ``(n_samples, n_inputs)``."""
-        return np.ascontiguousarray((inputs - np.array(self.input_offset)) / np.array(self.input_scale))
+        scaled = np.ascontiguousarray(inputs - np.array(self.input_offset))
+        scaled /= np.array(self.input_scale)  # in place: of a long record each copy is many MB
+        return scaled
 
     def scale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in the model's numbers, any shape."""

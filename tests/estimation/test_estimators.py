@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Status, Training, fit_arx
 from sysid.estimation.estimators import ESTIMATORS, JOINING, estimator_of, fit, with_stability
-from sysid.models import ARX, NARX, Mapping, Start
+from sysid.models import ARX, NARX, Mapping, NeuralStateSpace, Start
 from sysid.traces import Channel, Trace
 
 MAPPING = Mapping.parse("u -> y")
@@ -24,6 +26,20 @@ def trace(pole: float = 0.9) -> Trace:
         y[t + 1] = pole * y[t] + 0.1 * u[t]
     channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
     return Trace(name="record", sample_time=0.5, channels=channels, values=np.column_stack([u, y]))
+
+
+@pytest.mark.parametrize("structure", [NETWORK, NeuralStateSpace(states=1, neurons=1)], ids=["NARX", "NSS"])
+def test_a_plain_fit_loads_nothing_heavy(structure, monkeypatch) -> None:
+    """``scipy.signal`` alone takes some 40 MB with all that it loads, a tenth of what a million samples need."""
+    for name in ("signal", "stats"):
+        monkeypatch.delattr(scipy, name, raising=False)
+    for name in ("scipy.signal", "scipy.stats", "pandas", "matplotlib", "mlflow", "torch"):
+        monkeypatch.setitem(sys.modules, name, None)  # whoever imports it fails
+    record = trace()
+    noise = np.column_stack([np.zeros(120), 0.5 * np.random.default_rng(1).normal(size=120)])
+    noisy = replace(record, values=record.values + np.cumsum(noise, axis=0))  # so that it is asked what is wrong
+    found = fit([noisy], MAPPING, structure, training=Training(max_iterations=3, starts=1), stability=None)
+    assert found.notes, "nothing was asked"
 
 
 def test_a_structure_without_a_row_is_refused() -> None:

@@ -31,7 +31,7 @@ def correlation_time(residual: NDArray[np.float64]) -> float:
     n = len(residual)
     lags = n if n <= BLOCK else LAGS
     while True:
-        tau = _covariance(residual, lags)
+        tau = products(residual, residual, lags)
         if not tau[0] > 0.0 or not np.isfinite(tau[0]):
             return 1.0
         tau = 2.0 * np.cumsum(tau / tau[0]) - 1.0
@@ -41,16 +41,25 @@ def correlation_time(residual: NDArray[np.float64]) -> float:
         lags = min(LONGER * lags, n)
 
 
-def _covariance(residual: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
-    """Sums of the products of samples so far apart, shape ``(lags,)``.
+def products(ahead: NDArray[np.float64], here: NDArray[np.float64], lags: int) -> NDArray[np.float64]:
+    """Sums of the products of the samples of one signal with those of another so far behind them.
 
     In blocks: of a million samples one transform has some 50 MB, and a fit takes one in every iteration.
+
+    Args:
+        ahead: Shape ``(n_samples,)``.
+        here: The same shape.
+        lags: How many, at most as many as samples.
+
+    Returns:
+        At lag ``k`` the sum of ``ahead[t + k] * here[t]``, shape ``(lags,)``.
     """
     total, block = np.zeros(lags), max(BLOCK, lags)
-    for first in range(0, len(residual), block):
-        here, ahead = residual[first : first + block], residual[first : first + block + lags - 1]
-        size = scipy.fft.next_fast_len(len(here) + max(len(ahead), lags), real=True)
-        spectrum = scipy.fft.rfft(ahead, size)
-        spectrum *= np.conj(scipy.fft.rfft(here, size)) if len(here) < len(ahead) else np.conj(spectrum)
+    for first in range(0, len(here), block):
+        now, later = here[first : first + block], ahead[first : first + block + lags - 1]
+        size = scipy.fft.next_fast_len(len(now) + max(len(later), lags), real=True)
+        spectrum = scipy.fft.rfft(later, size)
+        alike = ahead is here and len(now) == len(later)
+        spectrum *= np.conj(spectrum if alike else scipy.fft.rfft(now, size))
         total += scipy.fft.irfft(spectrum, size)[:lags]
     return total

@@ -94,8 +94,9 @@ class NeuralProvider(AbstractProvider):
         # One measured sample is a system that has stood there, here as in every free run of the model.
         stood = len(history.output) == 1 and (experiment.past is None or bool(experiment.past.any()))
         n_past = len(history.output) if not stood and experiment.past is not None and experiment.past.any() else 0
-        u = np.concatenate([history.inputs[:n_past], experiment.inputs])
-        target = np.concatenate([history.output[:n_past], experiment.output])
+        u, target = experiment.inputs, experiment.output
+        if n_past:  # else a long record is not copied
+            u, target = np.concatenate([history.inputs[:n_past], u]), np.concatenate([history.output[:n_past], target])
         roots = None
         before = experiment.past_weights[:n_past]
         if experiment.weights is not None or not before.all():

@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.experiment import Experiment
+from sysid.kernels.linear import slowed
 
 TIME_CONSTANTS = (0.0, 2.0, 5.0, 12.0, 30.0, 80.0, 200.0)
 """Of the poles, in samples; those longer than the record are left out."""
@@ -69,7 +70,7 @@ def shares(
         for u, y in zip(inputs, targets, strict=True):
             x = u
             for _ in range(order):
-                x = scipy.signal.lfilter([1.0 - p], [1.0, -p], x)
+                x = slowed(x, p, 0.0)
             n = len(x)
             x = x - x.mean()
             size = scipy.fft.next_fast_len(n + most + 1, real=True)
@@ -124,7 +125,7 @@ def _explained(u: NDArray[np.float64], y: NDArray[np.float64], k: int) -> NDArra
     """What responses with that dead time explain together."""
     delayed = np.concatenate([np.full(min(k, len(u)), u[0]), u[: max(len(u) - k, 0)]])
     poles = [float(np.exp(-1.0 / constant)) if constant else 0.0 for constant in TIME_CONSTANTS]
-    columns = np.column_stack([scipy.signal.lfilter([1.0 - p], [1.0, -p], delayed) for p in poles])
+    columns = np.column_stack([slowed(delayed, p, 0.0) for p in poles])
     return np.asarray(columns @ np.linalg.lstsq(columns, y, rcond=1e-6)[0])
 
 

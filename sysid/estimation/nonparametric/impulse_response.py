@@ -125,7 +125,7 @@ class ImpulseResponse:
         held = np.concatenate([np.repeat(u[:1], deepest, axis=0), u])
         response = np.zeros((len(self.values), deepest + 1))
         response[:, self.lags] = self.values
-        made = [scipy.signal.lfilter(g, [1.0], x)[deepest:] for g, x in zip(response, held.T, strict=True)]
+        made = [np.convolve(g, x)[deepest : len(x)] for g, x in zip(response, held.T, strict=True)]
         return np.asarray(np.sum(made, axis=0))
 
     def to_frame(self) -> pd.DataFrame:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.nonparametric.evidence import CHUNK, Triangle, triangle
@@ -46,7 +45,8 @@ class Regression:
         for segment in self.segments:
             if len(segment) > first:
                 signals = np.column_stack([segment.inputs, segment.output]) / self.scale
-                by_trace.setdefault(segment.trace, []).append(scipy.signal.lfilter(whiten, [1.0], signals, axis=0))
+                white = np.column_stack([np.convolve(whiten, x)[: len(x)] for x in signals.T])
+                by_trace.setdefault(segment.trace, []).append(white)
         lags = range(self.length)
         for stretches in by_trace.values():
             rows = sum(len(x) - first for x in stretches)
@@ -73,7 +73,7 @@ class Regression:
         for segment in self.segments:
             if len(segment) > self.length:
                 u, y = segment.inputs / self.scale[:-1], segment.output / self.scale[-1]
-                made = [scipy.signal.lfilter(row, [1.0], x - x.mean()) for row, x in zip(g, u.T, strict=True)]
+                made = [np.convolve(row, x - x.mean())[: len(x)] for row, x in zip(g, u.T, strict=True)]
                 left = (y - np.sum(made, axis=0))[self.length - 1 :]
                 found.append(left - left.mean())
         return found
