@@ -14,6 +14,9 @@ from numba import njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+FAST = {"reassoc", "contract", "arcp", "nsz"}
+"""Sums may be reordered, which is what lets the compiler vectorise them; NaN and infinity keep their meaning."""
+
 
 def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
     """A view that cannot be written, as the parameters of a model cannot: training and models run one compiled kernel.

@@ -22,12 +22,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sysid.kernels.arrays import copy_numbers, copy_rows
+from sysid.kernels.arrays import FAST, copy_numbers, copy_rows
 from sysid.kernels.cascade_layout import (
     FREE,
     HIGH,
     HIGH_CHANNEL,
-    LOST,
     LOW,
     LOW_CHANNEL,
     SUM_HEAD,
@@ -35,39 +34,19 @@ from sysid.kernels.cascade_layout import (
     Program,
     from_a_line,
 )
+from sysid.kernels.held_sums import bounded, limited, weighted
 from sysid.kernels.neurons.table import activate
 from sysid.kernels.register_machine import evaluate
 from sysid.kernels.registers import LANES, affine, dot, tanh
 
 Array = NDArray[np.float64]
 Held = NDArray[np.int8]
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 ONE, TWO, HEAD = np.uintp(1), np.uintp(2), np.uintp(SUM_HEAD)
 """Of the same kind as the indices that they are added to."""
 
 # In the pass over samples no function takes the program or its layout itself: a call would copy the descriptions of
 # their arrays, which costs as much as the network (measured: 34 ms instead of 16 for four members over 20,000 samples).
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _bounded(y, low, high):
-    """An output within the network's bound, and whether that held it; NaN passes."""
-    if y < low:
-        return low, LOST
-    if y > high:
-        return high, LOST
-    return y, FREE
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _limited(value, code, low, high, low_code, high_code):
-    """A value within its limits, and what held it; the lower limit comes last, so that it wins where the two cross."""
-    if value > high:
-        value, code = high, high_code
-    if value < low:
-        value, code = low, low_code
-    return value, code
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -79,15 +58,6 @@ def _linear(theta, first, flat, back, first_x, here, n_x):
     total = 0.0
     for i in range(n_x):
         total += theta[first + i] * flat[here - back[first_x + i]]
-    return total
-
-
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _weighted(theta, first, x, first_x, n_x):
-    """The linear part of a network, from its regressors side by side."""
-    total = 0.0
-    for i in range(n_x):
-        total += theta[first + i] * x[first_x + i]
     return total
 
 
@@ -119,7 +89,7 @@ def _keep(kept, h, neurons, neuron_first):
         at += neurons[m]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _walk(p, layout, values, past, kept, held):
     """Run over the rows of ``values`` from ``past`` on; ``kept`` and ``held`` begin with the first of these."""
     theta, bounds, weights = layout.theta, layout.bounds, layout.weights
@@ -167,7 +137,7 @@ def _walk(p, layout, values, past, kept, held):
                 if blocks[m] > 0:
                     linear = 0.0
                     if linear_first[o] >= 0:
-                        linear = _weighted(theta, np.uintp(linear_first[o]), x, first_x, n_x)
+                        linear = weighted(0.0, theta, np.uintp(linear_first[o]), x, first_x, n_x)
                     total += dot(g, readout_first[o], h, neuron_first[m], blocks[m]) + linear
                 elif is_equation[m]:
                     for i in range(n_x):
@@ -180,13 +150,13 @@ def _walk(p, layout, values, past, kept, held):
                 low, high = fixed_limits[o, 0], fixed_limits[o, 1]
                 low_code, high_code = fixed_codes[o, 0], fixed_codes[o, 1]
                 if not fixed[o]:
-                    total, code = _bounded(total, bounds[o, 0], bounds[o, 1])
+                    total, code = bounded(total, bounds[o, 0], bounds[o, 1])
                     low, high, low_code, high_code = p.limits[o, 0], p.limits[o, 1], LOW, HIGH
                     if p.limit_channel[o, 0] >= 0:
                         low, low_code = flat[here + np.uintp(p.limit_channel[o, 0])], LOW_CHANNEL
                     if p.limit_channel[o, 1] >= 0:
                         high, high_code = flat[here + np.uintp(p.limit_channel[o, 1])], HIGH_CHANNEL
-                flat[here + channel_y[o]], held[t, o] = _limited(total, code, low, high, low_code, high_code)
+                flat[here + channel_y[o]], held[t, o] = limited(total, code, low, high, low_code, high_code)
             for q in range(sum_first[level], sum_first[level + ONE]):
                 total, low, high = numbers[at], numbers[at + ONE], numbers[at + TWO]
                 channel, o, end = indices[at + ONE], indices[at + TWO], at + HEAD + indices[at]
@@ -194,7 +164,7 @@ def _walk(p, layout, values, past, kept, held):
                 while at < end:
                     total += numbers[at] * flat[here - indices[at]]
                     at += ONE
-                flat[here + channel], held[t, o] = _limited(total, FREE, low, high, codes[q, 0], codes[q, 1])
+                flat[here + channel], held[t, o] = limited(total, FREE, low, high, codes[q, 0], codes[q, 1])
         if len(kept) > 0:
             _keep(kept[t], h, p.neurons, neuron_first)
 

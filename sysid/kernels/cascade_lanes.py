@@ -11,13 +11,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.arrays import copy_numbers, copy_rows
-from sysid.kernels.cascade import _bounded, _limited
+from sysid.kernels.arrays import FAST, copy_numbers, copy_rows
 from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, gates_at
+from sysid.kernels.held_sums import bounded, limited
 from sysid.kernels.neurons.table import activate
 from sysid.kernels.register_machine import evaluate
-
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 CHUNK = 128
 """Samples of which the past is kept at a time, so that it stays in the second-level cache."""
@@ -26,7 +24,7 @@ CHUNK = 128
 # vectorised, which made this slower than one record at a time.
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _affine(theta, first, constants, n, n_x, x, h):
     """One affine function for each neuron in all lanes, two neurons and four regressors at a time."""
     lanes = x.shape[1]
@@ -50,7 +48,7 @@ def _affine(theta, first, constants, n, n_x, x, h):
                 h[k, lane] += w * x[i, lane]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _weighted(total, theta, first, n, a):
     """Add the weighted rows of ``a`` to the totals of all lanes."""
     for k in range(n):
@@ -59,7 +57,7 @@ def _weighted(total, theta, first, n, a):
             total[lane] += w * a[k, lane]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _products(total, g, n, h):
     """Add the sums of the products of two arrays to the totals of all lanes."""
     for k in range(n):
@@ -67,7 +65,7 @@ def _products(total, g, n, h):
             total[lane] += g[k, lane] * h[k, lane]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _outside(value, low_bound, high_bound, low, high):
     """Count the lanes in which something holds the value."""
     count = 0
@@ -83,8 +81,8 @@ def _outside(value, low_bound, high_bound, low, high):
 def _hold(value, codes, low_bound, high_bound, low, high, low_code, high_code):
     """Hold values within bounds and limits, lane by lane."""
     for lane in range(len(value)):
-        bounded, code = _bounded(value[lane], low_bound, high_bound)
-        value[lane], codes[lane] = _limited(bounded, code, low[lane], high[lane], low_code, high_code)
+        inside, code = bounded(value[lane], low_bound, high_bound)
+        value[lane], codes[lane] = limited(inside, code, low[lane], high[lane], low_code, high_code)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -120,7 +118,7 @@ def _sizes(p):
     return width, neurons
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def run(p, theta, bounds, depth, rest, lanes, values, held):
     """Run all members over all samples of some records, writing the outputs into ``values``.
 

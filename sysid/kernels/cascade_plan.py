@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.kernels.cascade_layout import HIGH, LOST, LOW, SUM_HEAD, Layout, Program, Sums
+from sysid.kernels.cascade_layout import HIGH, LOST, LOW, SUM_HEAD, Layout, Program, Sums, from_a_line
 from sysid.kernels.registers import LANES
 
 Array = NDArray[np.float64]
@@ -75,13 +75,6 @@ class Plan:
         ):  # fmt: skip
             target[places] = acting[sources]
         return wired._replace(theta=acting, weights=weights, readout=readout, sums=wired.sums._replace(numbers=numbers))
-
-
-def from_a_line(size: int) -> Array:
-    """Zeros from the beginning of a line of the cache on, which is as wide as a block: no block lies in two."""
-    room = np.zeros(size + LANES)
-    skipped = -(room.ctypes.data // room.itemsize) % LANES
-    return room[skipped : skipped + size]
 
 
 @dataclass
@@ -174,8 +167,8 @@ class _Planning:
             theta=np.zeros(len(p.theta)),
             bounds=self.bounds,
             networks=_whole([m for some in networks for m in some]),
-            network_first=_firsts(map(len, networks)),
-            neurons_first=_firsts(sum(LANES * self.members[m].blocks for m in some) for some in networks),
+            network_first=firsts(map(len, networks)),
+            neurons_first=firsts(sum(LANES * self.members[m].blocks for m in some) for some in networks),
             weights=np.zeros(n_weights),
             weights_first=weights_first,
             blocks=_whole([member.blocks for member in self.members]),
@@ -185,7 +178,7 @@ class _Planning:
             readout_first=readout_first,
             sums=sums,
             order_y=_whole([o for some in others for o in some]),
-            level_first_y=_firsts(map(len, others)),
+            level_first_y=firsts(map(len, others)),
             member=np.repeat(np.arange(len(self.members)), np.diff(p.output_first)),
             constant=np.concatenate([member.constant for member in self.members]),
             linear_first=self._linear(),
@@ -253,7 +246,7 @@ class _Planning:
             indices += [len(terms), int(p.output_channel[o]), o, *range(member.x.start, member.x.start + len(terms))]
             codes.append(self.codes[o])
         sums = Sums(
-            first=_firsts(map(len, by_level)),
+            first=firsts(map(len, by_level)),
             numbers=np.array(numbers, dtype=np.float64),
             indices=np.array(indices, dtype=np.uint64),
             codes=np.array(codes, dtype=np.int64).reshape(-1, 2),
@@ -284,5 +277,6 @@ def _whole(values: list[int]) -> Places:
     return np.array(values, dtype=np.int64)
 
 
-def _firsts(counts: Iterable[int]) -> Places:
+def firsts(counts: Iterable[int]) -> Places:
+    """Where each of some things begins that stand one after the other, and where the last ends; by how long each is."""
     return np.concatenate([[0], np.cumsum([*counts])]).astype(np.int64)

@@ -32,13 +32,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from sysid.kernels.arrays import FAST
 from sysid.kernels.cascade_layout import FREE, HIGH_CHANNEL, LOW_CHANNEL, gates_at
 from sysid.kernels.neurons.table import slopes_of_sums, slopes_of_values
 from sysid.kernels.register_machine import evaluate, moves_of, partials
 
 ONE = np.uintp(1)
 _u = np.uintp
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
 
 
 class Rows(NamedTuple):
@@ -77,31 +77,31 @@ def rows_for(kept: NDArray[np.int64], n_parameters: int) -> Rows:
 # unsigned: of others numba looks at the sign, each time, and no loop is vectorised.
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _clear(J, first, end):
     for i in range(first, end):
         J[i] = 0.0
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _add(J, row, n, factor, other):
     for i in range(n):
         J[row + i] += factor * J[other + i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _add_two(J, row, n, f0, f1, p0, p1):
     for i in range(n):
         J[row + i] += f0 * J[p0 + i] + f1 * J[p1 + i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _add_four(J, row, n, f0, f1, f2, f3, p0, p1, p2, p3):
     for i in range(n):
         J[row + i] += f0 * J[p0 + i] + f1 * J[p1 + i] + f2 * J[p2 + i] + f3 * J[p3 + i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _gains(g, theta, readout, gated, gates, n, n_x, x):
     """What stands before each activation: the readout, and the gate of a member that has gates."""
     for k in range(n):
@@ -112,7 +112,7 @@ def _gains(g, theta, readout, gated, gates, n, n_x, x):
         g[k] = total
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _own(J, at, gated, gates, j, n, n_x, n_y, linear, x, h, s, g):
     """The part of a row that does not go through earlier samples; ``at`` is where the member's parameters stand."""
     biases = at + n * n_x
@@ -135,7 +135,7 @@ def _own(J, at, gated, gates, j, n, n_x, n_y, linear, x, h, s, g):
                 J[gates + k * n_x + i] = h[k] * x[i]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _factors(c, theta, first, gated, gates, j, n, n_x, n_y, linear, h, s, g):
     """Derivative of an output with respect to each regressor."""
     weights = first + n * (n_x + ONE + n_y) + n_y + j * n_x

@@ -13,12 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from sysid.kernels.arrays import copy_numbers
-
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
+from sysid.kernels.arrays import FAST, copy_numbers
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def predict(A, B, C, D, K, c, u, y, x, states, predicted):
     """Run the one-step prediction ``yhat = C x + D u + c``, ``x(t+1) = A x + B u + K (y - yhat)``.
 
@@ -59,7 +57,7 @@ def predict(A, B, C, D, K, c, u, y, x, states, predicted):
         copy_numbers(following, x)
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def responses(At, C, sources, z, out):
     """Responses of every output to every source through every row of the state.
 

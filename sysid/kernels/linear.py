@@ -11,9 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sysid.kernels.arrays import copy_numbers, read_only
-
-_FAST = {"reassoc", "contract", "arcp", "nsz"}
+from sysid.kernels.arrays import FAST, copy_numbers, read_only
 
 
 @njit(cache=True, nogil=True)
@@ -79,7 +77,7 @@ def state_space(
     _state_space(*(read_only(np.ascontiguousarray(array)) for array in (A, B, C, D, u)), x, y)
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=FAST)
 def _state_space(A, B, C, D, u, x, y):
     n, m, k = len(x), u.shape[1], y.shape[1]
     following = np.empty(n)

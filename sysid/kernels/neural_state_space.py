@@ -35,8 +35,7 @@ import math
 import numpy as np
 from numba import njit
 
-from sysid.kernels.arrays import copy_numbers, copy_rows
-from sysid.kernels.neurons.neuron import FAST
+from sysid.kernels.arrays import FAST, copy_numbers, copy_rows
 from sysid.kernels.neurons.table import activate_with_slopes
 
 ONE, TWO = np.uintp(1), np.uintp(2)

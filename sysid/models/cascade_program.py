@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels.cascade_layout import Equations, Program
+from sysid.kernels.cascade_plan import firsts
 from sysid.kernels.neurons import code_of
 from sysid.kernels.register_machine import TABLE
 from sysid.models.column_recursion import ColumnEquation, ColumnRecursion
@@ -75,15 +76,15 @@ def program_of(
     )
     return Program(
         theta=np.concatenate([member.theta for member in members]),
-        theta_first=_firsts([len(member.theta) for member in members]),
+        theta_first=firsts([len(member.theta) for member in members]),
         neurons=np.array([member.neurons for member in members], dtype=np.int64),
         kinds=np.array([code_of(member.activation) for member in members], dtype=np.int64),
-        regressor_first=_firsts([len(some) for some in regressors]),
+        regressor_first=firsts([len(some) for some in regressors]),
         regressor_channel=_of_each(columns, regressors),
         regressor_lag=np.concatenate([member.lags.input_lag for member in members]),
         regressor_offset=_of_each(offsets, regressors),
         regressor_scale=_of_each(scales, regressors),
-        output_first=_firsts([len(end.outputs) for end in ends]),
+        output_first=firsts([len(end.outputs) for end in ends]),
         output_channel=np.array([column_of[name] for name in written], dtype=np.int64),
         output_offset=np.concatenate([some[len(end.inputs) :] for some, end in zip(offsets, ends, strict=True)]),
         output_scale=np.concatenate([some[len(end.inputs) :] for some, end in zip(scales, ends, strict=True)]),
@@ -112,7 +113,7 @@ def _equations(given: Sequence[ColumnEquation | None], regressors: Sequence[int]
     numbers, code = np.array([len(one.numbers) for one in all_]), np.array([len(one.code) for one in all_])
     counts = [n + x + c if one else 0 for one, n, x, c in zip(given, numbers, regressors, code, strict=True)]
     low, tables, rows = (
-        _firsts(some)[:-1] for some in (counts, [len(one.places) for one in all_], [len(one.table) for one in all_])
+        firsts(some)[:-1] for some in (counts, [len(one.places) for one in all_], [len(one.table) for one in all_])
     )
     registers = np.zeros(sum(counts))
     for at, one in zip(low, all_, strict=True):
@@ -125,7 +126,7 @@ def _equations(given: Sequence[ColumnEquation | None], regressors: Sequence[int]
     return Equations(
         is_one=np.array([one is not None for one in given], dtype=np.bool_),
         code=np.concatenate(codes),
-        code_first=_firsts([len(one.code) for one in all_]),
+        code_first=firsts([len(one.code) for one in all_]),
         registers=registers,
         low=low,
         free=low + np.array([one.free.start for one in all_], dtype=np.int64),
@@ -137,10 +138,6 @@ def _equations(given: Sequence[ColumnEquation | None], regressors: Sequence[int]
         places=np.concatenate([one.places + np.array([first, 0]) for one, first in zip(all_, rows, strict=True)]),
         table=np.concatenate([one.table for one in all_]),
     )
-
-
-def _firsts(counts: Sequence[int]) -> NDArray[np.int64]:
-    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
 
 def _of_each(tables: Sequence[NDArray[_Number]], picked: Sequence[NDArray[np.int64]]) -> NDArray[_Number]:

@@ -84,16 +84,25 @@ class Recursion(AbstractForm):
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Between what the kernels hold the output, in scaled numbers: bounds, and limits where they are closer."""
-        low, high = (None if one is None else float(self.scaling.scale_output(np.array(one))) for one in self.between)
-        return self.low if low is None else max(self.low, low), self.high if high is None else min(self.high, high)
+        """Between what the kernels hold the output, in scaled numbers: bounds within the limits."""
+        low, high = self._limits
+        return min(max(self.low, low), high), min(max(self.high, low), high)
+
+    @property
+    def _limits(self) -> tuple[float, float]:
+        """The limits in scaled numbers, infinite for none."""
+        low, high = (
+            far if one is None else float(self.scaling.scale_output(np.array(one)))
+            for one, far in zip(self.between, (-np.inf, np.inf), strict=True)
+        )
+        return low, high
 
     def in_units(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled outputs in their unit; one that is held at a limit is at it to the last bit, as in a cascade."""
         found = self.scaling.unscale_output(y)
-        for at, (limit, bound) in enumerate(zip(self.between, self.bounds, strict=True)):
+        for at, (limit, scaled) in enumerate(zip(self.between, self._limits, strict=True)):
             if limit is not None:
-                found = np.where((y >= bound) if at else (y <= bound), limit, found)
+                found = np.where((y >= scaled) if at else (y <= scaled), limit, found)
         return found
 
     @property

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from sysid.kernels.cascade import _bounded, _limited
 from sysid.kernels.cascade_layout import FREE, HIGH, LOW, SUM_HEAD, Layout, Program
 from sysid.kernels.cascade_plan import Plan
+from sysid.kernels.held_sums import bounded, limited
 from sysid.models.cascade_stages import CompiledStage
 from tests.models.cascades import CASCADES, command
 
@@ -79,11 +79,11 @@ def test_bounds_and_limits_at_once_are_first_the_one_and_then_the_other(bounds, 
             output_scale=np.ones(n),
         )
     )
-    bounded, code = _bounded(value, *bounds)
-    expected = _limited(bounded, code, *limits, LOW, HIGH)
+    held, code = bounded(value, *bounds)
+    expected = limited(held, code, *limits, LOW, HIGH)
     assert layout.fixed[0] == (max(bounds[0], limits[0]) <= min(bounds[1], limits[1]))
     if layout.fixed[0]:
-        assert _limited(value, FREE, *layout.fixed_limits[0], *layout.fixed_codes[0]) == expected
+        assert limited(value, FREE, *layout.fixed_limits[0], *layout.fixed_codes[0]) == expected
 
 
 def test_a_plan_lays_out_other_parameters_and_leaves_former_layouts_as_they_were():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from sysid.errors import ConfigError
 from sysid.kernels.cascade_layout import FREE, HIGH, LOST, LOW
@@ -53,6 +54,13 @@ def test_what_may_be_written_is_stored_as_it_is_read(written):
 def test_what_is_none_is_refused(written):
     with pytest.raises(ConfigError, match="not limits of an output"):
         parse_limits(written)
+
+
+@pytest.mark.parametrize("between", [(20.0, 25.0), (-5.0, 0.0), (9.0, 30.0), (-9.0, 11.0)])
+def test_limits_beyond_the_bounds_win_as_in_the_slow_twin(between):
+    model = replace(held(*between).recursion, low=-1.0, high=1.0)  # in units 3 and 17
+    start = History.at_rest(inputs=[0.5], output=10.0)
+    assert_allclose(model.simulate(U, start), simulate(model, U, start), rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("between", [(3.3, 16.1), (3.3, None), (None, 16.1)])

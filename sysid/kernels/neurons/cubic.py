@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sysid.kernels.neurons.neuron import FAST, Graph, Neuron
+from sysid.kernels.arrays import FAST
+from sysid.kernels.neurons.neuron import Graph, Neuron
 
 
 @njit(cache=True, nogil=True, fastmath=FAST)

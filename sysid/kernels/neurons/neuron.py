@@ -9,8 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-FAST = {"reassoc", "contract", "arcp", "nsz"}
-"""Sums may be reordered, which is what lets the compiler vectorise them; NaN and infinity keep their meaning."""
 FAR = 1e6
 """A sum that no bounded neuron makes as much of."""
 

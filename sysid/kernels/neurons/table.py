@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from sysid.kernels.arrays import FAST
 from sysid.kernels.neurons import cubic, tanh
-from sysid.kernels.neurons.neuron import FAST, Neuron
+from sysid.kernels.neurons.neuron import Neuron
 
 NEURONS: dict[str, Neuron] = {neuron.name: neuron for neuron in (tanh.TANH, cubic.CUBIC)}
 """By the word in ``activation``; a kind's place is its code."""
