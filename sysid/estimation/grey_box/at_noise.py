@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.stepping import ACCURACY
@@ -53,4 +53,4 @@ def _is_noise(records: list[Array]) -> bool:
     lags = np.arange(1, LAGS + 1)
     products = np.array([sum(float(one[k:] @ one[:-k]) for one in records) for k in lags])
     statistic = n * (n + 2.0) * np.sum((products / power) ** 2 / (n - lags))
-    return bool(stats.chi2.sf(statistic, LAGS) > PROBABILITY)
+    return bool(scipy.stats.chi2.sf(statistic, LAGS) > PROBABILITY)
