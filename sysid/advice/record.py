@@ -131,13 +131,16 @@ class Record:
     @property
     def runs_away(self) -> bool:
         """Whether the plant by itself does, so that something holds it."""
-        return bool(self.moving) and self.equation is not None and self.equation.grows
+        found = self.impulse
+        if not self.moving or isinstance(found, str) or found.explained > 1.0 - LONGER:
+            return False  # the search for an equation takes its time
+        return self.equation is not None and self.equation.grows
 
     @property
     def lasts(self) -> bool:
         """Whether a linear model explains much that a response over some lags does not: what rings, or is slow."""
         found = self.slowed[0].impulse
-        if isinstance(found, str) or self.equation is None or self.runs_away:
+        if isinstance(found, str) or found.explained > 1.0 - LONGER or self.equation is None or self.runs_away:
             return False
         return self.equation.explained > max(found.explained, 0.0) + LONGER
 

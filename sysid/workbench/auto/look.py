@@ -45,6 +45,7 @@ class Looked:
         in_motion: Whether outputs move before any input does though each run begins as if they had stood: then what
             remembers one sample, or learns where it begins, is tried first.
         states: Of the best linear state space, once linear models were tried; 0 before.
+        seen_from: Samples after which an input is seen to act first, in a response that takes no drift for its own.
     """
 
     n_inputs: int
@@ -58,6 +59,7 @@ class Looked:
     all_end: bool = False
     integrators: int = 0
     states: int = 0
+    seen_from: int | None = None
 
     @property
     def lags(self) -> int:
@@ -67,7 +69,9 @@ class Looked:
     @property
     def delay(self) -> int:
         """The least dead time, in samples; 1 where it is not known."""
-        return min(self.orders[0].nk, default=1) if self.orders else 1
+        ordered = min(self.orders[0].nk, default=1) if self.orders else 1
+        # The best free run of a record that drifts, or adds up, may have a dead time that is not there.
+        return ordered if self.seen_from is None else min(ordered, self.seen_from)
 
 
 def look(data: Data, mapping: Mapping, start: Start) -> Looked:
@@ -96,6 +100,10 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         ends=any(ends.values()),
         all_end=bool(ends) and all(ends.values()),
         integrators=integrators,
+        seen_from=min(
+            (int(one.figures["best"]) for each in advice for one in each.findings if one.code == "dead_time"),
+            default=None,
+        ),
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.advice import Advice
-from sysid.models import Mapping, NeuralStateSpace, Start, StartKind
+from sysid.models import ARX, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.families import FAMILIES
 from sysid.workbench.auto.look import Looked, at_ends, in_motion, look
@@ -92,3 +92,10 @@ def test_orders_that_nobody_tries_are_not_looked_for(monkeypatch: pytest.MonkeyP
     names = ("y",) if outputs == 1 else ("y1", "y2")
     look(data(record("a", 60, outputs=outputs)), Mapping(inputs=("u",), outputs=names), ESTIMATED)
     assert asked == [outputs == 1] * outputs
+
+
+def test_a_dead_time_that_drift_has_made_is_not_that_of_the_inputs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sysid.workbench.auto.look._orders", lambda *_: (ARX(na=2, nb=1, nk=9),))
+    lags = record("a", 300)
+    at_once = replace(lags, values=np.column_stack([lags["u"], lags["u"] + lags["y"]]))
+    assert look(data(at_once), MAPPING, ESTIMATED).delay == 0
