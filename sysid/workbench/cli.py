@@ -6,8 +6,10 @@ complete but could not be tracked), 130 stopped by the user (Ctrl-C), 143 ended 
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import threading
 import warnings
 from collections.abc import Iterable
 from contextlib import suppress
@@ -100,6 +102,17 @@ def _end_in_order() -> None:
     def end(number: int, _: object) -> None:
         signal.signal(number, signal.SIG_DFL)
         raise _EndedError(number)
+
+    def dropped(lost: sys.UnraisableHookArgs) -> None:
+        # Python drops what is raised while it cleans up (the callback of a weak reference): the signal is sent again.
+        if not isinstance(lost.exc_value, _EndedError):
+            sys.__unraisablehook__(lost)
+            return
+        number = lost.exc_value.exit_code - 128
+        signal.signal(number, end)
+        threading.Timer(0.01, os.kill, (os.getpid(), number)).start()
+
+    sys.unraisablehook = dropped
 
     for name in ("SIGTERM", "SIGHUP"):
         known = getattr(signal, name, None)

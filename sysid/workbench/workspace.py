@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -35,17 +36,7 @@ def make_workspace(folder: Path) -> list[Path]:
     templates = sorted(file for file in TEMPLATE.rglob("*") if file.is_file())
     targets = [folder / file.relative_to(TEMPLATE) for file in templates]
     records = {folder / "datasets" / "tank" / f"{name.lower()}.csv": name for name in CASES}
-    taken = [target for target in targets if target.exists()]
-    if not all(file.exists() for file in (*targets, *records)):  # a call that was cut off has left whole files, as here
-        taken = [target for source, target in zip(templates, targets, strict=True) if _is_another(source, target)]
-    if taken:
-        raise ConfigError(
-            "the folder has files of a workspace already",
-            where=folder,
-            expected="a folder without them",
-            got=", ".join(str(file.relative_to(folder)) for file in taken),
-            remedy="name another folder; nothing was changed",
-        )
+    refuse_taken(folder, {to: file.read_bytes() for file, to in zip(templates, targets, strict=True)}, records)
     for source, target in zip(templates, targets, strict=True):
         with replacing(target) as draft:
             shutil.copyfile(source, draft)
@@ -56,8 +47,28 @@ def make_workspace(folder: Path) -> list[Path]:
     return [*targets, *schemas, *records]
 
 
-def _is_another(source: Path, target: Path) -> bool:
-    return target.exists() and not (target.is_file() and target.read_bytes() == source.read_bytes())
+def refuse_taken(folder: Path, files: Mapping[Path, bytes], more: Iterable[Path] = ()) -> None:
+    """Overwrite nothing: but what a call that was cut off has left is whole and the same, and may stand.
+
+    Args:
+        folder: Of the workspace.
+        files: What would be written.
+        more: What would be written after it.
+
+    Raises:
+        ConfigError: If a file is there already.
+    """
+    there = [file for file in files if file.exists()]
+    if not all(file.exists() for file in (*files, *more)):
+        there = [file for file in there if not (file.is_file() and file.read_bytes() == files[file])]
+    if there:
+        raise ConfigError(
+            "the folder has files of a workspace already",
+            where=folder,
+            expected="a folder without them",
+            got=", ".join(str(file.relative_to(folder)) for file in there),
+            remedy="name another folder; nothing was changed",
+        )
 
 
 def tank(case: str, n_samples: int = 1500) -> Trace:

@@ -193,6 +193,22 @@ def test_what_the_system_ends_clears_up_behind_itself(name: str, code: int, tmp_
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals there")
+def test_a_signal_that_comes_while_python_cleans_up_is_not_lost() -> None:
+    """What the callback of a weak reference raises is dropped."""
+    script = (
+        "import os, signal, sys, time, weakref\nfrom sysid.workbench import cli\n"
+        "class Thing: pass\n"
+        "def work(*_, **__):\n"
+        "    thing = Thing(); seen = weakref.ref(thing, lambda _: os.kill(os.getpid(), signal.SIGTERM)); del thing\n"
+        "    time.sleep(20)\n"
+        "cli._with_commands_of_fields = work\nsys.argv = ['sysid', 'run', 'first']\ncli.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 143
+    assert done.stderr == "ended by SIGTERM; the same command goes on where this one was\n"
+
+
 def sysid(workspace: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*SYSID, *arguments], cwd=workspace, capture_output=True, text=True, check=False)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from pathlib import Path
 
 from sysid.errors import ConfigError
@@ -13,6 +12,7 @@ from sysid.references.sources import Source
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.schemas import write_schemas
 from sysid.workbench.surrogates.plan import text_of
+from sysid.workbench.workspace import refuse_taken
 
 README = """# A surrogate of {source}
 
@@ -41,31 +41,23 @@ def make_reference_workspace(folder: Path, source: Source, wish: Wish) -> tuple[
         ConfigError: If a file is there already, the folder cannot be written to, or something is not said.
     """
     name, fmu = slug(source.name), source.fmu
-    copies = [] if fmu is None else [folder / "references" / fmu.name]
-    pipeline, readme = folder / "pipelines" / f"{name}.yaml", folder / "README.md"
-    taken = [one for one in (*copies, pipeline, readme) if one.exists()]
-    if taken:
-        raise ConfigError(
-            "the folder has files of a workspace already", where=folder, expected="a folder without them",
-            got=", ".join(str(one.relative_to(folder)) for one in taken),
-            remedy="name another folder; nothing was changed",
-        )  # fmt: skip
+    pipeline = folder / "pipelines" / f"{name}.yaml"
     places = {"folder": _seen_from(pipeline.parent, Path(source.reference.get("folder", ".")))}
     if fmu is not None:
         places = {"folder": ".", "fmu": f"../references/{fmu.name}"}
     text, notes = text_of(source, wish, name=name, places=places)
+    files = {} if fmu is None else {folder / "references" / fmu.name: fmu.read_bytes()}
+    files |= {pipeline: text.encode(), folder / "README.md": README.format(source=source.text, name=name).encode()}
+    refuse_taken(folder, files)
     try:
-        for copy in copies:
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(str(fmu), copy)
-        write_bytes(pipeline, text.encode())
-        write_bytes(readme, README.format(source=source.text, name=name).encode())
+        for file, content in files.items():
+            write_bytes(file, content)
         schemas = write_schemas(folder)
     except OSError as error:
         raise ConfigError(
             "the workspace cannot be written", where=folder, got=error, remedy="name another folder"
         ) from error
-    return [*copies, pipeline, readme, *schemas], name, notes
+    return [*files, *schemas], name, notes
 
 
 def _seen_from(place: Path, folder: Path) -> str:

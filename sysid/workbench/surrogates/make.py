@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from sysid.atomic import replacing
 from sysid.bounded_text import read_bounded
 from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
@@ -187,9 +188,15 @@ def make_surrogate(
     if page.stat().st_mtime < (place / FOLDER / "proof.json").stat().st_mtime:
         page = write_report(place)
     if fmu is not None:
-        fmu = Path(shutil.copyfile(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu"))
+        fmu = _delivered(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu")
     notes += _short_of_time(shown, plan, count, took=time.monotonic() - began, asked=bool(proof or iterations))
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes, pipeline=pipeline)
+
+
+def _delivered(fmu: Path, target: Path) -> Path:
+    with replacing(target) as draft:
+        shutil.copyfile(fmu, draft)
+    return target
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

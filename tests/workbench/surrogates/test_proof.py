@@ -120,6 +120,11 @@ def test_a_workspace_begins_with_a_function_or_a_program_too(tmp_path: Path, mon
         config = check(ExperimentConfig, read_yaml(pipeline), where=pipeline)
         assert (config.reference.inputs["u"].unit, config.reference.outputs["y"].reference.value) == ("V", "gauge")
         assert Path(config.reference.at(pipeline.parent).folder) == tmp_path
+    assert run_cli(["init", "lag", "--reference", "lag.py:lag", *said]) == 2, "it is there"
+    Path("lag/README.md").unlink()  # as a call leaves it that is cut off
+    assert run_cli(["init", "lag", "--reference", "lag.py:lag", *said]) == 0
+    Path("lag/README.md").unlink()
+    assert run_cli(["init", "lag", "--reference", "lag.py:lag", *said[:-1], "50"]) == 2, "another pipeline is there"
 
 
 def test_a_reference_that_never_gives_a_record_is_refused_before_anything_is_written(
