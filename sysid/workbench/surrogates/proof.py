@@ -24,7 +24,8 @@ from sysid.traces import TraceSet
 
 SEED = 77_001
 """Of the proof, behind the design's: no experiment that taught is drawn from it."""
-WORST, POINTS = 10, 400
+DRAWN, POINTS = (3, 10), 400
+"""The worst experiments that are drawn: a tenth of them, but so many at least and at most; and points of a line."""
 FEWEST = 20
 """Experiments of a proof, whatever the time."""
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
@@ -152,8 +153,9 @@ class Proof:
 
     @property
     def worst(self) -> list[int]:
-        """The experiments with the largest errors, the worst first."""
-        return [int(k) for k in np.argsort(-self.errors.max(axis=1), kind="stable")[:WORST]]
+        """The experiments with the largest errors that are drawn, the worst first."""
+        count = int(np.clip(len(self.errors) // 10, *DRAWN))
+        return [int(k) for k in np.argsort(-self.errors.max(axis=1), kind="stable")[:count]]
 
 
 def prove(

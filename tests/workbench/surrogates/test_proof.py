@@ -63,7 +63,7 @@ def test_every_new_experiment_is_within_the_tolerance_of_a_model_that_is_exact(
     assert proof.errors.shape == (12, 1)
     assert proof.errors.max() < 1e-9
     assert (proof.share, proof.share_everywhere, proof.diverged, proof.failed) == (1.0, 1.0, 0, 0)
-    assert len(section.scenes) == 10
+    assert len(section.scenes) == 3, "a tenth of them, but three at least"
     assert "Of 12 new random experiments" in section.method
 
 
