@@ -145,7 +145,8 @@ def _best(
         parts.append(picture(drawing, title, words, f"instants{suffix}"))
         parts.append(_instants_table(fit, instants))
     r = {case: record.free_run.r for case, record in fit.cases.items()}
-    drawing = figures.regression_figure(signals, r, label=output, unit=fit.unit)
+    drawn = {name: signals[name] for name in drawn_cases(fit, most)}
+    drawing = figures.regression_figure(drawn, r, label=output, unit=fit.unit)
     caption = "Free run against target: a perfect model lies on the line."
     parts.append(picture(drawing, f"{fit.name}: target-output regression", caption, f"regression{suffix}"))
     return Section(anchor=f"best{suffix}", title=f"The chosen model: {fit.name}", parts=tuple(parts))

@@ -14,6 +14,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.reporting import read_results, write_report
+from sysid.reporting.figures import fit_figures as figures
 from sysid.validation.metrics import MERITS
 
 PAIR = ("ARX", "NARX free run")
@@ -355,6 +356,20 @@ def test_a_run_that_is_not_as_hoped_is_reported_in_words(
     assert words in "".join(page.texts)
     printed = " ".join(page.texts)
     assert not re.search(r"\b(nan|inf|None)\b", printed)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_regressions_of_a_fit_are_those_of_the_cases_that_are_drawn(
+    make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each is a panel of its own: of 90 cases they took longest of all."""
+    panels, draw = list[list[str]](), figures.regression_figure
+    monkeypatch.setattr(
+        figures, "regression_figure", lambda signals, *a, **k: panels.append([*signals]) or draw(signals, *a, **k)
+    )
+    folder = make_run(tmp_path / "run", samples=50, names=PAIR, edit=lambda document: document.update(drawn=1))
+    write_report(folder)
+    assert [len(names) for names in panels] == [1]
 
 
 def test_signals_that_are_missing_are_named(make_run: Callable[..., Path], tmp_path: Path) -> None:
