@@ -164,7 +164,9 @@ def make_surrogate(
     plan, count = work.planned(found, minutes=minutes, spent=time.monotonic() - began, proof=proof)
     if not iterations and not (folder / TIMES).is_file():
         say(plan.sentence(count))
-    seconds_left = _kept(folder / TIMES, plan.search) - (0.0 if growth is None else GROWING * plan.whole)
+    # A search counts its scores, export and report in its minutes; fits that are asked for do not.
+    seconds_left = _kept(folder / TIMES, plan.search + (0.0 if config.fits else plan.finish))
+    seconds_left -= 0.0 if growth is None else GROWING * plan.whole
     proving = _Proving(
         reference=reference, design=config.experiment, taught=found.traces, count=count, workers=config.workers,
         ends=inf if proof or iterations else began + plan.whole, search_s=seconds_left, say=say,
