@@ -117,10 +117,11 @@ class OrderSearch:
     @property
     def fit(self) -> Fit:
         """The fit of the first of all, with what every fit says of its records."""
-        found = self.contenders[0].fit
-        if isinstance(found.model.structure, ARX):  # those of the search were fitted by the hundred, and say nothing
-            estimation = self.traces.with_role(Role.ESTIMATION)
-            found = estimators.fit(estimation, self.mapping, found.model.structure, start=self.start)
+        structure = self.contenders[0].fit.model.structure
+        # Those of the search were fitted by the dozen, and say nothing.
+        checked = {} if isinstance(structure, ARX) else {"stability": None}
+        estimation = self.traces.with_role(Role.ESTIMATION)
+        found = estimators.fit(estimation, self.mapping, structure, start=self.start, **checked)
         return Fit.of(found, self.traces, self.start)
 
     @property

@@ -113,7 +113,8 @@ def run_structures(
         for n in range(1, most + 1):
             structure = KINDS[kind](n, dead_times)
             try:
-                found = fit(traces, mapping, structure, start=start, stability=None)
+                # Who is chosen gets posterior and remarks.
+                found = fit(traces, mapping, structure, start=start, stability=None, remarks=False)
             except UserError as error:  # too short a record for it, or no start that stays finite
                 notes.append(f"{structure.label} was not fitted: {error.what}.")
                 break

@@ -125,9 +125,7 @@ def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool
             remedy="record for longer, or fit a structure of few parameters with sysid orders or sysid run",
         )
     sentences, total = [told], max(sum(map(len, fitted)) for fitted, _ in pairs)
-    most = SEARCHED
-    if data.selection and wall_s is not None:
-        most = round(min(SEARCHED, max(LEAST_SEARCHED, A_SECOND * wall_s)))
+    most = searched_in(wall_s) if data.selection else SEARCHED
     cut = total > most and bool(data.selection)
     if total > most:
         share, partial = most / total, True
@@ -135,6 +133,22 @@ def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool
         pairs = [(some, rest) for (some, _), (_, rest) in zip(seen, pairs, strict=True)]
         sentences.append(f"Trials saw {seen[0][1]} of what is fitted, and what was chosen all of it.")
     return Parts(folds=tuple(_fold(data, *pair) for pair in pairs), told=tuple(sentences), partial=partial, cut=cut)
+
+
+def searched_in(wall_s: float | None) -> int:
+    """How many samples trials fit where selection traces choose.
+
+    Args:
+        wall_s: Seconds of the search; ``None`` where iterations are counted.
+
+    Returns:
+        Samples of all traces together.
+
+    Example:
+        >>> searched_in(None), searched_in(60.0), searched_in(10.0)
+        (40000, 12000, 8000)
+    """
+    return SEARCHED if wall_s is None else round(min(SEARCHED, max(LEAST_SEARCHED, A_SECOND * wall_s)))
 
 
 def _seen(fitted: Sequence[Trace], share: float) -> tuple[list[Trace], str]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from sysid.references.described import Wish
 from sysid.workbench.listeners import Listeners
+from sysid.workbench.runner.events import Event
 from sysid.workbench.runner.program import Program, carry_out
 from sysid.workbench.surrogates.asked import surrogate_of
 
@@ -43,10 +44,14 @@ def surrogate_command(
     def perform(program: Program[Any], place: Path) -> Any:
         return carry_out(program, place, command=command, watchers=listeners.watchers)
 
+    def watch(event: Event) -> None:
+        for one in (listeners.screen, listeners.log):
+            one(event)
+
     try:
         made = surrogate_of(
             source, wish, out, perform=perform, minutes=minutes, proof=proof, rounds=rounds, workers=workers,
-            seed=seed, began=began, say=lambda text: target.print(text, markup=False, soft_wrap=True),
+            seed=seed, began=began, say=lambda text: target.print(text, markup=False, soft_wrap=True), watch=watch,
         )  # fmt: skip
     finally:
         listeners.screen.close()

@@ -16,6 +16,7 @@ from sysid.names import slug
 from sysid.references.described import Wish
 from sysid.references.sources import KINDS, TABLES, source_of
 from sysid.workbench.fits.config import find_pipeline
+from sysid.workbench.runner.events import Watcher
 from sysid.workbench.surrogates.make import Made, Perform, make_surrogate
 from sysid.workbench.surrogates.plan import written
 from sysid.yaml_files import read_yaml
@@ -180,6 +181,7 @@ def surrogate_of(
     iterations: int | None = None,
     began: float | None = None,
     say: Callable[[str], None] = lambda _: None,
+    watch: Watcher = lambda _: None,
 ) -> Made:
     """Make a surrogate of what is named, which is code, and is run.
 
@@ -196,7 +198,8 @@ def surrogate_of(
         seed: Of everything random.
         iterations: In place of the search's time.
         began: When the time began, by ``time.monotonic``; now by default.
-        say: Told what is run, what was taken from where, what makes a surrogate wrong, and how the proof goes.
+        say: Told what is run, what was taken from where, and what makes a surrogate wrong.
+        watch: Told how the proof goes.
 
     Returns:
         The surrogate.
@@ -225,7 +228,7 @@ def surrogate_of(
         say(f"  {note}")
     made = make_surrogate(
         pipeline, folder, perform=perform, minutes=minutes, proof=proof, iterations=iterations, rounds=rounds,
-        workers=workers, seed=seed, began=began, say=say,
+        workers=workers, seed=seed, began=began, say=say, watch=watch,
     )  # fmt: skip
     return replace(made, proposed=tuple(notes))
 

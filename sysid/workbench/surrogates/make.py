@@ -41,6 +41,7 @@ from sysid.workbench.experiments.run import DATASET, Experimented, Experiments
 from sysid.workbench.experiments.run import program_of as experiment_program
 from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import data_of
+from sysid.workbench.runner.events import StepDone, StepProgress, StepStarted, Watcher
 from sysid.workbench.runner.program import Program
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.surrogates.grown import GROWN, Ground, grow
@@ -66,6 +67,8 @@ LEAST_MINUTES = 0.1
 """Of a surrogate."""
 TOLERANCE = 0.01
 """Share of an output's range: what a proof counts, and what models are chosen by."""
+PROVING = "Proving it on new experiments"
+"""The step of the proof, for people."""
 EXPORT: dict[str, Any] = {"formats": ("c", "fmi2", "fmi3")}
 """What leaves the workbench as a surrogate."""
 
@@ -106,6 +109,7 @@ def make_surrogate(
     seed: int = 0,
     began: float | None = None,
     say: Callable[[str], None] = lambda _: None,
+    watch: Watcher = lambda _: None,
 ) -> Made:
     """Run experiments, find a model of them, or fit the given ones, export it with the reference's ports, and prove it.
 
@@ -120,7 +124,8 @@ def make_surrogate(
         workers: Processes, in place of those of the pipeline.
         seed: Of the search.
         began: When the time began, by ``time.monotonic``; now by default.
-        say: Told what makes a surrogate wrong, and how the proof goes.
+        say: Told what makes a surrogate wrong.
+        watch: Told how the proof goes.
 
     Returns:
         The surrogate.
@@ -169,7 +174,7 @@ def make_surrogate(
     seconds_left -= 0.0 if growth is None else GROWING * plan.whole
     proving = _Proving(
         reference=reference, design=config.experiment, taught=found.traces, count=count, workers=config.workers,
-        ends=inf if proof or iterations else began + plan.whole, search_s=seconds_left, say=say,
+        ends=inf if proof or iterations else began + plan.whole, search_s=seconds_left, watch=watch,
     )  # fmt: skip
     place = folder / "model"
     if config.fits:
@@ -278,7 +283,7 @@ class _Proving:
     workers: int
     ends: float
     search_s: float
-    say: Callable[[str], None]
+    watch: Watcher
     done: dict[Path, Proof] = field(default_factory=dict)
 
     def __call__(self, place: Path) -> Proof:
@@ -286,6 +291,7 @@ class _Proving:
         until = inf
         if np.isfinite(self.ends):
             until = self.ends - page_s(len(self.taught), len(self.reference.outputs), self.search_s)
+        self.watch(StepStarted(step=PROVING))
         proof, section = prove(
             read_bundle(place / "bundle"), self.reference, self.design, self.taught, count=self.count,
             workers=self.workers, tolerance=TOLERANCE, until=until, progress=self._progress,
@@ -293,11 +299,12 @@ class _Proving:
         (place / FOLDER).mkdir(exist_ok=True)
         write_record(place / FOLDER / "proof.json", section)
         self.done[place] = proof
+        within = f"{100.0 * proof.share:.1f} % within {100.0 * TOLERANCE:g} % of the range"
+        self.watch(StepDone(step=PROVING, stored=False, detail=f"{len(proof.errors):,} new experiments, {within}"))
         return proof
 
-    def _progress(self, name: str, n: int, of: int) -> None:
-        if n % max(1, of // 20) == 0:
-            self.say(f"proof: {name} ({n} of {of})")
+    def _progress(self, _: str, n: int, of: int) -> None:
+        self.watch(StepProgress(step=PROVING, fraction=n / of, detail=f"{n:,} of {of:,} experiments"))
 
 
 def _grown(

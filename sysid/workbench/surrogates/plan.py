@@ -20,7 +20,7 @@ from sysid.references.runs import ReferenceRuns
 from sysid.references.sources import Source
 from sysid.references.told import reasons_of
 from sysid.workbench.auto.finish import span
-from sysid.workbench.auto.parts import SEARCHED
+from sysid.workbench.auto.parts import searched_in
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import yaml_text
@@ -46,8 +46,8 @@ KNOWN = """\
 PROOF = 1000
 """New experiments of the proof where there is time for them."""
 FEWEST, ENOUGH, MOST = 8, 12, 60
-"""Experiments that are fitted: at least, where they are long, and at most. More samples than a search looks at would
-make its trials slow; rounds of growth add what is missing."""
+"""Experiments that are fitted: at least, where they are long, and at most. More samples than trials fit in the time
+would make look, scores and report slow, and leave none for the search; rounds of growth add what is missing."""
 
 
 def written(
@@ -141,7 +141,7 @@ def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, wo
         )  # fmt: skip
     one = next(one for one in (one, *more) if one.trace is not None)
     each = one.wall_s if np.isfinite(one.wall_s) else reference.time_limit
-    most = int(np.clip(SEARCHED * reference.sample_time / design.duration, ENOUGH, MOST))
+    most = int(np.clip(searched_in(60.0 * minutes) * reference.sample_time / design.duration, ENOUGH, MOST))
     count = int(np.clip(RUNNING * 60.0 * minutes * workers / max(each, 1e-3) / 1.5, FEWEST, most))
     return Counts(estimation=count, selection=max(3, count // 4), test=max(3, count // 4))
 

@@ -192,8 +192,26 @@ def learning_curve(ready: FitReady) -> list[tuple[int, float]]:
     return [(int(iteration), float(mse)) for iteration, mse in pairs if math.isfinite(mse)]
 
 
+def drawn(ready: FitReady) -> list[str]:
+    """The cases whose lines and pictures are tracked: those that a verdict rests on first, then the others.
+
+    Which they are depends on no fit, so that fits stand side by side; figures are tracked of every case.
+
+    Args:
+        ready: The fit.
+
+    Returns:
+        Their names, in the order of the file; as many as the report draws.
+    """
+    from sysid.reporting.fit_tables import DRAWN, SCORED
+
+    cases = ready.evaluation.cases
+    first = sorted(cases, key=lambda name: cases[name].role not in SCORED)[: ready.pipeline.report.drawn or DRAWN]
+    return [name for name in cases if name in first]
+
+
 def lines(ready: FitReady) -> Iterator[tuple[str, int, float]]:
-    """Target and free run of each case as lines over its samples, so that a chart has those of several fits in one.
+    """Target and free run of the drawn cases as lines over their samples: a chart has those of several fits in one.
 
     Args:
         ready: The fit.
@@ -204,7 +222,8 @@ def lines(ready: FitReady) -> Iterator[tuple[str, int, float]]:
     from sysid.reporting.figures.thinning import thin
 
     keys = distinct(ready.evaluation.cases, tracking_key)
-    for name, case in ready.evaluation.cases.items():
+    for name in drawn(ready):
+        case = ready.evaluation.cases[name]
         both, samples = {TARGET: case.target, OUTPUT: case.simulated}, np.arange(len(case.target), dtype=np.float64)
         kept = np.unique(np.concatenate([thin(samples, values, COLUMNS)[0] for values in both.values()])).astype(int)
         for line, values in both.items():
@@ -213,7 +232,7 @@ def lines(ready: FitReady) -> Iterator[tuple[str, int, float]]:
 
 
 def pictures(ready: FitReady) -> Iterator[tuple[str, NDArray[np.uint8]]]:
-    """Target and output of each case, drawn.
+    """Target and output of the cases of :func:`drawn`: of 90 cases pictures took longer than the search and its report.
 
     The key is the case, and the same for every fit, so that fits stand side by side.
 
@@ -224,8 +243,8 @@ def pictures(ready: FitReady) -> Iterator[tuple[str, NDArray[np.uint8]]]:
         Key and picture, shape ``(height, width, 3)``.
     """
     keys = distinct(ready.evaluation.cases, tracking_key)
-    for name, case in ready.evaluation.cases.items():
-        yield f"target and output/{keys[name]}", _picture(ready, case)
+    for name in drawn(ready):
+        yield f"target and output/{keys[name]}", _picture(ready, ready.evaluation.cases[name])
 
 
 def _picture(ready: FitReady, case: CaseResult) -> NDArray[np.uint8]:

@@ -139,7 +139,8 @@ class Tracker:
             tracked_fit.log_values(self.client, run_id, ready, tracking.entities())
             tracking.log_data(self.client, run_id, self.data.traces)
             tracked_fit.log_pictures(self.client, run_id, ready)
-            views.show(self.client, experiment, list(distinct(ready.evaluation.cases, tracking_key).values()))
+            keys = distinct(ready.evaluation.cases, tracking_key)
+            views.show(self.client, experiment, [keys[name] for name in tracked.drawn(ready)])
             status = "FINISHED"
         finally:
             self.client.set_terminated(run_id, status=status)

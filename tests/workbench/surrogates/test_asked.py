@@ -73,7 +73,7 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         return folder / "experiment.yaml", ["u: 0 to 2, as was said"]
 
     def make(pipeline: Path, folder: Path, **more: object) -> None:
-        ours = {name: value for name, value in more.items() if name not in {"perform", "began", "say"}}
+        ours = {name: value for name, value in more.items() if name not in {"perform", "began", "say", "watch"}}
         found.append({"pipeline": pipeline, "folder": folder, **ours})
         raise ConfigError("far enough", where="here", expected="", got="", remedy="")
 

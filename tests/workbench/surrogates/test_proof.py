@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -28,9 +29,11 @@ from sysid.workbench.auto.families import Family, Try
 from sysid.workbench.cli import run_cli
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.experiments.run import Experimented, Experiments
+from sysid.workbench.runner.events import Event, StepDone, StepProgress
 from sysid.workbench.surrogates import make
+from sysid.workbench.surrogates.asked import surrogate_of
 from sysid.workbench.surrogates.make import beginning_of, restless
-from sysid.workbench.surrogates.plan import times, written
+from sysid.workbench.surrogates.plan import affordable, times, written
 from sysid.workbench.surrogates.proof import Proof, _begun_until, fmu_of, prove
 from sysid.yaml_files import read_yaml
 
@@ -163,7 +166,16 @@ def test_the_page_of_a_search_is_made_once_and_has_the_proof(tmp_path: Path, mon
     content = {"kind": "experiment", "name": "lag", "workers": 1, "reference": REFERENCE}
     content["experiment"] = {"duration": 20.0, "runs": runs}
     (tmp_path / "lag.yaml").write_text(json.dumps(content), encoding="utf-8")
-    made = sysid.surrogate(tmp_path / "lag.yaml", tmp_path / "out", iterations=20, proof=4)
+    told: list[Event] = []
+    with monkeypatch.context() as patch:
+        patch.setattr("sysid.workbench.surrogates.python.surrogate_of", partial(surrogate_of, watch=told.append))
+        made = sysid.surrogate(tmp_path / "lag.yaml", tmp_path / "out", iterations=20, proof=4)
+    # One step whose progress a terminal shows in a line, and of which a file has only the end.
+    assert [type(one).__name__ for one in told] == ["StepStarted", *4 * ["StepProgress"], "StepDone"]
+    assert isinstance(told[-2], StepProgress)
+    assert told[-2].fraction == 1.0
+    assert isinstance(told[-1], StepDone)
+    assert told[-1].detail == "4 new experiments, 100.0 % within 1 % of the range"
     assert made.proof.errors.max() < 1e-9
     assert made_of == [tmp_path / "out" / "model"]
     assert "Of 4 new random experiments" in made.report.read_text(encoding="utf-8")
@@ -206,6 +218,18 @@ def test_what_takes_longer_than_was_asked_for_is_told(proven: tuple[Bundle, Proo
     assert "of 12 experiments, not of 40, as the time was up" in short
     assert "it took 1.5 min, 30 s more than was asked for" in over
     assert len(make._short_of_time(proven[1], plan, 40, took=90.0, asked=True)) == 1
+
+
+@pytest.mark.parametrize(("minutes", "count"), [(0.5, 16), (1.0, 24), (60.0, 60)])
+def test_no_more_experiments_are_asked_for_than_trials_fit_in_the_time(
+    minutes: float, count: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Of a minute, ninety records took the search all that it had: their look, scores and pictures."""
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path))
+    config = ReferenceConfig.model_validate(REFERENCE)
+    design = Design.model_validate({"duration": 250.0})
+    found = affordable(config, design, minutes=minutes, workers=2)
+    assert (found.estimation, found.selection, found.test) == (count, count // 4, count // 4)
 
 
 def test_what_experiments_take_is_told_before_they_are_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

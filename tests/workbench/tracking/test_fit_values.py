@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from sysid.workbench.tracking.fit_values import MAX_METRICS, batches
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from sysid.reporting.fit_tables import DRAWN
+from sysid.traces import Role
+from sysid.workbench.tracking import fit_values
+from sysid.workbench.tracking.fit_values import MAX_METRICS, batches, drawn
 
 
 def test_metrics_go_in_as_many_batches_as_the_store_needs():
@@ -10,3 +18,23 @@ def test_metrics_go_in_as_many_batches_as_the_store_needs():
     assert [len(one) for one in batches(values)] == [MAX_METRICS, MAX_METRICS, 1]
     assert [value for one in batches(values) for value in one] == values
     assert list(batches([])) == []
+
+
+def many_cases(asked: int | None = None) -> Any:
+    """A fit of sixty cases, of which ten test it."""
+    cases = {f"EST{k}": SimpleNamespace(role=Role.ESTIMATION) for k in range(50)}
+    cases |= {f"TST{k}": SimpleNamespace(role=Role.TEST) for k in range(10)}
+    report = SimpleNamespace(drawn=asked)
+    return SimpleNamespace(evaluation=SimpleNamespace(cases=cases), pipeline=SimpleNamespace(report=report))
+
+
+def test_pictures_are_tracked_of_as_many_cases_as_the_report_draws_those_that_test_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tests = [f"TST{k}" for k in range(10)]
+    assert drawn(many_cases()) == ["EST0", "EST1", *tests]
+    assert len(drawn(many_cases())) == DRAWN
+    assert drawn(many_cases(3)) == tests[:3]
+    monkeypatch.setattr(fit_values, "_picture", lambda _, case: case.role)
+    pictures = dict(fit_values.pictures(cast("Any", many_cases(3))))
+    assert pictures == dict.fromkeys([f"target and output/{name}" for name in tests[:3]], Role.TEST)
