@@ -290,7 +290,7 @@ def test_everything_that_a_fit_runs_is_covered(kind: str) -> None:
 
 
 def test_a_kernel_concerns_the_fits_that_run_it() -> None:
-    kernel = "sysid.kernels.recursion:free_run"
+    kernel = "sysid.kernels.cascade:go_on"
     concerned = {
         kind for kind, (structure, _) in STRUCTURES.items() if kernel in reached(*estimator_of(structure).runs)
     }

@@ -7,18 +7,20 @@ for every type of argument, of which an array that can be written and one that c
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+_Number = TypeVar("_Number", np.float64, np.uintp)
+
 FAST = {"reassoc", "contract", "arcp", "nsz"}
 """Sums may be reordered, which is what lets the compiler vectorise them; NaN and infinity keep their meaning."""
 
 
-def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+def read_only(array: NDArray[_Number]) -> NDArray[_Number]:
     """A view that cannot be written, as the parameters of a model cannot: training and models run one compiled kernel.
 
     Args:

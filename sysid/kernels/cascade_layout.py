@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from sysid.kernels.arrays import read_only
 from sysid.kernels.registers import LANES
 
 
@@ -100,89 +101,89 @@ class Program(NamedTuple):
     limit_channel: NDArray[np.int64]
     equations: Equations
 
+    @property
+    def bounds_in_units(self) -> NDArray[np.float64]:
+        """The bounds of each output in its unit, shape ``(n_outputs, 2)``."""
+        return self.bounds * self.output_scale[:, None] + self.output_offset[:, None]
 
-class Sums(NamedTuple):
-    """Outputs of members without neurons that are held between two numbers, in the order in which they run.
-
-    What the pass needs of one stands side by side, numbers in one array and indices at the same places of another:
-    constant, low, high, then a weight for each term; and number of terms, channel that is written, position among the
-    outputs, then a regressor for each term. There may be five of them for each network, and what they compute is so
-    little that looking it up in the program would take longer.
-
-    Attributes:
-        first: Where each level begins among them; one more entry than levels.
-        numbers: Between units.
-        indices: Not negative.
-        codes: What their bounds are called where they hold, shape ``(n_sums, 2)``.
-    """
-
-    first: NDArray[np.int64]
-    numbers: NDArray[np.float64]
-    indices: NDArray[np.uint64]
-    codes: NDArray[np.int64]
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """What the pass is given: parameters of all members, and behind them the registers of equations."""
+        return read_only(np.concatenate([self.theta, self.equations.registers]))
 
 
-class Layout(NamedTuple):
-    """A program as the pass over the samples reads it.
+# A plan is two flat arrays, one of integers and one of numbers: a call of the pass unpacks two of them, and not fifty,
+# which took it 6 to 8 us. The integers begin with where each part of either array begins. A part is a stretch of one of
+# them, often rows of a fixed width: what the pass needs at once stands side by side.
+(
+    NETWORKS,  # a row for each member that has neurons, level by level
+    NETWORK_FIRST,  # where each level begins among them; one more entry than levels, as below
+    NEURONS_FIRST,  # where each level begins among all their neurons, with their padding
+    OUTPUTS,  # a row for each output that is more than a sum between two numbers, level by level
+    OUTPUT_FIRST,  # where each level begins among them
+    SUM_FIRST,  # where each level begins among the sums
+    SUM_INDICES,  # of the sums; see SUM_HEAD
+    SUM_CODES,  # what the two numbers are called where they hold, a pair for each sum
+    LAGS,  # of every regressor
+    CHANNELS,  # of every regressor
+    KEPT,  # of every member how many neurons, and where they stand among all with their padding
+    CODE,  # instructions of equations, five numbers each
+    TABLES,  # of each of their tables its first row and its rows
+    SIZES,  # weights, readouts, neurons with their padding, and whether neurons are all of the first kind
+    MOVED,  # pairs of places: a constant that loses a multiple of a parameter, and this
+    WEIGHTS,  # pairs of places: among the weights of neurons and gates, and of the parameter that stands there
+    READOUTS,  # likewise among the readouts
+    TERMS,  # likewise among the numbers of sums
+    N_INTEGERS,
+    DIVISOR,  # of each parameter the scale of what it acts on
+    TIMES,  # the multiples that constants lose
+    FACTOR,  # of each parameter the scale of what it acts for
+    SHIFT,  # what is added to it
+    HOLDS,  # four numbers a row of OUTPUTS: between what it is held, by its limits alone unless FIXED; its bounds
+    SUM_NUMBERS,  # of the sums, without parameters
+    WIDTHS,  # of the switches of equations
+    TABLE_ROWS,  # rows of all tables, two numbers each
+    N_PARTS,
+) = range(28)
 
-    Attributes:
-        theta: Parameters as they act between channels in their units, in the program's order.
-        bounds: Of each output in its unit, shape ``(n_outputs, 2)``.
-        networks: Members that have neurons, level by level.
-        network_first: Where each level begins among them; one more entry than levels.
-        neurons_first: Where each level begins among all their neurons, with their padding; one more entry than levels.
-        weights: Of neurons and gates in blocks (``sysid/kernels/registers.py``), networks in that order.
-        weights_first: Where those of each member begin.
-        blocks: Blocks of neurons of each member.
-        gate_blocks: Blocks of its gates: as many, or none.
-        neuron_first: Where each member's neurons stand among all, with their padding.
-        readout: Readouts of all outputs; gates write theirs anew at every sample.
-        readout_first: Where each output's begin.
-        sums: What is no more than a sum between two numbers.
-        order_y: The other outputs level by level.
-        level_first_y: Where each level begins among them; one more entry than levels.
-        member: The member of each output.
-        constant: Where the constant of each output stands in ``theta``.
-        linear_first: Where its linear part begins in ``theta``; -1 for none.
-        fixed: Whether bounds and limits of an output are a pair of numbers: no channel is among them, and they overlap.
-        fixed_limits: Between what it is held then, by bounds and limits together, shape ``(n_outputs, 2)``.
-        fixed_codes: And which of them that is.
-    """
-
-    theta: NDArray[np.float64]
-    bounds: NDArray[np.float64]
-    networks: NDArray[np.int64]
-    network_first: NDArray[np.int64]
-    neurons_first: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    weights_first: NDArray[np.int64]
-    blocks: NDArray[np.int64]
-    gate_blocks: NDArray[np.int64]
-    neuron_first: NDArray[np.int64]
-    readout: NDArray[np.float64]
-    readout_first: NDArray[np.int64]
-    sums: Sums
-    order_y: NDArray[np.int64]
-    level_first_y: NDArray[np.int64]
-    member: NDArray[np.int64]
-    constant: NDArray[np.int64]
-    linear_first: NDArray[np.int64]
-    fixed: NDArray[np.bool_]
-    fixed_limits: NDArray[np.float64]
-    fixed_codes: NDArray[np.int64]
-
+(N_FIRST_X, N_N_X, N_WEIGHTS, N_NEURONS, N_BLOCKS, N_GATES, N_GATE_BLOCKS, N_KIND, NETWORK_ROW) = map(
+    np.uintp, range(9)
+)
+"""A row of networks: first regressor, regressors, first weight, first neuron, blocks of neurons, where its gates are
+written among the readouts, blocks of gates (as many, or none), kind."""
+(
+    WHAT,  # OF_A_NETWORK, OF_AN_EQUATION or OF_A_SUM
+    CHANNEL,  # the column that it is
+    POSITION,  # among the outputs
+    FIRST_X,  # first regressor
+    N_X,  # regressors
+    CONSTANT,  # place of its constant
+    LINEAR,  # one more than where its linear part begins; 0 for none
+    FIXED,  # whether bounds and limits are a pair of numbers: no channel is among them, and they overlap
+    LOW_CODE,  # what the lower of the pair, or limit, is called
+    HIGH_CODE,  # what the upper is
+    LOW_AT,  # one more than the channel that is its lower limit; 0 for none
+    HIGH_AT,  # likewise its upper limit
+    FIRST,  # of a network its first readout; of an equation the first register that is written
+    SECOND,  # its first neuron; where regressors begin among the registers
+    THIRD,  # its blocks of neurons; its first instruction
+    END,  # of an equation one more than its last instruction
+    RESULT,  # of an equation the register that is the output
+    OUTPUT_ROW,
+) = map(np.uintp, range(18))
+"""A row of outputs."""
+OF_A_NETWORK, OF_AN_EQUATION, OF_A_SUM = 0, 1, 2
 
 SUM_HEAD = 3
-"""Numbers of a sum before its terms."""
+"""Numbers of a sum before its terms.
+
+Outputs of members without neurons that are held between two numbers stand in the order in which they run, numbers in
+one part and indices at the same places of another: constant, low, high, then a weight for each term; and number of
+terms, channel that is written, position among the outputs, then a regressor for each term. There may be five of them
+for each network, and what they compute is so little that looking it up elsewhere would take longer."""
 
 FREE, LOW, HIGH, LOW_CHANNEL, HIGH_CHANNEL, LOST = 0, 1, 2, 3, 4, 5
 """What held an output at a sample: nothing; a constant limit; a limit that is a channel; the bound of the network."""
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def padded(n):
-    """Neurons with their padding."""
-    return (n + LANES - 1) // LANES * LANES
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -198,14 +199,3 @@ def from_a_line(size):
     room = np.zeros(size + LANES)
     skipped = (LANES - (room.ctypes.data // room.itemsize) % LANES) % LANES
     return room[skipped : skipped + size]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def put(weights, first, theta, rows_at, constants_at, n, n_x):
-    """Put weights and constants of neurons or gates into blocks; where the next begin."""
-    for k in range(n):
-        own = first + k // LANES * LANES * (n_x + 1) + k % LANES
-        for i in range(n_x):
-            weights[own + LANES * i] = theta[rows_at + k * n_x + i]
-        weights[own + LANES * n_x] = theta[constants_at + k]
-    return first + padded(n) * (n_x + 1)

@@ -1,8 +1,7 @@
-r"""The layout of a cascade: what its wiring says, once, and what parameters say, each time they change.
+r"""The plan of a cascade: what its wiring says, once, for whatever parameters the pass is given.
 
 Where everything stands in the pass over the samples follows from the wiring alone. A plan holds it as places: which
-parameter goes where, what it is divided by and multiplied with on the way. So a layout for other parameters is a few
-operations on whole arrays, and none of it has to be compiled.
+parameter goes where, what it is divided by and multiplied with on the way. The pass lays other parameters out itself.
 
 Where a member reads :math:`x = (u - o) / s`, the weights :math:`W / s` act on :math:`u` itself, and the constants lose
 :math:`W o / s`; where it puts out :math:`y` as :math:`s y + o`, its readouts, gates and linear part are :math:`s` times
@@ -13,68 +12,53 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.kernels.cascade_layout import HIGH, LOST, LOW, SUM_HEAD, Layout, Program, Sums, from_a_line
+from sysid.kernels import cascade_layout as layout
+from sysid.kernels.arrays import read_only
+from sysid.kernels.cascade_layout import HIGH, HIGH_CHANNEL, LOST, LOW, LOW_CHANNEL, SUM_HEAD, Program
 from sysid.kernels.registers import LANES
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Plan:
-    """Where everything of a program stands in its layout.
+class Plan(NamedTuple):
+    """Where everything of a program stands in the pass, whatever its parameters are.
 
-    Args:
-        wired: The layout, with whatever hangs on parameters at zero.
-        divisor: Of each parameter the scale of what it acts on.
-        lost: Places of constants that lose a multiple of a weight, of these weights, and the multiples.
-        factor: Of each parameter the scale of what it acts for.
-        shift: What is added to it.
-        weights: Places in the weights, and of the parameters that stand there.
-        readout: Likewise in the readouts.
-        numbers: Likewise in the numbers of sums.
+    Attributes:
+        places: Where each part begins, then the parts that are integers (``sysid/kernels/cascade_layout.py``).
+        numbers: The parts that are numbers.
     """
 
-    wired: Layout
-    divisor: Array
-    lost: tuple[Places, Places, Array]
-    factor: Array
-    shift: Array
-    weights: tuple[Places, Places]
-    readout: tuple[Places, Places]
-    numbers: tuple[Places, Places]
+    places: NDArray[np.uintp]
+    numbers: Array
 
     @classmethod
     def of(cls, p: Program) -> Plan:
-        """The plan of a program, whatever its parameters are."""
-        return _Planning(p).plan()
+        """The plan of a program."""
+        parts = _Planning(p).parts()
+        integers, numbers = (
+            [np.ravel(parts[part]) for part in range(*some)]
+            for some in ((layout.N_INTEGERS,), (layout.N_INTEGERS + 1, layout.N_PARTS))
+        )
+        begins = [1 + layout.N_PARTS + firsts(map(len, integers)), firsts(map(len, numbers))]
+        places = np.concatenate([some.astype(np.uintp) for some in (*begins, *integers)])
+        return cls(read_only(places), read_only(np.concatenate(numbers)))
 
-    def laid_out(self, theta: Array) -> Layout:
-        """The layout with some parameters.
+    def part(self, one: int) -> NDArray[np.uintp] | Array:
+        """One part of it.
 
         Args:
-            theta: Parameters of all members, one after the other, as the program's.
+            one: Which, as ``sysid/kernels/cascade_layout.py`` names them.
 
         Returns:
-            The layout.
+            It, flat.
         """
-        acting = theta / self.divisor
-        to, by, times = self.lost
-        np.subtract.at(acting, to, acting[by] * times)
-        acting *= self.factor
-        acting += self.shift
-        wired = self.wired
-        weights, readout = from_a_line(len(wired.weights)), from_a_line(len(wired.readout))
-        numbers = wired.sums.numbers.copy()
-        for target, (places, sources) in (
-            (weights, self.weights), (readout, self.readout), (numbers, self.numbers),
-        ):  # fmt: skip
-            target[places] = acting[sources]
-        return wired._replace(theta=acting, weights=weights, readout=readout, sums=wired.sums._replace(numbers=numbers))
+        return (self.places if one < layout.N_INTEGERS else self.numbers)[slice(*self.places[one : one + 2].tolist())]
 
 
 @dataclass
@@ -89,9 +73,9 @@ class _Places:
         self.of.append(np.ravel(of))
 
     @property
-    def both(self) -> tuple[Places, Places]:
+    def pairs(self) -> Places:
         nothing = [np.empty(0, dtype=np.int64)]
-        return np.concatenate(self.to + nothing), np.concatenate(self.of + nothing)
+        return np.column_stack([np.concatenate(self.to + nothing), np.concatenate(self.of + nothing)])
 
 
 class _Member:
@@ -122,7 +106,7 @@ class _Planning:
     def __init__(self, p: Program) -> None:
         self.p = p
         self.members = [_Member(p, m) for m in range(len(p.neurons))]
-        self.bounds = p.bounds * p.output_scale[:, None] + p.output_offset[:, None]
+        self.bounds = p.bounds_in_units
         self._fix()
         self.is_sum = self.fixed.copy()
         for member, is_equation in zip(self.members, p.equations.is_one, strict=True):
@@ -133,10 +117,12 @@ class _Planning:
         """Which outputs are held between two numbers, which these are, and what each of them is."""
         p, bounds = self.p, self.bounds
         lost = np.column_stack([bounds[:, 0] >= p.limits[:, 0], bounds[:, 1] <= p.limits[:, 1]])
-        self.limits = np.where(lost, bounds, p.limits)
-        self.codes = np.where(lost, LOST, np.array([LOW, HIGH])).astype(np.int64)
+        between = np.where(lost, bounds, p.limits)
         # Where one is outside the other, what holds is a matter of order.
-        self.fixed = (p.limit_channel < 0).all(axis=1) & (self.limits[:, 0] <= self.limits[:, 1])
+        self.fixed = (p.limit_channel < 0).all(axis=1) & (between[:, 0] <= between[:, 1])
+        codes = np.where(p.limit_channel < 0, np.array([LOW, HIGH]), np.array([LOW_CHANNEL, HIGH_CHANNEL]))
+        lost &= self.fixed[:, None]
+        self.limits, self.codes = np.where(lost, bounds, p.limits), np.where(lost, LOST, codes).astype(np.int64)
 
     def _order(self) -> None:
         """Members level by level, each with its sums at the end, and where each level begins."""
@@ -154,90 +140,99 @@ class _Planning:
         self.levels = range(max(level) + 1)
         self.by_level = [[m for m in self.order if level[m] == one] for one in self.levels]
 
-    def plan(self) -> Plan:
+    def parts(self) -> dict[int, Places | Array]:
         """All of it."""
-        p = self.p
-        weights, weights_first, gate_blocks, neuron_first, n_weights = self._blocks()
-        readout, readout_first, n_readout = self._readouts()
-        numbers, sums = self._sums()
-        networks = [[m for m in some if self.members[m].n] for some in self.by_level]
+        p, members = self.p, self.members
         others = [self._outputs(some, sums=False) for some in self.by_level]
-        divisor, lost, factor, shift = self._units()
-        wired = Layout(
-            theta=np.zeros(len(p.theta)),
-            bounds=self.bounds,
-            networks=_whole([m for some in networks for m in some]),
-            network_first=firsts(map(len, networks)),
-            neurons_first=firsts(sum(LANES * self.members[m].blocks for m in some) for some in networks),
-            weights=np.zeros(n_weights),
-            weights_first=weights_first,
-            blocks=_whole([member.blocks for member in self.members]),
-            gate_blocks=gate_blocks,
-            neuron_first=neuron_first,
-            readout=np.zeros(n_readout),
-            readout_first=readout_first,
-            sums=sums,
-            order_y=_whole([o for some in others for o in some]),
-            level_first_y=firsts(map(len, others)),
-            member=np.repeat(np.arange(len(self.members)), np.diff(p.output_first)),
-            constant=np.concatenate([member.constant for member in self.members]),
-            linear_first=self._linear(),
-            fixed=self.fixed,
-            fixed_limits=self.limits,
-            fixed_codes=self.codes,
-        )
-        return Plan(
-            wired=wired, divisor=divisor, lost=lost, factor=factor, shift=shift, weights=weights, readout=readout,
-            numbers=numbers,
-        )  # fmt: skip
+        networks = [[m for m in some if members[m].n] for some in self.by_level]
+        pieces = self._networks([m for some in networks for m in some])
+        return {
+            **pieces,
+            **self._others([o for some in others for o in some], pieces),
+            **self._sums(),
+            **self._units(),
+            layout.NETWORK_FIRST: firsts(map(len, networks)),
+            layout.NEURONS_FIRST: firsts(sum(LANES * members[m].blocks for m in some) for some in networks),
+            layout.OUTPUT_FIRST: firsts(map(len, others)),
+            layout.LAGS: p.regressor_lag,
+            layout.CHANNELS: p.regressor_channel,
+            layout.CODE: p.equations.code.astype(np.int64),
+            layout.TABLES: p.equations.places,
+            layout.WIDTHS: p.equations.widths,
+            layout.TABLE_ROWS: p.equations.table,
+        }
 
     def _outputs(self, members: list[int], *, sums: bool) -> list[int]:
         """The outputs of some members that are sums, or the others."""
         every = [o for m in members for o in range(self.members[m].y.start, self.members[m].y.stop)]
         return [o for o in every if self.is_sum[o] == sums]
 
-    def _linear(self) -> Places:
-        firsts = [
-            member.linear[:, 0] if member.is_linear and member.n_x else np.full(member.n_y, -1)
-            for member in self.members
-        ]
-        return np.concatenate(firsts).astype(np.int64)
-
-    def _blocks(self) -> tuple[tuple[Places, Places], Places, Places, Places, int]:
-        """Neurons and gates in blocks, members in the order in which they run."""
-        places, at, at_neuron = _Places(), 0, 0
-        first, gate_blocks, neuron_first = (np.zeros(len(self.members), dtype=np.int64) for _ in range(3))
-        for m in self.order:
+    def _networks(self, order: list[int]) -> dict[int, Places | Array]:
+        """Networks in the order in which they run: neurons and gates in blocks, and their readouts."""
+        weights, readouts, at, at_neuron, at_readout = _Places(), _Places(), 0, 0, 0
+        rows, kept = [], np.column_stack([self.p.neurons, np.zeros_like(self.p.neurons)])
+        for m in order:
             one = self.members[m]
-            first[m], neuron_first[m] = at, at_neuron
-            at_neuron += LANES * one.blocks
-            for rows, constants in ((one.weights, one.biases), (one.gates, one.readout[0])):
-                if len(rows):
+            wide = LANES * one.blocks
+            gate_blocks, kept[m, 1] = one.blocks if len(one.gates) else 0, at_neuron
+            rows.append([one.x.start, one.n_x, at, at_neuron, one.blocks, at_readout, gate_blocks, self.p.kinds[m]])
+            for values, constants in ((one.weights, one.biases), (one.gates, one.readout[0])):
+                if len(values):
                     k = np.arange(one.n)
                     own = at + k // LANES * LANES * (one.n_x + 1) + k % LANES
-                    places.put(own[:, None] + LANES * np.arange(one.n_x), rows)
-                    places.put(own + LANES * one.n_x, constants)
-                    at += LANES * one.blocks * (one.n_x + 1)
-            gate_blocks[m] = one.blocks if len(one.gates) else 0
-        return places.both, first, gate_blocks, neuron_first, at
-
-    def _readouts(self) -> tuple[tuple[Places, Places], Places, int]:
-        places, at = _Places(), 0
-        first = np.zeros(len(self.p.output_channel), dtype=np.int64)
-        for m in self.order:
-            one = self.members[m]
+                    weights.put(own[:, None] + LANES * np.arange(one.n_x), values)
+                    weights.put(own + LANES * one.n_x, constants)
+                    at += wide * (one.n_x + 1)
             for j in range(one.n_y):
-                first[one.y.start + j] = at
-                places.put(at + np.arange(one.n), one.readout[j])
-                at += LANES * one.blocks
-        return places.both, first, at
+                readouts.put(at_readout + wide * j + np.arange(one.n), one.readout[j])
+            at_neuron, at_readout = at_neuron + wide, at_readout + wide * one.n_y
+        return {
+            layout.NETWORKS: np.array(rows, dtype=np.int64).reshape(-1, int(layout.NETWORK_ROW)),
+            layout.KEPT: kept,
+            layout.SIZES: np.array([at, at_readout, at_neuron, not self.p.kinds.any()], dtype=np.int64),
+            layout.WEIGHTS: weights.pairs,
+            layout.READOUTS: readouts.pairs,
+        }
 
-    def _sums(self) -> tuple[tuple[Places, Places], Sums]:
+    def _others(self, outputs: list[int], networks: dict[int, Places | Array]) -> dict[int, Places | Array]:
+        """What the pass needs of each output that is more than a sum between two numbers."""
+        p, e = self.p, self.p.equations
+        of_network = {int(row[int(layout.N_FIRST_X)]): row for row in networks[layout.NETWORKS]}
+        rows, holds = [], []
+        for o in outputs:
+            m = self._owner(o)
+            one = self.members[m]
+            j = o - one.y.start
+            if one.n:
+                row = of_network[one.x.start]
+                first = int(row[int(layout.N_GATES)]) + LANES * one.blocks * j
+                what, own = layout.OF_A_NETWORK, [first, int(row[int(layout.N_NEURONS)]), one.blocks, 0, 0]
+            elif e.is_one[m]:
+                what, own = layout.OF_AN_EQUATION, [e.first[m], e.given[m], *e.code_first[m : m + 2], e.result[m]]
+            else:
+                what, own = layout.OF_A_SUM, [0] * 5
+            linear = 1 + int(one.linear[j, 0]) if one.is_linear and one.n_x else 0
+            limits = 1 + p.limit_channel[o]
+            rows.append(
+                [what, p.output_channel[o], o, one.x.start, one.n_x, one.constant[j], linear, self.fixed[o],
+                 *self.codes[o], *limits, *own]
+            )  # fmt: skip
+            holds.append([*self.limits[o], *self.bounds[o]])
+        return {
+            layout.OUTPUTS: np.array(rows, dtype=np.int64).reshape(-1, int(layout.OUTPUT_ROW)),
+            layout.HOLDS: np.array(holds, dtype=np.float64),
+        }
+
+    def _owner(self, o: int) -> int:
+        """The member of an output."""
+        return int(np.searchsorted(self.p.output_first, o, side="right")) - 1
+
+    def _sums(self) -> dict[int, Places | Array]:
         """Outputs that are sums, with what the pass needs of each side by side."""
         p, places, numbers, indices, codes = self.p, _Places(), list[float](), list[int](), list[Places]()
         by_level = [self._outputs(some, sums=True) for some in self.by_level]
         for o in (o for some in by_level for o in some):
-            member = self.members[int(np.searchsorted(p.output_first, o, side="right")) - 1]
+            member = self.members[self._owner(o)]
             j, at = o - member.y.start, len(numbers)
             terms = member.linear[j] if member.is_linear else np.empty(0, dtype=np.int64)
             places.put(np.array([at]), member.constant[j : j + 1])
@@ -245,15 +240,15 @@ class _Planning:
             numbers += [0.0, *self.limits[o], *[0.0] * len(terms)]
             indices += [len(terms), int(p.output_channel[o]), o, *range(member.x.start, member.x.start + len(terms))]
             codes.append(self.codes[o])
-        sums = Sums(
-            first=firsts(map(len, by_level)),
-            numbers=np.array(numbers, dtype=np.float64),
-            indices=np.array(indices, dtype=np.uint64),
-            codes=np.array(codes, dtype=np.int64).reshape(-1, 2),
-        )
-        return places.both, sums
+        return {
+            layout.SUM_FIRST: firsts(map(len, by_level)),
+            layout.SUM_INDICES: np.array(indices, dtype=np.int64),
+            layout.SUM_CODES: np.array(codes, dtype=np.int64),
+            layout.SUM_NUMBERS: np.array(numbers, dtype=np.float64),
+            layout.TERMS: places.pairs,
+        }
 
-    def _units(self) -> tuple[Array, tuple[Places, Places, Array], Array, Array]:
+    def _units(self) -> dict[int, Places | Array]:
         """What makes parameters act between channels in their units."""
         p, n = self.p, len(self.p.theta)
         divisor, factor, shift, lost, times = np.ones(n), np.ones(n), np.zeros(n), _Places(), list[Array]()
@@ -269,14 +264,20 @@ class _Planning:
             factor[one.gates] = size[0]
             factor[one.readout], factor[one.linear] = size[:, None], size[: len(one.linear), None]
             factor[one.constant], shift[one.constant] = size, p.output_offset[one.y]
-        to, by = lost.both
-        return divisor, (to, by, np.concatenate([*times, np.empty(0)])), factor, shift
-
-
-def _whole(values: list[int]) -> Places:
-    return np.array(values, dtype=np.int64)
+        return {
+            layout.MOVED: lost.pairs,
+            layout.TIMES: np.concatenate([*times, np.empty(0)]),
+            layout.DIVISOR: divisor,
+            layout.FACTOR: factor,
+            layout.SHIFT: shift,
+        }
 
 
 def firsts(counts: Iterable[int]) -> Places:
     """Where each of some things begins that stand one after the other, and where the last ends; by how long each is."""
     return np.concatenate([[0], np.cumsum([*counts])]).astype(np.int64)
+
+
+def planned(p: Program) -> tuple[NDArray[np.uintp], Array, Array]:
+    """What the pass is given of a program: places and numbers of its plan, and its own numbers."""
+    return *Plan.of(p), p.numbers

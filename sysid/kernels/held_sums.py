@@ -1,4 +1,4 @@
-"""What every pass does with an output at every sample, of a network alone and in a whole: sum it up, and hold it."""
+"""What both passes, of one record and of many in lockstep, do with an output at every sample: sum it up, hold it."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.kernels import cascade as one_record
 from sysid.kernels import cascade_lanes as kernel
 from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage
@@ -97,7 +98,7 @@ def simulate_records(
     groups = workers * -(-n // (workers * MAX_LANES))
     ends = [round(n * i / groups) for i in range(groups + 1)]
 
-    acting = stage.layout.theta, stage.layout.bounds
+    acting = one_record.acting(*stage.planned), stage.program.bounds_in_units
 
     def work(group: int) -> None:
         own = slice(ends[group], ends[group + 1])

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels import cascade as kernel
-from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, Layout, Program
-from sysid.kernels.cascade_plan import Plan
+from sysid.kernels.cascade_layout import FREE, HIGH, HIGH_CHANNEL, LOW, LOW_CHANNEL, Program
+from sysid.kernels.cascade_plan import planned
 from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit, program_of
 from sysid.models.column_recursion import ColumnRecursion
@@ -39,9 +39,9 @@ class CompiledStage:
     program: Program
 
     @cached_property
-    def layout(self) -> Layout:
-        """How they are laid out."""
-        return Plan.of(self.program).laid_out(self.program.theta)
+    def planned(self) -> tuple[NDArray[np.uintp], NDArray[np.float64], NDArray[np.float64]]:
+        """What the pass is given of them: their plan, and their numbers."""
+        return planned(self.program)
 
     def run(self, levels: NDArray[np.float64], values: NDArray[np.float64], held: NDArray[np.int8]) -> None:
         """Run over one record.
@@ -52,7 +52,7 @@ class CompiledStage:
             held: What held its outputs, shape ``(n_samples, n_outputs)``, written.
         """
         own = np.ascontiguousarray(held)  # some columns of an array are another type, of which all is compiled again
-        kernel.run(self.program, self.layout, self.depth, levels, values, _NOTHING, own)
+        kernel.run(*self.planned, self.depth, levels, values, _NOTHING, own)
         held[:] = own
 
 

@@ -1,27 +1,21 @@
-"""The form that every model with lagged regressors lowers to, run by the compiled kernel."""
+"""The form that every model of one output with lagged regressors lowers to."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
-from sysid.kernels import recursion as kernel
-from sysid.kernels.neurons import code_of
 from sysid.models.activations import PLAIN
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import read_now
-from sysid.models.form import AbstractForm
 from sysid.models.history import History
+from sysid.models.lagged_form import AbstractLaggedForm
 from sysid.models.lags import Lags
 from sysid.models.output_limits import Between
 from sysid.models.scaling import Scaling
-
-NOT_KEPT = (np.empty((0, 0)), np.empty((0, 0), dtype=np.int8))
-"""Room for activations and for what held an output, of which nobody asks."""
 
 
 def parameter_count(lags: Lags, neurons: int, *, linear: bool, gated: bool = False) -> int:
@@ -41,7 +35,7 @@ def parameter_count(lags: Lags, neurons: int, *, linear: bool, gated: bool = Fal
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Recursion(AbstractForm):
+class Recursion(AbstractLaggedForm):
     r"""A layer of neurons and a linear part over lagged regressors, scaling included.
 
     In scaled numbers :math:`\hat y_t = \mathrm{clip}(w^T x_t + c + \sum_k (v_k + V_k x_t)\,\sigma(W_k x_t + b_k))`,
@@ -97,13 +91,15 @@ class Recursion(AbstractForm):
         )
         return low, high
 
-    def in_units(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Scaled outputs in their unit; one that is held at a limit is at it to the last bit, as in a cascade."""
-        found = self.scaling.unscale_output(y)
-        for at, (limit, scaled) in enumerate(zip(self.between, self._limits, strict=True)):
-            if limit is not None:
-                found = np.where((y >= scaled) if at else (y <= scaled), limit, found)
-        return found
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return self.lags.n_inputs
+
+    @property
+    def output_limits(self) -> tuple[Between, ...]:
+        """Limits of the output in its unit."""
+        return (self.between,)
 
     @property
     def numbers(self) -> NDArray[np.float64]:
@@ -180,14 +176,7 @@ class Recursion(AbstractForm):
         Raises:
             TraceError: If the number of inputs is not the model's.
         """
-        inputs = np.asarray(inputs, dtype=np.float64)
-        if inputs.ndim != 2 or inputs.shape[1] != self.lags.n_inputs or history.inputs.shape[1] != self.lags.n_inputs:
-            raise TraceError(
-                "the inputs do not fit the model",
-                expected=f"inputs and history of shape (n, {self.lags.n_inputs})",
-                got=f"shapes {inputs.shape} and {history.inputs.shape}",
-                remedy="give one column per input of the mapping, in its order",
-            )
+        inputs = self._checked(inputs, history)
         past_inputs, past_output = history.padded(self.lags.depth)
         u = self.scaling.scale_inputs(np.concatenate([past_inputs, inputs]))
         y = np.concatenate([self.scaling.scale_output(past_output), np.zeros(len(inputs))])
@@ -196,129 +185,3 @@ class Recursion(AbstractForm):
     def reads_now(self, inputs: tuple[str, ...]) -> frozenset[str]:
         """Inputs that it reads with a lag of 0."""
         return read_now(inputs, self.lags.inputs)
-
-    def simulate(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
-        """Free run: the model is fed its own past output.
-
-        Args:
-            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
-            history: The samples before.
-
-        Returns:
-            Output of shape ``(n_samples,)``, in its unit.
-        """
-        u, y = self.extended(inputs, history)
-        kernel.free_run(u, y, y, *self._arguments(len(inputs)))
-        return self.in_units(y[self.lags.depth :])
-
-    @property
-    def memory(self) -> int:
-        """Lags before the first row, and rows to tell the outputs among them."""
-        return self.lags.depth + max(self.lags.output, default=0)
-
-    def refined(self, history: History) -> History:
-        """Past outputs by Gauss-Newton on those before the first row, followed by the free run from there.
-
-        Masked outputs take no part. A single Gauss-Newton step is exact for a linear model.
-
-        Args:
-            history: Measured samples, oldest first.
-
-        Returns:
-            The history with the model's own outputs; as it is where it is no longer than the lags, or the run is lost.
-        """
-        depth, own = self.lags.depth, max(self.lags.output, default=0)
-        if own == 0 or len(history.output) <= depth:
-            return history
-        u, measured = self.scaling.scale_inputs(history.inputs), self.scaling.scale_output(history.output)
-        places = slice(depth - own, len(measured))
-        known = history.known[places]
-
-        def run(past: NDArray[np.float64]) -> NDArray[np.float64]:
-            y = measured.copy()
-            y[depth - own : depth] = past
-            kernel.free_run(u, y, y, *self._arguments(len(measured) - depth))
-            return y[places]
-
-        found = gauss_newton(run, measured[depth - own : depth], measured[places], known)
-        if found is None:
-            return history
-        y = measured.copy()
-        y[places] = run(found)
-        return History(inputs=history.inputs, output=self.scaling.unscale_output(y))
-
-    def followed(self, history: History) -> NDArray[np.float64]:
-        """The free run over a history itself; see the base class."""
-        return self.refined(history).output
-
-    def predict(
-        self, inputs: NDArray[np.float64], output: NDArray[np.float64], history: History, steps: int
-    ) -> NDArray[np.float64]:
-        """Prediction ``steps`` ahead: measured output up to ``t - steps``, the model's own after it.
-
-        Args:
-            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
-            output: Measured output, shape ``(n_samples,)``.
-            history: The samples before.
-            steps: How far ahead, at least 1.
-
-        Returns:
-            Predicted output of shape ``(n_samples,)``; its first ``steps`` samples start from the history.
-        """
-        u, y = self.extended(inputs, history)
-        measured = y.copy()
-        measured[self.lags.depth :] = self.scaling.scale_output(np.asarray(output, dtype=np.float64))
-        kernel.predict(u, measured, y, steps, *self._arguments(len(inputs)))
-        return self.in_units(y[self.lags.depth :])
-
-    def _arguments(self, n_steps: int) -> tuple[object, ...]:
-        lags = self.lags
-        tables = (lags.input_channel, lags.input_lag, lags.output_lag)
-        kind, bounds = code_of(self.activation), self.bounds
-        return (lags.depth, n_steps, *tables, self.theta, self.neurons, kind, *bounds, *NOT_KEPT)
-
-
-STEPS, APART = 12, 1e-5
-"""Gauss-Newton steps at most, and how far apart outputs are put for a derivative, in scaled numbers."""
-
-
-def gauss_newton(
-    run: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    start: NDArray[np.float64],
-    target: NDArray[np.float64],
-    known: NDArray[np.bool_],
-) -> NDArray[np.float64] | None:
-    """What to begin a run with so that it comes closest to a target.
-
-    Args:
-        run: From what it begins with to what it gives, both flat.
-        start: The first guess.
-        target: What it should give.
-        known: Which of the target's values count.
-
-    Returns:
-        What was found; ``None`` where no run is finite.
-    """
-
-    def residual(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.where(known, run(x) - target, 0.0)
-
-    x, r = start.copy(), residual(start)
-    if not np.isfinite(r).all():
-        return None
-    for _ in range(STEPS):
-        moved = [residual(x + step) - residual(x - step) for step in APART * np.eye(len(x))]
-        J = np.column_stack(moved) / (2.0 * APART)
-        if not np.isfinite(J).all():
-            return x
-        step, share, better = np.linalg.lstsq(J, -r, rcond=1e-10)[0], 1.0, False
-        while not better and share > 1e-3:
-            trial = residual(x + share * step)
-            better = bool(np.isfinite(trial).all() and trial @ trial < r @ r)
-            if better:
-                gained = r @ r - trial @ trial
-                x, r = x + share * step, trial
-            share /= 4.0
-        if not better or gained < 1e-12 * (r @ r):
-            break
-    return x

@@ -9,7 +9,7 @@
 ``motion``          a train in motion, advanced in chunks, with its energies and peak forces
 ``kernel``          the compiled step; ``reference`` is the same step written plainly
 ``brake``           the brake as a port: reference physics or recorded traces
-``surrogate``       the brake as a port: fitted models for every car (``kernel_bank`` runs them)
+``surrogate``       the brake as a port: fitted models for every car
 ``cascade_brake``   the brake as a port: a whole assembly from the handle to the cylinder
 ``port``            from fitted models to a brake, by their channels
 ``equalising``      the equalising reservoir that a handle makes

@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from sysid.kernels.cascade_layout import FREE, HIGH, LOW, SUM_HEAD, Layout, Program
+from sysid.kernels import cascade as kernel
+from sysid.kernels import cascade_layout as layout
+from sysid.kernels.cascade_layout import FREE, HIGH, LOST, LOW, SUM_HEAD, Program
 from sysid.kernels.cascade_plan import Plan
 from sysid.kernels.held_sums import bounded, limited
 from sysid.models.cascade_stages import CompiledStage
@@ -19,59 +21,59 @@ NUMBERS = st.integers(-3, 3).map(float)
 PAIRS = st.tuples(NUMBERS, NUMBERS).map(sorted)
 
 
-def laid_out(one: Program) -> Layout:
-    return Plan.of(one).laid_out(one.theta)
-
-
 def program(name: str) -> Program:
     (stage,) = CASCADES[name].stages
     assert isinstance(stage, CompiledStage)
     return stage.program
 
 
-def test_members_that_do_not_read_each_other_at_the_same_sample_are_of_one_level():
-    layout = laid_out(program("the emergency reservoir too"))  # STP -> BP, BP -> ER, BP+ER -> AR, BP+AR+ER -> BC
-    assert_array_equal(layout.level_first_y, [0, 2, 3, 4])  # ER reads the pipe of two samples ago
-    assert_array_equal(layout.neurons_first, [0, 8 + 16, 32, 40])
+def of_outputs(plan: Plan, column: np.uintp) -> np.ndarray:
+    return plan.part(layout.OUTPUTS).reshape(-1, int(layout.OUTPUT_ROW))[:, int(column)]
 
-    circle = laid_out(program("a circle through the past"))  # the pipe reads what is behind it a sample later
-    assert_array_equal(circle.level_first_y, [0, 1, 2, 3])
+
+def test_members_that_do_not_read_each_other_at_the_same_sample_are_of_one_level():
+    plan = Plan.of(program("the emergency reservoir too"))  # STP -> BP, BP -> ER, BP+ER -> AR, BP+AR+ER -> BC
+    assert_array_equal(plan.part(layout.OUTPUT_FIRST), [0, 2, 3, 4])  # ER reads the pipe of two samples ago
+    assert_array_equal(plan.part(layout.NEURONS_FIRST), [0, 8 + 16, 32, 40])
+
+    circle = Plan.of(program("a circle through the past"))  # the pipe reads what is behind it a sample later
+    assert_array_equal(circle.part(layout.OUTPUT_FIRST), [0, 1, 2, 3])
 
 
 def test_a_sum_runs_behind_what_it_reads_and_begins_no_level():
-    layout = laid_out(program("a linear member"))  # STP -> BP, BP -> AR without neurons, BP+AR -> BC
-    assert_array_equal(layout.network_first, [0, 1, 2])
-    assert_array_equal(layout.sums.first, [0, 1, 1])
-    assert_array_equal(layout.level_first_y, [0, 1, 2])
+    plan = Plan.of(program("a linear member"))  # STP -> BP, BP -> AR without neurons, BP+AR -> BC
+    assert_array_equal(plan.part(layout.NETWORK_FIRST), [0, 1, 2])
+    assert_array_equal(plan.part(layout.SUM_FIRST), [0, 1, 1])
+    assert_array_equal(plan.part(layout.OUTPUT_FIRST), [0, 1, 2])
 
 
 def test_what_a_limit_is_made_of_comes_before_it():
-    layout = laid_out(program("a limit made of what it limits, a sample ago"))  # BP, x = AR a sample ago, AR, BC
-    assert_array_equal(layout.order_y, [0, 2, 3])
-    assert_array_equal(layout.level_first_y, [0, 1, 2, 3])
-    assert_array_equal(layout.sums.first, [0, 1, 1, 1])
-    assert_array_equal(layout.fixed, [True, True, False, True])
+    plan = Plan.of(program("a limit made of what it limits, a sample ago"))  # BP, x = AR a sample ago, AR, BC
+    assert_array_equal(of_outputs(plan, layout.POSITION), [0, 2, 3])
+    assert_array_equal(of_outputs(plan, layout.FIXED), [True, False, True])
+    assert_array_equal(plan.part(layout.OUTPUT_FIRST), [0, 1, 2, 3])
+    assert_array_equal(plan.part(layout.SUM_FIRST), [0, 1, 1, 1])
 
 
 def test_a_sum_between_two_numbers_stands_with_its_terms_side_by_side():
     one = program("a limit made of what it limits, a sample ago")
-    layout = laid_out(one)
+    plan = Plan.of(one)
 
-    terms = int(layout.sums.indices[0])
-    member, (constant, low, high) = layout.member[1], layout.sums.numbers[:SUM_HEAD]
-    first = one.regressor_first[member]
-    assert_array_equal(layout.sums.indices[1:], [one.output_channel[1], 1, *range(first, first + terms)])
-    assert constant == layout.theta[layout.constant[1]]
-    assert [low, high] == layout.fixed_limits[1].tolist()
-    assert_array_equal(layout.sums.numbers[SUM_HEAD:], layout.theta[layout.linear_first[1] :][:terms])
-    assert_array_equal(layout.sums.codes, layout.fixed_codes[[1]])
+    indices, numbers = plan.part(layout.SUM_INDICES), plan.part(layout.SUM_NUMBERS)
+    first, terms = int(one.regressor_first[1]), int(indices[0])
+    assert_array_equal(indices[1:], [one.output_channel[1], 1, *range(first, first + terms)])
+    assert_array_equal(numbers[1:], [*one.limits[1], *[0.0] * terms])
+    assert_array_equal(plan.part(layout.SUM_CODES), [LOST, LOST])  # nothing holds it: neither is ever said
+    to, of = plan.part(layout.TERMS).reshape(-1, 2).T
+    assert_array_equal(to, [0, *range(SUM_HEAD, SUM_HEAD + terms)])
+    assert_array_equal(of, one.theta_first[1] + np.arange(1 + terms))
 
 
 @given(PAIRS, PAIRS, st.floats(-4.0, 4.0))
 def test_bounds_and_limits_at_once_are_first_the_one_and_then_the_other(bounds, limits, value):
     one = program("three networks")
     n = len(one.output_channel)
-    layout = laid_out(
+    plan = Plan.of(
         one._replace(
             bounds=np.tile(np.array(bounds), (n, 1)),
             limits=np.tile(np.array(limits), (n, 1)),
@@ -81,20 +83,26 @@ def test_bounds_and_limits_at_once_are_first_the_one_and_then_the_other(bounds, 
     )
     held, code = bounded(value, *bounds)
     expected = limited(held, code, *limits, LOW, HIGH)
-    assert layout.fixed[0] == (max(bounds[0], limits[0]) <= min(bounds[1], limits[1]))
-    if layout.fixed[0]:
-        assert limited(value, FREE, *layout.fixed_limits[0], *layout.fixed_codes[0]) == expected
+    hold, own = plan.part(layout.HOLDS)[:4], plan.part(layout.OUTPUTS).astype(np.int64)
+    codes = own[int(layout.LOW_CODE)], own[int(layout.HIGH_CODE)]
+    fixed = max(bounds[0], limits[0]) <= min(bounds[1], limits[1])
+    assert bool(own[int(layout.FIXED)]) == fixed
+    before = (value, FREE) if fixed else bounded(value, *hold[2:])
+    assert limited(*before, *hold[:2], *codes) == expected
 
 
-def test_a_plan_lays_out_other_parameters_and_leaves_former_layouts_as_they_were():
+def test_parameters_act_between_units_as_the_members_do_in_their_own_numbers():
     one = program("gates")
-    plan, other = Plan.of(one), one.theta[::-1].copy()
-    before, after = plan.laid_out(one.theta), plan.laid_out(other)
-    for name, expected in laid_out(one._replace(theta=other))._asdict().items():
-        if name != "sums":
-            assert_array_equal(getattr(after, name), expected)
-    assert_array_equal(before.weights, laid_out(one).weights)
-    assert (before.weights != after.weights).any()
+    found = kernel.acting(*Plan.of(one), one.numbers)
+    rng, n_x = np.random.default_rng(0), int(one.regressor_first[1])
+    size, n = slice(0, n_x), int(one.neurons[0])
+    values = rng.uniform(0.0, 90.0, n_x)
+    x = (values - one.regressor_offset[size]) / one.regressor_scale[size]
+    sums = one.theta[: n * n_x].reshape(n, n_x) @ x + one.theta[n * n_x :][:n]
+    np.testing.assert_allclose(found[: n * n_x].reshape(n, n_x) @ values + found[n * n_x :][:n], sums, atol=1e-12)
+    linear = int(one.theta_first[0]) + n * (n_x + 2)
+    alone = one.output_scale[0] * (one.theta[linear] + one.theta[linear + 1 :][:n_x] @ x) + one.output_offset[0]
+    np.testing.assert_allclose(found[linear] + found[linear + 1 :][:n_x] @ values, alone, rtol=1e-12)
 
 
 def test_runs_in_several_threads_share_a_layout():

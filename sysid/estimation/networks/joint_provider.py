@@ -278,8 +278,7 @@ class CascadeProvider(AbstractProvider):
             np.empty((n, int(program.neurons.sum()))) if keep else np.empty((0, 0)),
             np.empty((n, len(program.output_channel)), dtype=np.int8),
         )
-        layout = self._trained.plan.laid_out(program.theta)
-        kernel.go_on(program, layout, depth, passed.values, passed.kept, passed.held)
+        kernel.go_on(*self._trained.plan, program.numbers, depth, passed.values, passed.kept, passed.held)
         return passed
 
     def _away(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -44,14 +44,13 @@ from numpy.typing import NDArray
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
-from sysid.kernels import recursion as kernel
+from sysid.kernels import cascade as kernel
 from sysid.kernels.arrays import read_only
 from sysid.kernels.cascade_layout import Program
+from sysid.kernels.cascade_plan import Plan
 from sysid.kernels.cascade_sensitivities import rows_for, sensitivities
-from sysid.kernels.neurons import code_of
-from sysid.models import Ends, Recursion
-from sysid.models.cascade_program import program_of
-from sysid.models.recursion import NOT_KEPT
+from sysid.models import Recursion
+from sysid.models.lagged_form import NOT_KEPT, opened, side_by_side
 
 BLOCK = 1024
 """Rows of the Jacobian that are alive at a time: 1024 rows of 300 parameters are 2.4 MB, which the second-level
@@ -62,22 +61,20 @@ cache holds until the normal equations have used them. Memory does not grow with
 class _Record:
     """An experiment in scaled numbers.
 
-    ``measured`` is the output with its history. Kernels write outputs into a copy: starts that train side by side
-    share the provider.
+    ``values`` are inputs, in the open loop a column for each past output that is read, and the output after its
+    history. The pass writes into a copy: starts that train side by side share the provider.
     """
 
-    u: NDArray[np.float64]
-    measured: NDArray[np.float64]
+    values: NDArray[np.float64]
     target: NDArray[np.float64]
     root_weights: NDArray[np.float64] | None
 
 
 @dataclass(frozen=True, eq=False)
 class _Pass:
-    """What one run over a record leaves for the sensitivities; ``values`` are inputs and the output that was read."""
+    """What one run over a record leaves for the sensitivities."""
 
     values: NDArray[np.float64]
-    out: NDArray[np.float64]
     kept: NDArray[np.float64]
     held: NDArray[np.int8]
 
@@ -118,14 +115,15 @@ class RecursionProvider(AbstractProvider):
         u, measured = self.template.extended(experiment.inputs, experiment.history)
         target = self.template.scaling.scale_output(experiment.output)
         measured[self.template.lags.depth :] = target
+        read = 1 if self.closed else 1 + len(self.template.lags.output)
         roots = None if experiment.weights is None else np.sqrt(experiment.weights)
-        return _Record(u, measured, target, roots)
+        return _Record(np.column_stack([u, *[measured] * read]), target, roots)
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
         total = 0.0
         for record in self._records:
-            residual = self._out(record, theta) - record.target
+            residual = self._residual(record, self._pass(record, theta, keep=False))
             residual = residual if record.root_weights is None else residual * record.root_weights
             residual = residual[:: self.stride]
             total += 0.5 * float(residual @ residual)
@@ -139,7 +137,7 @@ class RecursionProvider(AbstractProvider):
         loss, correlated = 0.0, 0.0
         for record in self._records:
             passed = self._pass(record, theta)
-            residual = passed.out - record.target
+            residual = self._residual(record, passed)
             residual = residual if record.root_weights is None else residual * record.root_weights
             correlated += len(residual) * max(1.0, correlation_time(residual) / self.stride)
             counted = residual[:: self.stride]
@@ -212,46 +210,35 @@ class RecursionProvider(AbstractProvider):
             block[~moves] = 0.0
             yield first, block
 
-    def _out(
-        self,
-        record: _Record,
-        theta: NDArray[np.float64],
-        kept: tuple[NDArray[np.float64], NDArray[np.int8]] = NOT_KEPT,
-    ) -> NDArray[np.float64]:
-        """The output after its history; in closed loop the network reads what it has written itself."""
-        template, y = self.template, record.measured.copy()
-        lags = template.lags
-        kernel.free_run(
-            record.u, y if self.closed else record.measured, y, lags.depth, len(record.target), lags.input_channel,
-            lags.input_lag, lags.output_lag, read_only(theta), template.neurons, code_of(template.activation),
-            *template.bounds, *kept,
-        )  # fmt: skip
-        return y[lags.depth :]
+    def _residual(self, record: _Record, passed: _Pass) -> NDArray[np.float64]:
+        return passed.values[self.template.lags.depth :, -1] - record.target
 
-    def _pass(self, record: _Record, theta: NDArray[np.float64]) -> _Pass:
+    def _pass(self, record: _Record, theta: NDArray[np.float64], *, keep: bool = True) -> _Pass:
+        """One run; in the closed loop the network reads what it has written itself."""
         n = len(record.target)
-        kept, held = np.empty((n, self.template.neurons)), np.empty((n, 1), dtype=np.int8)
-        out = self._out(record, theta, (kept, held))
-        read = np.concatenate([record.measured[:-n], out]) if self.closed else record.measured
-        return _Pass(np.column_stack([record.u, read]), out, kept, held)
+        kept = np.empty((n, self.template.neurons)) if keep else NOT_KEPT
+        passed = _Pass(record.values.copy(), kept, np.empty((n, 1), dtype=np.int8))
+        kernel.go_on(*self._plan, read_only(theta), self.template.lags.depth, passed.values, kept, passed.held)
+        return passed
 
     @cached_property
     def _program(self) -> Program:
         """The network as a cascade of one in scaled numbers."""
-        lags = self.template.lags
-        names = tuple(f"u{i}" for i in range(lags.n_inputs))
-        columns = replace(self.template.columns, offset=(0.0,) * (len(names) + 1), scale=(1.0,) * (len(names) + 1))
-        ends = Ends(
-            inputs=names, outputs=("y",), input_units=("",) * len(names), output_units=("",), rest_outputs=(0.0,),
-            direct=frozenset(),
-        )  # fmt: skip
-        return program_of([columns], [ends], (*names, "y"), {})
+        template, n = self.template, self.template.lags.n_inputs
+        columns = template.columns if self.closed else opened(template.columns, n)
+        read = len(columns.lags.inputs)
+        low, high = template.bounds
+        columns = replace(columns, offset=(0.0,) * read, scale=(1.0,) * read, low=low, high=high)
+        return side_by_side([columns], read - 1)
+
+    @cached_property
+    def _plan(self) -> Plan:
+        return Plan.of(self._program)
 
     @cached_property
     def _source(self) -> NDArray[np.int64]:
         """For each regressor whether it is the network's own output, 0, or an input, -1."""
-        own = self._program.regressor_channel == self.template.lags.n_inputs
-        return np.where(own, 0, -1) if self.closed else np.full(len(own), -1)
+        return np.where(self._program.regressor_channel == self._program.output_channel[0], 0, -1)
 
     def at(self, theta: NDArray[np.float64]) -> Recursion:
         """The recursion with these parameters.

@@ -93,19 +93,15 @@ class TrainedMembers:
     @property
     def theta(self) -> NDArray[np.float64]:
         """The parameters that the trained members have, shape ``(n_parameters,)``."""
-        numbers = self._numbers
+        numbers = self.program.numbers
         return np.concatenate([numbers[whole] for whole, _ in self.places])
 
     def program_at(self, theta: NDArray[np.float64]) -> Program:
         """The program with these parameters of the trained members."""
-        whole, n = self._numbers, len(self.program.theta)
+        whole, n = self.program.numbers.copy(), len(self.program.theta)
         for place, own in self.places:
             whole[place] = theta[own]
         return self.program._replace(theta=whole[:n], equations=self.program.equations._replace(registers=whole[n:]))
-
-    @property
-    def _numbers(self) -> NDArray[np.float64]:
-        return np.concatenate([self.program.theta, self.program.equations.registers])
 
     def put(self, cascade: Cascade, theta: NDArray[np.float64]) -> Cascade:
         """The cascade with these parameters of the trained members."""

@@ -12,10 +12,9 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.machine import BrakedTrain, Probe
 from sysid.airbrake.variant import USUAL, Variant
 from sysid.errors import ConfigError
-from sysid.kernels.arrays import read_only
-from sysid.kernels.neurons import code_of
+from sysid.kernels.cascade_plan import planned
 from sysid.models import AbstractModel, Ends, Recursion, Wiring
-from sysid.rail.dynamics import kernel_bank
+from sysid.models.lagged_form import side_by_side, walk
 from sysid.rail.dynamics.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
 from sysid.rail.dynamics.equalising import equalising_from_handle
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
@@ -68,7 +67,7 @@ class Stage:
 
 
 class ModelBank:
-    """One stage for all cars: histories and parameters side by side, advanced by one compiled loop.
+    """One stage for all cars: a whole of models that do not read each other, run in one pass.
 
     Args:
         stage: The models.
@@ -90,20 +89,11 @@ class ModelBank:
             )
         self.mapping = models[0].mapping
         recursions = stage.forms * cars if len(stage.forms) == 1 else stage.forms
-        self._lags, self._neurons = recursions[0].lags, recursions[0].neurons
-        self._kinds = np.array([code_of(recursion.activation) for recursion in recursions])
-        self._theta = read_only(np.array([recursion.theta for recursion in recursions]))
-        self._bounds = np.array([recursion.bounds for recursion in recursions])
-        scalings = [recursion.scaling for recursion in recursions]
-        self._input_offset = np.array([scaling.input_offset for scaling in scalings])
-        self._input_scale = np.array([scaling.input_scale for scaling in scalings])
-        self._output_offset = np.array([scaling.output_offset for scaling in scalings])
-        self._output_scale = np.array([scaling.output_scale for scaling in scalings])
-        depth = self._lags.depth
-        rest = np.array([model.rest_output for model in models])
-        self._inputs = np.empty((cars, depth, self._lags.n_inputs))
-        self._inputs[:] = ((np.asarray(rest_inputs) - self._input_offset) / self._input_scale)[:, None]
-        self._outputs = np.repeat(((rest - self._output_offset) / self._output_scale)[:, None], depth, axis=1)
+        self._n_inputs, depth = recursions[0].n_inputs, recursions[0].lags.depth
+        limits = [recursion.between for recursion in recursions]
+        self._planned = planned(side_by_side([recursion.columns for recursion in recursions], self._n_inputs, limits))
+        rest = [*np.tile(np.asarray(rest_inputs, dtype=np.float64), cars), *(model.rest_output for model in models)]
+        self._past = np.tile(np.array(rest), (depth, 1))
 
     def advance(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Advance every car.
@@ -114,18 +104,12 @@ class ModelBank:
         Returns:
             Outputs in their unit, shape ``(n_samples, n_cars)``.
         """
-        samples, depth = len(inputs), self._lags.depth
-        scaled = (inputs.transpose(1, 0, 2) - self._input_offset[:, None]) / self._input_scale[:, None]
-        # Laid out one way, whatever the number of cars and samples: the kernel is compiled for each way.
-        u = np.ascontiguousarray(np.concatenate([self._inputs, scaled], axis=1))
-        y = np.ascontiguousarray(np.concatenate([self._outputs, np.zeros((len(u), samples))], axis=1))
-        lags = self._lags
-        kernel_bank.advance(
-            u, y, depth, samples, lags.input_channel, lags.input_lag, lags.output_lag,
-            self._theta, self._neurons, self._kinds, self._bounds,
-        )  # fmt: skip
-        self._inputs, self._outputs = u[:, samples:].copy(), y[:, samples:].copy()
-        return np.ascontiguousarray((y[:, depth:] * self._output_scale[:, None] + self._output_offset[:, None]).T)
+        samples, depth, cars = len(inputs), len(self._past), inputs.shape[1]
+        room = np.concatenate([self._past, np.zeros((samples, self._past.shape[1]))])
+        room[depth:, :-cars] = inputs.reshape(samples, -1)
+        walk(self._planned, room, depth)
+        self._past = room[samples:].copy()
+        return np.ascontiguousarray(room[depth:, -cars:])
 
 
 class SurrogateBrake(AbstractBrake):

@@ -1,4 +1,4 @@
-"""The compiled recursion against finite differences, NumPy and its own formula."""
+"""The compiled pass of one network against finite differences, NumPy and its own formula."""
 
 import numpy as np
 import pytest
@@ -76,16 +76,25 @@ def test_sensitivities_equal_finite_differences(network, closed):
 def test_the_free_run_and_the_prediction_are_those_of_the_slow_twin(network):
     provider = a_provider(network, closed=True, n=16)
     form = provider.at(0.3 * np.random.default_rng(1).standard_normal(len(provider.template.theta)))
-    e, steps = provider.experiments[0], 3
+    e = provider.experiments[0]
     assert_allclose(form.simulate(e.inputs, e.history), simulate(form, e.inputs, e.history), rtol=0.0, atol=1e-13)
     u, y = np.concatenate([e.history.inputs, e.inputs]), np.concatenate([e.history.output, e.output])
-    expected = []
-    for t in range(len(e.output)):
-        first = max(0, t + 1 - steps)
-        before = len(e.history.output) + first
-        history = History(inputs=u[:before], output=y[:before])
-        expected.append(simulate(form, e.inputs[first : t + 1], history)[-1])
-    assert_allclose(form.predict(e.inputs, e.output, e.history, steps), expected, rtol=0.0, atol=1e-13)
+    for steps in (1, 3, 40):  # the last more than there are samples
+        expected = []
+        for t in range(len(e.output)):
+            first = max(0, t + 1 - steps)
+            before = len(e.history.output) + first
+            history = History(inputs=u[:before], output=y[:before])
+            expected.append(simulate(form, e.inputs[first : t + 1], history)[-1])
+        found = form.predict(e.inputs, e.output, e.history, steps)
+        assert_allclose(found, expected, rtol=0.0, atol=1e-13)
+
+
+def test_models_of_one_structure_share_a_plan_and_not_their_parameters():
+    provider = a_provider(NARX(input_delays=3, output_delays=2, neurons=4), closed=True)
+    e, rng = provider.experiments[0], np.random.default_rng(5)
+    for form in [provider.at(0.3 * rng.standard_normal(len(provider.template.theta))) for _ in range(3)]:
+        assert_allclose(form.simulate(e.inputs, e.history), simulate(form, e.inputs, e.history), rtol=0.0, atol=1e-13)
 
 
 @pytest.mark.parametrize("weights", [None, (0.0, 1.0, 2.5)], ids=["plain", "weighted and masked"])
