@@ -231,6 +231,9 @@ def main(known: Samples, kept_back: Samples, unseen: Samples) -> None:
     by_kind = {kind: unseen.kinds == kind for kind in dict.fromkeys(unseen.kinds)}
     shares = ", ".join(f"{kind} {100 * unseen.wrong[there].mean():.1f}" for kind, there in by_kind.items())
     print(f"unseen, wrong {100 * unseen.wrong.mean():.1f} % ({shares}); wrong / others flagged, by kind, and at 5 %:")
+    ends = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, np.inf)
+    sizes = [(unseen.errors >= low) & (unseen.errors < high) for low, high in itertools.pairwise(ends)]
+    print("  by error from 0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 2 psi on:", *(f"{100 * one.mean():.2f}" for one in sizes))
     for name, judge in judges.items():
         doubted = judge(unseen.seen)
         flag = doubted > np.quantile(judge(right), 1.0 - FALSE)
@@ -241,10 +244,8 @@ def main(known: Samples, kept_back: Samples, unseen: Samples) -> None:
             for kind, there in rows.items()
         ]
         print(f"  {name:<24}", *told, f"at 5 %: {flagged(doubted, unseen.wrong):.0f}")
-        ends = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, np.inf)
-        sizes = [(unseen.errors >= low) & (unseen.errors < high) for low, high in itertools.pairwise(ends)]
         told = [f"{100 * flag[one].mean() if one.any() else np.nan:.0f}" for one in sizes]
-        print("    by error from 0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 2 psi on:", *told)
+        print("    of these flagged:", *told)
     even = unseen.numbers % 2 == 0
     for half in (even, ~even):
         judge = trees(np.concatenate([known.seen, unseen.seen[half]]), np.append(known.wrong, unseen.wrong[half]))
