@@ -142,8 +142,10 @@ def _neural_sums(looked: Looked) -> list[Try]:
     ]
 
 
-def _neural_in_motion(_: Looked) -> list[Try]:
-    return [Try(structure=NeuralStateSpace(states=n, neurons=k)) for n, k in ((1, 4), (2, 8), (3, 8), (2, 0), (3, 0))]
+def _neural_in_motion(looked: Looked) -> list[Try]:
+    """Those with a state for each output first: a short search comes to no others, and fewer cannot tell two apart."""
+    sizes = sorted(((1, 4), (2, 8), (3, 8), (2, 0), (3, 0)), key=lambda size: size[0] < min(looked.n_outputs, 3))
+    return [Try(structure=NeuralStateSpace(states=n, neurons=k)) for n, k in sizes]
 
 
 def _around_neural(one: Try, looked: Looked) -> list[Try]:

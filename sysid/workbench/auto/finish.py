@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import time
+from functools import cache
+
+import numpy as np
 
 from sysid.reporting.fit_tables import DRAWN
 
-FINISHING_S, PICTURE_S = 15.0, 0.25
-"""Processor seconds that scores, export and what has to be loaded for them take, and each picture of the report."""
-PAGE_S = 4.0
+FINISHING_S, OUTPUT_S, PICTURE_S = 4.0, 3.0, 0.2
+"""Processor seconds that scores, export and what has to be loaded for them take, those of each output, and each picture
+of the report, on a machine that takes :data:`DRAWING_S` for one picture."""
+PAGE_S = 2.0
 """Of that, what the page alone takes beside its pictures."""
+DRAWING_S, SLOWEST_PACE = 0.04, 20.0
+"""Processor seconds of a picture that is drawn to measure a machine by, and how much slower it may be at most."""
 PAGE_SHARE, FEWEST = 0.15, 3
 """Share of the time of a search that pictures of single cases may take, and cases that are drawn in any case."""
 PROBE_S, MOST = 0.2, 20.0
@@ -28,14 +34,16 @@ def drawn_in(wall_s: float | None, outputs: int) -> int:
 
     Example:
         >>> drawn_in(30.0, 1), drawn_in(30.0, 5), drawn_in(300.0, 5)
-        (9, 3, 12)
+        (11, 3, 12)
     """
     if wall_s is None:
         return DRAWN
     return int(min(max(PAGE_SHARE * wall_s / (2.0 * PICTURE_S * outputs), FEWEST), DRAWN))
 
 
-def finish_s(records: int, outputs: int, wall_s: float | None = None, *, slowed: float | None = None) -> float:
+def finish_s(
+    records: int, outputs: int, wall_s: float | None = None, *, slowed: float | None = None, paced: float | None = None
+) -> float:
     """About how long scores, export and report take.
 
     Args:
@@ -43,15 +51,17 @@ def finish_s(records: int, outputs: int, wall_s: float | None = None, *, slowed:
         outputs: Of each.
         wall_s: Seconds of the search; ``None`` where iterations are counted.
         slowed: How many times as long a second of work takes; measured now by default.
+        paced: How many times as much work it is as where the constants were measured; measured by default.
 
     Returns:
         Seconds by the clock.
 
     Example:
-        >>> finish_s(20, 2, slowed=1.0)
-        27.0
+        >>> round(finish_s(20, 2, slowed=1.0, paced=1.0), 3)
+        19.6
     """
-    return (slowness() if slowed is None else slowed) * (FINISHING_S + _pictures_s(records, outputs, wall_s))
+    work = FINISHING_S + outputs * OUTPUT_S + _pictures_s(records, outputs, wall_s)
+    return (slowness() if slowed is None else slowed) * (pace() if paced is None else paced) * work
 
 
 def page_s(records: int, outputs: int, wall_s: float | None = None) -> float:
@@ -65,12 +75,31 @@ def page_s(records: int, outputs: int, wall_s: float | None = None) -> float:
     Returns:
         Seconds by the clock.
     """
-    return slowness() * (PAGE_S + _pictures_s(records, outputs, wall_s))
+    return slowness() * pace() * (PAGE_S + _pictures_s(records, outputs, wall_s))
 
 
 def _pictures_s(records: int, outputs: int, wall_s: float | None) -> float:
     """Processor seconds of a gallery of all models, and of each model by itself."""
     return PICTURE_S * 2.0 * min(records, drawn_in(wall_s, outputs)) * outputs
+
+
+@cache
+def pace() -> float:
+    """How much processor time this machine takes, as a picture shows that is drawn now, once in a process.
+
+    Returns:
+        Times that of the machine on which the constants were measured.
+    """
+    from sysid.reporting.figures.fit_figures import case_figure
+    from sysid.reporting.figures.svg import svg
+
+    x, seconds = np.linspace(0.0, 1.0, 600), 0.0
+    for _ in range(2):  # for the first fonts are looked for, and much is loaded
+        began = time.process_time()
+        figure = case_figure(x, np.sin(9.0 * x), np.cos(9.0 * x), title="pace", label="y", unit="")
+        svg(figure, title="pace", description="pace", name="pace")
+        seconds = time.process_time() - began
+    return min(seconds / DRAWING_S, SLOWEST_PACE)
 
 
 def slowness() -> float:

@@ -225,7 +225,7 @@ class Search:
             refit=refit_share(self.parts),
             trial=TRIAL_OF_MANY if self.parts.trained_on else TRIAL,
             kept=FINAL if again else 0.0,
-            finishing_s=finish_s(len(self.data.traces), self._n_outputs, self.config.wall_s, slowed=1.0),
+            finishing_s=self._finishing_s,
         )
         training = {**self.parts.training, **budget.limits(budget.trial / len(self.parts.folds))}
         if self.parts.trained_on and self.config.tolerance is not None:
@@ -293,6 +293,12 @@ class Search:
         return ranked_by(error, self.config.tolerance)
 
     @property
+    def _finishing_s(self) -> float:
+        """Processor seconds of what follows; nobody asks for them where iterations are counted."""
+        wall_s = self.config.wall_s
+        return 0.0 if wall_s is None else finish_s(len(self.data.traces), self._n_outputs, wall_s, slowed=1.0)
+
+    @property
     def _n_outputs(self) -> int:
         return len(self.config.mapping.outputs)
 
@@ -329,11 +335,15 @@ def _hurried(plan: Plan, chosen: Trial, spent_s: float) -> str:
     wall_s = plan.budget.wall_s
     if wall_s is None:
         return f"The budget was spent before structures were compared: {chosen.label} is the least that there is."
-    need = max(2.0 * wall_s, spent_s / max(1.0 - MOST_KEPT - plan.budget.refit, LEAST_SHARE))
+    # What was seen on a busy machine says nothing of the same data on another day: it is reckoned as if it were quiet.
+    slowed = plan.budget.slowed
+    need = spent_s / slowed / max(1.0 - MOST_KEPT - plan.budget.refit, LEAST_SHARE)
+    need = max(need, 2.0 * wall_s / slowed)
+    busy = f" on a quiet machine (a second of work takes {slowed:.1f} s now)" if slowed >= BUSY else ""
     return (
         f"The time was up before structures were compared: {chosen.label} is the least that there is, fitted once, "
         f"whatever it is worth. Of {span(wall_s)}, looking at the record and one fit took {span(spent_s)}, and scores, "
-        f"export and report are still to come; a search that compares takes {span(need)} at least."
+        f"export and report are still to come; a search that compares takes {span(need)} at least{busy}."
     )
 
 

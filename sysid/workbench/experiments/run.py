@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
 
 DATASET, RECORD, TRACES = "dataset.yaml", "experiment.json", "traces"
+UNLIKE = "unlike.txt"
+"""Beside them, where the reference does not repeat itself: how."""
 TITLE = "Running the reference"
 LOADING = Outlined(name="data", title="Loading the traces")
 SHOWN = 5
@@ -168,10 +170,17 @@ class Experiments:
             return _by_role(cases, runs.run(flat))
 
     def _ran(self, run: Run, work: Work) -> dict[str, list[Outcome]]:
+        kept = run.store.path / UNLIKE
+        if run.fresh:
+            kept.unlink(missing_ok=True)
+
+        def warn(text: str) -> None:
+            run.tell(Warned(text=text))
+            write_bytes(kept, f"{text}\n".encode())  # who goes on later runs nothing again that would tell
+
         return self.made(
-            lambda name, n, count: work.say(f"{name} ({n} of {count})", n / count), fresh=run.fresh,
-            warn=lambda text: run.tell(Warned(text=text)),
-        )  # fmt: skip
+            lambda name, n, count: work.say(f"{name} ({n} of {count})", n / count), fresh=run.fresh, warn=warn
+        )
 
     def made(
         self, progress: Progress | None, *, fresh: bool = False, warn: Callable[[str], object] | None = None

@@ -7,6 +7,7 @@
 ``grow``   rounds of experiments that are added where the surrogate is worst, and their control
 ``grown``  the model of the chosen round as a pipeline of fits
 ``begun``  a workspace that begins with an FMU
+``told``   what a reader has to know beside the proof
 ``known``  fits that are asked for in place of a search
 ``make``   the whole: experiment, search, growth, proof; what is done is not done again
 =========  =====================================================================================================

@@ -17,23 +17,21 @@ import numpy as np
 from sysid.atomic import replacing
 from sysid.bounded_text import read_bounded
 from sysid.errors import ConfigError
-from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.field_checks import check
 from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
 from sysid.references.runs import ReferenceRuns
-from sysid.references.told import reasons_of
 from sysid.reporting.growth import FILE
 from sysid.reporting.judging.results import FOLDER
 from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import finish_s, page_s, slowness, span
+from sysid.workbench.auto.finish import finish_s, page_s, span
 from sysid.workbench.auto.jumps import jumps_told
-from sysid.workbench.auto.look import MOVED, in_motion, span_of
+from sysid.workbench.auto.look import span_of
 from sysid.workbench.auto.run import Searched, auto_of
 from sysid.workbench.auto.run import program_of as search_program
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
@@ -50,13 +48,12 @@ from sysid.workbench.surrogates.known import pipeline_of
 from sysid.workbench.surrogates.known import program_of as known_program
 from sysid.workbench.surrogates.plan import PROOF, RUNNING, SEARCHING, Times, times
 from sysid.workbench.surrogates.proof import FEWEST, Proof, fmu_of, prove
+from sysid.workbench.surrogates.told import beginning_of, failed, poor, restless, short_of_time, unlike, without_effect
 from sysid.yaml_files import read_yaml
 
 T = TypeVar("T")
 Perform = Callable[[Program[Any], Path], Any]
 """Carries a program out in a folder, and gives its results."""
-OVERRUN = 0.05
-"""Share of the time by which it is exceeded without a word."""
 RUNS_MOST = 1.0 - SEARCHING
 """Share of the time beyond which it is told before, how long the experiments take."""
 GROWING = 0.25
@@ -163,12 +160,12 @@ def make_surrogate(
     # What a search has to learn; of fits that are asked for somebody knows it.
     begins = [] if config.fits else restless(found, mapping)
     jumps = [] if config.fits else jumps_told(found.traces.with_role(Role.ESTIMATION), mapping)
-    notes = [*_failed(found), *begins, *jumps]
+    notes = [*failed(found), *unlike(work.place), *begins, *jumps]
     for note in notes:  # before an hour is spent
         say(f"note: {note}")
-    plan, count = work.planned(found, minutes=minutes, spent=time.monotonic() - began, proof=proof)
+    plan, planned, count = work.planned(found, minutes=minutes, spent=time.monotonic() - began, proof=proof)
     if not iterations and not (folder / TIMES).is_file():
-        say(plan.sentence(count))
+        say(plan.sentence(planned, count))
     # A search counts its scores, export and report in its minutes; fits that are asked for do not.
     seconds_left = _kept(folder / TIMES, plan.search + (0.0 if config.fits else plan.finish))
     seconds_left -= 0.0 if growth is None else GROWING * plan.whole
@@ -189,14 +186,15 @@ def make_surrogate(
             place, said = _grown(ground, growth, searched, seconds=seconds, perform=perform, say=say)
             notes.append(said)
     bundle = read_bundle(place / "bundle")
-    notes += beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if begins else []
     shown = proving.done.get(place) or proving(place)
     page, fmu = place / "report" / "index.html", fmu_of(bundle)
     if page.stat().st_mtime < (place / FOLDER / "proof.json").stat().st_mtime:
         page = write_report(place)
     if fmu is not None:
         fmu = _delivered(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu")
-    notes += _short_of_time(shown, plan, count, took=time.monotonic() - began, asked=bool(proof or iterations))
+    begun = beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if begins else []
+    notes += [*begun, *without_effect(bundle, found.traces.with_role(Role.ESTIMATION)), *poor(shown, minutes)]
+    notes += short_of_time(shown, plan, count, took=time.monotonic() - began, asked=bool(proof or iterations))
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes, pipeline=pipeline)
 
 
@@ -220,17 +218,20 @@ class _Work:
     iterations: int | None
 
     @property
-    def _experiment(self) -> Path:
+    def place(self) -> Path:
+        """Of the experiments."""
         return self.folder / "experiment"
 
     def experimented(self) -> Experimented:
         """The experiments."""
         text, beside = self.pipeline.read_text(encoding="utf-8-sig"), self.pipeline.resolve().parent
-        found: Experimented = self.perform(experiment_program(self.config, text=text, folder=beside), self._experiment)
+        found: Experimented = self.perform(experiment_program(self.config, text=text, folder=beside), self.place)
         return found
 
-    def planned(self, found: Experimented, *, minutes: float, spent: float, proof: int | None) -> tuple[Times, int]:
-        """How the time is spent, and of how many experiments the proof is."""
+    def planned(
+        self, found: Experimented, *, minutes: float, spent: float, proof: int | None
+    ) -> tuple[Times, int, int]:
+        """How the time is spent, of how many experiments the proof is for certain, and if it has time of how many."""
         whole = None if self.iterations else 60.0 * minutes
         workers, finish = self.config.workers, finish_s(len(found.traces), len(self.mapping.outputs), whole)
         with ReferenceRuns(config=self.reference) as runs:
@@ -238,15 +239,17 @@ class _Work:
         each = self.reference.time_limit if each is None else max(each, 1e-3)
         # What is short of time is not the search first: a proof of fewer experiments says the same, less sharply.
         left = (1.0 - SEARCHING) * 60.0 * minutes - spent - finish
-        seconds = min(RUNNING * 60.0 * minutes, max(left, 0.0))
-        count = proof or int(np.clip(seconds * workers / each, FEWEST, PROOF))
-        found_out = times(each, minutes=minutes, spent=spent, experiments=count, workers=workers, finish=finish)
-        return found_out, count
+        planned, most = (
+            proof or int(np.clip(min(RUNNING * 60.0 * minutes, seconds) * workers / each, FEWEST, PROOF))
+            for seconds in (max(left, 0.0), inf)
+        )
+        plan = times(each, minutes=minutes, spent=spent, experiments=planned, workers=workers, finish=finish)
+        return plan, planned, most
 
     def searched(self, found: Experimented, minutes: float, before_page: Callable[[], object] | None) -> Searched:
         """A model that is looked for."""
         fields: dict[str, Any] = {
-            **{"kind": "auto", "name": "model", "data": str((self._experiment / DATASET).resolve())},
+            **{"kind": "auto", "name": "model", "data": str((self.place / DATASET).resolve())},
             **{"mapping": self.mapping, "start": Start(), "rest": dict(found.before), "seed": self.seed},
             **({"iterations": self.iterations} if self.iterations else {"minutes": minutes}),
             **{"workers": self.config.workers, "tolerance": TOLERANCE},
@@ -268,7 +271,7 @@ class _Work:
     def fitted(self, found: Experimented, minutes: float) -> None:
         """They are fitted, scored and exported."""
         place = self.folder / "model"
-        known = self.known((self._experiment / DATASET).resolve(), found, minutes)
+        known = self.known((self.place / DATASET).resolve(), found, minutes)
         self.perform(known_program(known, place), place)
 
 
@@ -354,31 +357,6 @@ def first_look(experiments: Experiments, *, minutes: float) -> str | None:
     )
 
 
-def _short_of_time(shown: Proof, plan: Times, count: int, *, took: float, asked: bool) -> list[str]:
-    """What was left out for want of time, and how much longer it took; nothing where what is done was asked for."""
-    notes, run = [], len(shown.errors) + shown.failed
-    if run < PROOF:
-        why = f", not of {count:,}, as the time was up" if run < count else ""
-        notes.append(f"the proof is of {run} experiments{why}; --proof 1000 makes it of 1,000")
-    if took > (1.0 + OVERRUN) * plan.whole and not asked:
-        notes.append(
-            f"it took {span(took)}, {span(took - plan.whole)} more than was asked for: experiments, a few fits, export "
-            f"and report come to that here, where a second of work takes {slowness():.2g} s"
-        )
-    return notes
-
-
-def _failed(found: Experimented) -> list[str]:
-    """That some experiments gave no record, and why: the surrogate has seen nothing of what they would have shown."""
-    of = sum(map(len, found.outcomes.values()))
-    if not found.failed:
-        return []
-    return [
-        f"{len(found.failed)} of {of} experiments gave no record, so that nothing was learnt there: "
-        f"{reasons_of(found.failed)}"
-    ]
-
-
 def _check_moving(traces: Sequence[Trace], reference: ReferenceConfig) -> None:
     """Refuse outputs that no experiment moves: nothing is to be learnt of them, and there is no range for an error."""
     still = [name for name in reference.outputs if span_of(traces, name) == 0.0]
@@ -396,52 +374,3 @@ def _kept(file: Path, seconds: float) -> float:
         return float(read_bounded(file))
     write_bytes(file, f"{seconds:.1f}\n".encode())
     return round(seconds, 1)
-
-
-def restless(found: Experimented, mapping: Mapping) -> list[str]:
-    """What of a reference does not begin at rest, in words.
-
-    Args:
-        found: The experiments.
-        mapping: What moves, and what answers.
-
-    Returns:
-        A sentence for each output that moves before any input does, or begins elsewhere from run to run.
-    """
-    traces = found.traces.with_role(Role.ESTIMATION)
-    moving = in_motion(traces, mapping)
-    uneven = {name: by for name, by in found.spread.items() if by > MOVED * span_of(traces, name)}
-    told = [f"{name} moves by up to {by:.3g} while the inputs stand still" for name, by in moving.items()]
-    told += [f"{name} begins at values up to {by:.3g} apart" for name, by in uneven.items()]
-    return [
-        f"{one}: the reference does not begin at rest, and where it begins is learnt with the model" for one in told
-    ]
-
-
-def beginning_of(bundle: Bundle, traces: Sequence[Trace]) -> list[str]:
-    """How near a surrogate begins to where its reference does, on runs that were not fitted.
-
-    Args:
-        bundle: The surrogate.
-        traces: Those runs.
-
-    Returns:
-        A sentence for each output; none without runs.
-    """
-    names = [str(entry["name"]) for entry in bundle.outputs]
-    inputs = [str(entry["name"]) for entry in bundle.inputs]
-    off = [
-        np.abs(
-            np.asarray(bundle.simulate({name: trace[name][:2] for name in inputs}, warn=False)).reshape(2, -1)
-            - measured
-        )[0]
-        for trace in traces
-        for measured in [trace.columns(names)[:2]]
-    ]
-    worst = dict(zip(names, np.max(off, axis=0, initial=0.0), strict=True)) if off else {}
-    shares = {name: 100.0 * float(by) / (span_of(traces, name) or 1.0) for name, by in worst.items()}
-    return [
-        f"at its first sample {name} is at most {share:.2g} % of its range off on {len(off)} runs that were not fitted"
-        + ("; give settling, a start at which it is at rest, or more experiments" if share > 100.0 * MOVED else "")
-        for name, share in shares.items()
-    ]

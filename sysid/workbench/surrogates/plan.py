@@ -167,11 +167,12 @@ class Times:
         """What a model is looked for: all that the rest does not take, but a share of the whole in any case."""
         return max(SEARCHING * self.whole, self.whole - self.spent - self.proof - self.finish)
 
-    def sentence(self, experiments: int) -> str:
+    def sentence(self, experiments: int, most: int | None = None) -> str:
         """What is about to be done, for who waits for it.
 
         Args:
             experiments: Of the proof.
+            most: So many where what comes before it takes less; no more by default.
 
         Returns:
             One sentence; another where it takes longer than was asked for.
@@ -179,14 +180,14 @@ class Times:
         said = (
             f"Time: {span(self.spent)} so far, {span(self.search)} for a model, {span(self.finish)} for "
             f"scores, export and report, {span(self.proof)} for {experiments:,} experiments of the proof"
+            f"{' or more' if most is not None and most > experiments else ''}"
         )
         whole = self.spent + self.search + self.proof + self.finish
         if whole <= 1.05 * self.whole:
             return f"{said}."
-        return (
-            f"{said}: about {span(whole)} in all, more than the {span(self.whole)} that were asked for. Fewer "
-            "experiments of the proof (--proof) take less."
-        )
+        less = "Fewer experiments of the proof (--proof) take less"
+        helps = less if self.proof > 0.05 * self.whole else "There is room for it in more --minutes"
+        return f"{said}: about {span(whole)} in all, more than the {span(self.whole)} that were asked for. {helps}."
 
 
 def times(each: float, *, minutes: float, spent: float, experiments: int, workers: int, finish: float) -> Times:

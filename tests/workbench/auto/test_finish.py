@@ -8,7 +8,7 @@ from sysid.field_checks import check
 from sysid.models import ARX
 from sysid.reporting.fit_tables import DRAWN
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import FEWEST, PICTURE_S, finish_s
+from sysid.workbench.auto.finish import FEWEST, PICTURE_S, SLOWEST_PACE, finish_s, pace
 
 SEARCH = {"kind": "auto", "name": "a", "data": "rig", "mapping": "u -> a+b+c+d+e"}
 STRUCTURE = ARX(na=1, nb=(1,), nk=(1,))
@@ -29,5 +29,13 @@ def test_how_many_cases_are_drawn_is_decided_by_the_time_or_said(given: dict[str
 
 
 def test_pictures_that_are_not_drawn_take_no_time() -> None:
-    long, short = finish_s(40, 5, slowed=1.0), finish_s(40, 5, 30.0, slowed=1.0)
-    assert long - short == 2.0 * PICTURE_S * 5 * (DRAWN - FEWEST)
+    long, short = finish_s(40, 5, slowed=1.0, paced=1.0), finish_s(40, 5, 30.0, slowed=1.0, paced=1.0)
+    assert long - short == pytest.approx(2.0 * PICTURE_S * 5 * (DRAWN - FEWEST))
+
+
+def test_what_follows_is_planned_by_what_this_machine_takes_for_a_picture() -> None:
+    assert 0.05 < pace() <= SLOWEST_PACE
+    assert pace() == pace(), "measured once"
+    now, twice = (finish_s(40, 2, slowed=1.0, paced=times * pace()) for times in (1.0, 2.0))
+    assert twice == pytest.approx(2.0 * now)
+    assert finish_s(40, 2, slowed=1.0) == now

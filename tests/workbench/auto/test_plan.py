@@ -251,6 +251,13 @@ def test_where_some_of_several_outputs_end_one_network_has_all_of_them() -> None
         assert kinds == ({"NARX", "VectorNARX"} if all_end else {"VectorNARX"})
 
 
+def test_of_two_outputs_in_motion_what_has_a_state_for_each_comes_first() -> None:
+    """A short search tries one or two: an oscillator of two outputs had one state, and an error of a third."""
+    for outputs, first in ((1, "NSS 1/4"), (2, "NSS 2/8"), (3, "NSS 3/8")):
+        _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, in_motion=True, n_outputs=outputs))
+        assert rounds[0][0].structure.label == first
+
+
 def test_what_begins_in_motion_has_first_what_remembers_one_sample_or_learns_where_it_begins() -> None:
     for in_motion in (False, True):
         _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, in_motion=in_motion))

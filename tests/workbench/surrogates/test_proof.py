@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -29,12 +30,14 @@ from sysid.workbench.auto.families import Family, Try
 from sysid.workbench.cli import run_cli
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.experiments.run import Experimented, Experiments
+from sysid.workbench.experiments.run import program_of as experiment_program
 from sysid.workbench.runner.events import Event, StepDone, StepProgress
+from sysid.workbench.runner.program import carry_out
 from sysid.workbench.surrogates import make
 from sysid.workbench.surrogates.asked import surrogate_of
-from sysid.workbench.surrogates.make import beginning_of, restless
 from sysid.workbench.surrogates.plan import affordable, times, written
 from sysid.workbench.surrogates.proof import Proof, _begun_until, fmu_of, prove
+from sysid.workbench.surrogates.told import beginning_of, poor, restless, short_of_time, unlike, without_effect
 from sysid.yaml_files import read_yaml
 
 pytest.importorskip("fmpy")
@@ -147,9 +150,12 @@ def test_a_search_has_the_time_that_experiments_proof_and_report_leave_and_what_
     plan = times(0.03, experiments=1000, **given)
     assert plan.spent + plan.search + plan.finish + plan.proof == 300.0
     assert plan.sentence(1000).endswith("15 s for 1,000 experiments of the proof.")
+    assert plan.sentence(20, 1000).endswith("15 s for 20 experiments of the proof or more.")
     slow = times(6.0, experiments=1000, **given)
     assert slow.search == 0.4 * 300.0
-    assert "about 52.9 min in all, more than the 5.0 min that were asked for" in slow.sentence(1000)
+    assert "about 52.9 min in all, more than the 5.0 min that were asked for. Fewer experiments" in slow.sentence(1000)
+    little = times(0.001, experiments=20, **{**given, "minutes": 0.5})
+    assert little.sentence(20).endswith("that were asked for. There is room for it in more --minutes.")
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -214,10 +220,10 @@ def test_a_proof_leaves_time_for_the_runs_of_the_surrogate(monkeypatch: pytest.M
 
 def test_what_takes_longer_than_was_asked_for_is_told(proven: tuple[Bundle, Proof, JudgementRecord]) -> None:
     plan = times(0.03, minutes=1.0, spent=5.0, experiments=40, workers=1, finish=30.0)
-    short, over = make._short_of_time(proven[1], plan, 40, took=90.0, asked=False)
+    short, over = short_of_time(proven[1], plan, 40, took=90.0, asked=False)
     assert "of 12 experiments, not of 40, as the time was up" in short
     assert "it took 1.5 min, 30 s more than was asked for" in over
-    assert len(make._short_of_time(proven[1], plan, 40, took=90.0, asked=True)) == 1
+    assert len(short_of_time(proven[1], plan, 40, took=90.0, asked=True)) == 1
 
 
 @pytest.mark.parametrize(("minutes", "count"), [(0.5, 16), (1.0, 24), (60.0, 60)])
@@ -230,6 +236,47 @@ def test_no_more_experiments_are_asked_for_than_trials_fit_in_the_time(
     design = Design.model_validate({"duration": 250.0})
     found = affordable(config, design, minutes=minutes, workers=2)
     assert (found.estimation, found.selection, found.test) == (count, count // 4, count // 4)
+
+
+def test_a_poor_surrogate_is_said_to_be_poor_with_what_helps(proven: tuple[Bundle, Proof, JudgementRecord]) -> None:
+    assert poor(proven[1], 1.0) == []
+    (said,) = poor(replace(proven[1], errors=np.full((12, 1), 0.3)), 1.0)
+    assert said.startswith("this surrogate is poor: 0 % of the new experiments are within 1 %, and y is 30 % of its")
+    assert "--minutes 2 or more" in said
+    (said,) = poor(replace(proven[1], errors=np.full((12, 1), np.inf)), 1.0)
+    assert "y is without bound in half" in said
+
+
+def test_a_reference_that_is_random_is_told_to_who_goes_on_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Python has no screen for warnings, and a second run runs nothing that would tell."""
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "noise.py").write_text(
+        "import numpy as np\n\ndef noise(t, u, p):\n    return u + np.random.default_rng().standard_normal(u.shape)\n",
+        encoding="utf-8",
+    )
+    reference = {**REFERENCE, "python": "noise.py:noise", "folder": str(tmp_path)}
+    config = check(
+        ExperimentConfig, {"kind": "experiment", "name": "noise", "workers": 1, "reference": reference,
+        "experiment": DESIGN}, where="",
+    )  # fmt: skip
+    for _ in range(2):
+        carry_out(experiment_program(config, text="", folder=tmp_path), tmp_path / "out", command="test")
+        (said,) = unlike(tmp_path / "out")
+        assert "The reference is random (give it a seed)" in said
+    assert unlike(tmp_path) == []
+
+
+def test_a_parameter_without_effect_is_told(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    u, p = rng.standard_normal(400), np.repeat(rng.uniform(0.0, 1.0, 4), 100)
+    y = np.zeros(400)
+    for k in range(1, 400):
+        y[k] = 0.8 * y[k - 1] + 0.2 * u[k]
+    traces = sysid.data({"u": u, "p": p, "y": y}, inputs=["u", "p"], outputs="y", sample_time=0.5)
+    fit = sysid.fit(traces, "u+p -> y", sysid.ARX(na=1, nb=(1, 1), nk=(0, 0)), rest_output=0.0)
+    bundle = sysid.save(fit, traces, tmp_path / "bundle", formats=("c",), start=Start())
+    (said,) = without_effect(bundle, traces.traces)
+    assert said.startswith("p moves no output by more than")
 
 
 def test_what_experiments_take_is_told_before_they_are_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
