@@ -14,7 +14,7 @@ from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit
 from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ConfigError
-from sysid.estimation import estimators
+from sysid.estimation import StabilityOptions, estimators
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
@@ -119,9 +119,9 @@ class OrderSearch:
         """The fit of the first of all, with what every fit says of its records."""
         structure = self.contenders[0].fit.model.structure
         # Those of the search were fitted by the dozen, and say nothing.
-        checked = {} if isinstance(structure, ARX) else {"stability": None}
+        checked = StabilityOptions() if isinstance(structure, ARX) else None
         estimation = self.traces.with_role(Role.ESTIMATION)
-        found = estimators.fit(estimation, self.mapping, structure, start=self.start, **checked)
+        found = estimators.fit(estimation, self.mapping, structure, start=self.start, stability=checked)
         return Fit.of(found, self.traces, self.start)
 
     @property
