@@ -19,6 +19,10 @@ VISIBLE = 0.05
 """Part of its peak from which a response is seen with the naked eye."""
 RINGS = 0.3
 """Damping ratio below which a response is told to ring."""
+MOST_LOST = 0.1
+"""Share of the output's variance that a slower rate may lose."""
+SUMS = "the plant integrates, and a step response that does not end has no time in which it rises"
+QUICKER = "the output moves faster than the linear response that was found, which does not show how fast it answers"
 AWAY = "the plant runs away by itself, and what is seen is the loop"
 QUIET, LOUD = 20.0, 5.0
 """Signal-to-noise ratios in decibel from which a record is quiet, and below which it is loud."""
@@ -146,6 +150,29 @@ def rise(response: NDArray[np.float64]) -> float:
     return float(places[1] - places[0])
 
 
+def lost(record: Record, every: int) -> float:
+    """What means over blocks of samples lose of an output, beside its noise: a rate that loses much is no proposal.
+
+    Args:
+        record: The record.
+        every: Samples of a block.
+
+    Returns:
+        The share of the output's variance within its stretches.
+    """
+    within, power, bends = 0.0, 0.0, list[NDArray[np.float64]]()
+    for y in record.values(record.mapping.output):
+        n = len(y) // every * every
+        blocks = y[:n].reshape(-1, every)
+        within += float(np.sum((blocks - blocks.mean(axis=1, keepdims=True)) ** 2))
+        power += float(np.sum((y[:n] - y[:n].mean()) ** 2)) if n else 0.0
+        bends.append(np.diff(y, 2))
+    count = sum(len(y) // every * every for y in record.values(record.mapping.output))
+    # White noise is lost as well, and nobody misses it: second differences show hardly anything else here.
+    noise = float(np.mean(stacked(bends) ** 2)) / 6.0 if len(stacked(bends)) else 0.0
+    return max(within - noise * count * (1.0 - 1.0 / every), 0.0) / max(power, 1e-300)
+
+
 def check_sampling(record: Record) -> Iterator[Finding]:
     """Samples within the rise of the step response, of the input that moves the output most.
 
@@ -170,10 +197,15 @@ def check_sampling(record: Record) -> Iterator[Finding]:
     samples = rise(found.step()[0][j]) * factor
     subject = (found.mapping.inputs[j],)
     figures = {"rise": samples, "sample_time": record.sample_time, "factor": factor}
+    every, response = max(int(samples / GOOD), 2), np.abs(found.values[j])
+    if samples > TOO_FAST and (record.integrates or lost(record, every) > MOST_LOST):
+        reason = SUMS if record.integrates else QUICKER
+        yield Finding(topic=Topic.SAMPLING, code="sampling.unknown", verdict=Verdict.UNKNOWN, reason=reason)
+        return
     if samples > TOO_FAST:
         code, verdict = "sampling.fast", Verdict.LOOK if samples > FAR_TOO_FAST else Verdict.NOTE
-        figures["proposed"] = record.sample_time * max(int(samples / GOOD), 2)
-    elif found.settling()[j] <= 1 and found.dead_times[j].best == 0:
+        figures["proposed"] = record.sample_time * every
+    elif found.settling()[j] <= 1 and response[0] >= VISIBLE * response.max():
         code, verdict = "sampling.at_once", Verdict.NOTE
         figures["proposed"] = record.sample_time / 5.0
     elif samples < TOO_SLOW and found.settling()[j] - found.dead_times[j].best <= 3:

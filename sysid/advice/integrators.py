@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from sysid.errors import UserError
 from sysid.estimation.experiment import experiments_of, unit_range
@@ -27,6 +28,8 @@ UNEXPLAINED = 0.1
 """Share of the output's variance that the best model may leave: of what it leaves, nobody knows whether it adds up."""
 BRINGS = 0.5
 """Share of the output's variance that has to come from the sum: one that brings nothing does no harm either."""
+BENDS = 0.3
+"""The same of what lines in time leave of both: an offset that is summed up is a line, and so is any drift."""
 
 
 def integrates(traces: Sequence[Trace], mapping: Mapping) -> bool:
@@ -35,7 +38,7 @@ def integrates(traces: Sequence[Trace], mapping: Mapping) -> bool:
     Linear state spaces are fitted to the free run, with and without a pole that is 1 exactly. A pole that is found near
     1 says little: of a plant with friction it lies beside 1 by more than its interval. What a record does show is
     whether anything is lost where the level of the output changes nothing. A plant integrates where the sum brings
-    most of the output, and the model that has it leaves about as little as one that is free.
+    most of the output, beside a line in time too, and the model that has it leaves about as little as one that is free.
 
     Args:
         traces: The records.
@@ -54,15 +57,27 @@ def integrates(traces: Sequence[Trace], mapping: Mapping) -> bool:
     records = NeuralProvider(template=form, experiments=experiments)
     values = [y[counts] for (_, y), counts in zip(records.signals, records.counted, strict=True)]
     variance = float(np.var(np.concatenate(values)))
+    off_line = _off_lines(values)
     free = min(_left(records, states, 0)[0] for states in STATES)
     if free > UNEXPLAINED * variance:
         return False
-    left, brought = min(_left(records, states, 1) for states in STATES)
-    return left <= max(NO_WORSE * free, EXACT * variance) and brought >= BRINGS * variance
+    left, brought, bent = min(_left(records, states, 1) for states in STATES)
+    adds_up = left <= max(NO_WORSE * free, EXACT * variance) and brought >= BRINGS * variance
+    return adds_up and bent >= BENDS * off_line
 
 
-def _left(records: NeuralProvider, states: int, integrators: int) -> tuple[float, float]:
-    """Mean squared error of the best linear model, and the variance that the mode at 1 brings; in scaled numbers."""
+def _off_lines(values: Sequence[NDArray[np.float64]]) -> float:
+    """Mean square of what a line in time, of each record its own, leaves of some signals."""
+    squares, count = 0.0, 0
+    for y in values:
+        line = np.column_stack([np.ones(len(y)), np.linspace(-1.0, 1.0, len(y))])
+        left = y - line @ np.linalg.lstsq(line, y, rcond=None)[0]
+        squares, count = squares + float(np.sum(left**2)), count + left.size
+    return squares / max(count, 1)
+
+
+def _left(records: NeuralProvider, states: int, integrators: int) -> tuple[float, float, float]:
+    """Mean squared error of the best linear model, the variance of its mode at 1, with lines in time and without."""
     sizes = replace(records.template.sizes, states=states, integrators=integrators)
     form = replace(records.template, sizes=sizes, theta=np.zeros(sizes.count))
     provider = replace(records, template=form)
@@ -72,5 +87,6 @@ def _left(records: NeuralProvider, states: int, integrators: int) -> tuple[float
     last = np.argmin(np.abs(values - 1.0))
     mode, shape = left[:, last].real, right[:, last].real
     brings = float(theta[sizes.output_linear][:states] @ shape) / float(mode @ shape or 1.0)
-    paths = np.concatenate(provider.states(theta))
-    return 2.0 * provider.loss(theta) / provider.n_samples, float(np.var(brings * (paths @ mode)))
+    paths = [brings * (path @ mode) for path in provider.states(theta)]
+    error = 2.0 * provider.loss(theta) / provider.n_samples
+    return error, float(np.var(np.concatenate(paths))), _off_lines(paths)

@@ -409,3 +409,24 @@ def test_a_drift_that_is_the_sum_of_an_input_is_no_drift() -> None:
     found = look(trace(u, plant(u) + charge + noise(2000, 9, 0.02)))
     assert finding(found, "output.sums", "u1").figures["size"] == pytest.approx(charge[-1] - charge[0], rel=0.2)
     assert "output.drift" not in codes(found)
+
+
+def test_no_rate_is_proposed_that_loses_what_the_output_does() -> None:
+    """A pendulum of 2 s was to be resampled to 1.4 s: its linear response drifts, and that was taken for its rise."""
+    u, x, speed = 7.0 * steps(1000, 5, 35), 0.0, 0.0
+    y = np.empty(1000)
+    for t in range(1000):
+        y[t] = x
+        for _ in range(5):
+            speed += 0.01 * (u[t] - 9.81 * np.sin(x) - 0.6 * speed)
+            x += 0.01 * speed
+    found = look(trace(u, y + noise(1000, 5, 0.02), sample_time=0.05))
+    assert "sampling.fast" not in codes(found)
+
+
+def test_an_answer_one_sample_later_is_not_at_once() -> None:
+    u = steps(600, 8, 1)
+    found = look(trace(u, np.asarray(lfilter([0.0, 1.425], [1.0, -0.05], u)) + noise(600, 8, 0.02)))
+    assert "sampling.at_once" not in codes(found)
+    at_once = look(trace(u, 2.0 * u + noise(600, 9, 0.02)))
+    assert "sampling.at_once" in codes(at_once)

@@ -59,6 +59,7 @@ def test_what_adds_up_is_found(u: Array, y: Array) -> None:
         pytest.param(STEPS, first_order(0.99), 0.01, id="a very slow one"),
         pytest.param(STEPS, lfilter([0.1], [1.0, -1.8, 0.9], STEPS), 0.01, id="a resonance"),
         pytest.param(STEPS, first_order(0.9) + np.linspace(0.0, 5.0, N), 0.01, id="a drift beside it"),
+        pytest.param(STEPS, first_order(0.6) + np.linspace(0.0, 8.0, N), 0.01, id="a drift that is most of it"),
         pytest.param(STEPS, np.cumsum(STEPS), 0.5, id="nothing but noise can be said"),
     ],
 )
@@ -68,6 +69,15 @@ def test_what_settles_is_not_taken_for_it(u: Array, y: Array, noise: float) -> N
 
 def look(u: Array, y: Array) -> Advice:
     return advise(TraceSet(name="x", traces=(a_trace(u, y),), roles={"a": Role.ESTIMATION}), MAPPING)
+
+
+def test_what_adds_up_has_no_rise_to_be_sampled_by() -> None:
+    """A rise of hundreds of samples, and a rate of a few a minute, had been proposed for a tank."""
+    u = np.repeat(np.random.default_rng(4).uniform(-1.0, 1.0, 60), 17)[:1000]
+    found = look(u, 3.0 + np.cumsum(u - u.mean()) * 0.05)
+    assert found.find("settling.integrates", "u") is not None
+    assert found.find("sampling.unknown") is not None
+    assert found.find("sampling.fast", "u") is None
 
 
 def test_it_is_told_and_what_is_suggested_has_it() -> None:

@@ -15,7 +15,7 @@ from sysid.estimation.estimators import estimator_of
 from sysid.estimation.networks.halving import planned_iterations
 from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.finish import MOST, slowness
+from sysid.workbench.auto.finish import MOST, MOST_KEPT, SPILL, slowness
 from sysid.workbench.sweep.search_space import Point
 
 REFIT, TRIAL = 0.2, 0.15
@@ -33,10 +33,6 @@ LINEAR = 0.5
 """Share of the time of all trials by whose end linear structures beyond the first of each kind have to be done."""
 LARGER = 0.35
 """The same for those of more states than are tried unasked."""
-SPILL = 0.05
-"""Share of the time by which scores, export and report may end after it."""
-MOST_KEPT = 0.5
-"""Share of the time that is kept for them at most: a search of a minute on a busy machine has to try something."""
 FINAL = 0.15
 """Share of either that is kept for trying the best once more."""
 

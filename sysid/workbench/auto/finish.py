@@ -18,6 +18,10 @@ DRAWING_S, SLOWEST_PACE = 0.04, 20.0
 """Processor seconds of a picture that is drawn to measure a machine by, and how much slower it may be at most."""
 PAGE_SHARE, FEWEST = 0.15, 3
 """Share of the time of a search that pictures of single cases may take, and cases that are drawn in any case."""
+SPILL = 0.05
+"""Share of the time by which scores, export and report may end after it."""
+MOST_KEPT = 0.5
+"""Share of the time that is kept for them at most: a search of a minute on a busy machine has to try something."""
 PROBE_S, MOST = 0.2, 20.0
 """Processor seconds for which the machine is looked at, and how much slower it may be found at most."""
 
@@ -112,6 +116,33 @@ def slowness() -> float:
     while (worked := time.process_time() - cpu) < PROBE_S:
         pass
     return min(max(1.0, (time.perf_counter() - wall) / worked), MOST)
+
+
+def time_told(wall_s: float, finish: float) -> str:
+    """What a search's time is for, in words, before it begins.
+
+    Args:
+        wall_s: Seconds of the search.
+        finish: Of scores, export and report, as :func:`finish_s` says.
+
+    Returns:
+        A sentence; where these take more than a search leaves them, how long all will take, and what would do.
+
+    Example:
+        >>> time_told(600.0, 20.0)
+        'Time: 10.0 min at most, about 20 s of it for scores, export and report.'
+        >>> time_told(30.0, 60.0).splitlines()[1]
+        'The search ends after half of the time, and the command after some 75 s: give it 2.0 min or more.'
+    """
+    most = MOST_KEPT * wall_s
+    if finish <= most + SPILL * wall_s:
+        return f"Time: {span(wall_s)} at most, about {span(finish)} of it for scores, export and report."
+    enough = span(max(90.0, finish / MOST_KEPT))
+    return (
+        f"Time: {span(wall_s)} are too few on this machine as busy as it is: scores, export and report alone take "
+        f"about {span(finish)}.\nThe search ends after half of the time, and the command after some "
+        f"{span(wall_s - most + finish)}: give it {enough} or more."
+    )
 
 
 def span(seconds: float) -> str:

@@ -12,9 +12,9 @@ from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, AbstractStructure
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.auto.budget import FINAL, GOING_ON, MOST_KEPT, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget
+from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
-from sysid.workbench.auto.finish import finish_s, span
+from sysid.workbench.auto.finish import MOST_KEPT, finish_s, span
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
 from sysid.workbench.auto.plan import AGAIN, Plan, Rank, ranked_by

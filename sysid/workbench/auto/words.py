@@ -11,6 +11,7 @@ from sysid.reporting.numbers import number, quantity
 from sysid.reporting.sweep_record import Trial
 from sysid.validation.resolution import tied
 from sysid.workbench.auto.plan import ALIKE, RIVAL, ranked_by
+from sysid.workbench.sweep.trial import FAILED
 
 Error = Callable[[Trial], float]
 NEAR = 0.15
@@ -29,6 +30,7 @@ class Choice:
         linear: The best linear one; ``None`` where none can be used.
         refused: Trials of less error that were passed over, as their free run is not stable.
         nonlinear: Trials that are no linear model.
+        finished: Of these the ones that came to a result, whatever it is worth; the others say nothing.
         more_within: Over how many of the traces that choose it stays within the tolerance, in words, where that is
             why it comes before one of less error; empty elsewhere.
         stable: The best stable one, where that was passed over for one whose training goes on.
@@ -40,6 +42,7 @@ class Choice:
     linear: Trial | None
     refused: int
     nonlinear: int
+    finished: int
     more_within: str = ""
     stable: Trial | None = None
     alone: Trial | None = None
@@ -86,11 +89,12 @@ def choose(
     alike = [t for t in usable[refused:] if no_worse(t) and outside(t) <= outside(chosen)]
     more = tolerance is not None and min(map(error, usable[refused:])) < error(chosen)
     smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
-    nonlinear = sum(not ESTIMATORS[t.structure["kind"]].linear for t in trials)
+    nonlinear = [t for t in trials if not ESTIMATORS[t.structure["kind"]].linear]
     alone = [t for t in usable if t.structure == smallest.structure and "ensemble" not in t.values]
     found = Choice(
         alone=alone[0] if alone and "ensemble" in smallest.values else None,
-        chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=nonlinear,
+        chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=len(nonlinear),
+        finished=sum(t.status != FAILED for t in nonlinear),
         more_within=f"{1.0 - outside(chosen):.0%} of what chose within {tolerance:.0%} of its range" if more else "",
     )  # fmt: skip
     ahead = [k for k, t in enumerate(usable[:refused]) if goes_on(t) and RIVAL**2 * error(t) < error(chosen)]
@@ -109,6 +113,16 @@ def cannot_be_told(best: Trial, other: Trial, error: Error) -> bool:
 def both_exact(*trials: Trial) -> bool:
     """Whether what several leave is rounding: an error of 1e-16 is no better than one of 1e-14."""
     return all(one.selection_rms_shares and max(one.selection_rms_shares) <= EXACT for one in trials)
+
+
+def _beside_nonlinear(choice: Choice) -> str:
+    """What nonlinear models have to do with the choice of a linear one: those that were not done are not worse."""
+    if not choice.nonlinear:
+        return "no nonlinear model was tried"
+    if not choice.finished:
+        return f"no nonlinear model came to a result ({choice.nonlinear} begun), so that none may be called worse"
+    without = choice.nonlinear - choice.finished
+    return "and no nonlinear model does better" + (f" ({without} more came to no result)" if without else "")
 
 
 def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit: str, ended: str, error: Error) -> str:
@@ -155,7 +169,7 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit
         share = 1.0 - root / linear if linear else 0.0  # what is met exactly has no error to better
         parts.append(f"{share:.0%} less than the best linear model, {choice.linear.label}")
     elif choice.linear is not None:
-        parts.append("and no nonlinear model does better" if choice.nonlinear else "no nonlinear model was tried")
+        parts.append(_beside_nonlinear(choice))
     said = f"{'; '.join(parts)}; {ended}."
     if choice.stable is not None:
         said += (

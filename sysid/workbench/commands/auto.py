@@ -11,7 +11,7 @@ from sysid.api.looking import mapping_of
 from sysid.field_checks import check
 from sysid.names import slug
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import finish_s, span
+from sysid.workbench.auto.finish import finish_s, time_told
 from sysid.workbench.auto.run import auto_of, program_of
 from sysid.workbench.commands.simulate import parse_start
 from sysid.workbench.fits.data import data_of
@@ -46,8 +46,7 @@ def auto_command(source: str, *, given: Mapping[str, Any], fresh: bool, out: Pat
     data = data_of(traces, config.mapping)
     if config.wall_s is not None:
         finish = finish_s(len(data.traces), len(config.mapping.outputs), config.wall_s)
-        said = f"Time: {span(config.wall_s)} at most, about {span(finish)} of it for scores, export and report."
-        console().print(said, soft_wrap=True, markup=False)
+        console().print(time_told(config.wall_s, finish), soft_wrap=True, markup=False)
     words = [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
     request = RunRequest(path=Path(source), typed=source, options=tuple(words), fresh=fresh, out=out, tracking=tracking)
     return perform(program_of(auto_of(config, load=lambda: data), verb="auto"), request)

@@ -8,7 +8,7 @@ from sysid.field_checks import check
 from sysid.models import ARX
 from sysid.reporting.fit_tables import DRAWN
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import FEWEST, PICTURE_S, SLOWEST_PACE, finish_s, pace
+from sysid.workbench.auto.finish import FEWEST, PICTURE_S, SLOWEST_PACE, finish_s, pace, time_told
 
 SEARCH = {"kind": "auto", "name": "a", "data": "rig", "mapping": "u -> a+b+c+d+e"}
 STRUCTURE = ARX(na=1, nb=(1,), nk=(1,))
@@ -39,3 +39,11 @@ def test_what_follows_is_planned_by_what_this_machine_takes_for_a_picture() -> N
     now, twice = (finish_s(40, 2, slowed=1.0, paced=times * pace()) for times in (1.0, 2.0))
     assert twice == pytest.approx(2.0 * now)
     assert finish_s(40, 2, slowed=1.0) == now
+
+
+def test_a_time_that_is_too_short_says_how_long_it_takes_and_what_would_do() -> None:
+    said = time_told(30.0, 63.0)
+    assert "30 s are too few" in said
+    assert "after some 78 s: give it 2.1 min or more" in said
+    assert "63 s of it" not in said
+    assert time_told(600.0, 20.0).startswith("Time: 10.0 min at most, about 20 s of it")

@@ -57,6 +57,15 @@ def test_a_linear_model_that_is_as_good_is_chosen() -> None:
     assert "and no nonlinear model does better" in sentence(found, 2, unit="V", ended="", error=error)
 
 
+def test_what_came_to_no_result_is_not_said_to_be_worse() -> None:
+    late = network(2, float("nan"), 20).model_copy(update={"status": "FAILED", "usable": False})
+    said = sentence(choose([arx(1, 1.0), late], error, stable), 2, unit="V", ended="", error=error)
+    assert "no nonlinear model came to a result (1 begun)" in said
+    assert "does better" not in said
+    both = sentence(choose([arx(1, 1.0), late, network(3, 2.0, 60)], error, stable), 3, unit="V", ended="", error=error)
+    assert "and no nonlinear model does better (1 more came to no result)" in both
+
+
 def test_two_models_that_are_exact_are_no_better_than_each_other() -> None:
     smaller = arx(1, 0.0).model_copy(update={"operations": 5})
     found = choose([smaller, arx(2, 0.0), network(3, 1.0, 60)], error, stable)
