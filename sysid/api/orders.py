@@ -190,7 +190,7 @@ class OrderSearch:
 
     def score(self, finalist: Finalist, criterion: Criterion) -> float:
         """A criterion of a structure; smaller is better."""
-        return score(finalist, self.losses.n_samples, criterion)
+        return score(finalist, self.losses, criterion)
 
     def plot(self) -> Figure:
         """Loss against number of parameters, with what each criterion chooses.
@@ -310,7 +310,7 @@ def search_orders(
     if selection:
         found, said = smallest_first(found), BY_SELECTION
     else:
-        found = tuple(sorted(found, key=lambda one: score(one, losses.n_samples, Criterion.BIC)))
+        found = tuple(sorted(found, key=lambda one: score(one, losses, Criterion.BIC)))
         said = "sorted by BIC, for want of selection traces"
     return OrderSearch(
         losses=losses, finalists=found, chosen_by=said, grid=grid, mapping=chosen, traces=traces, start=start,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, UserError
 from sysid.estimation.estimators import fit
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.linear.order_search import Criterion, weighed
+from sysid.estimation.linear.order_search import Criterion, OrderLosses, weighed
 from sysid.estimation.result import FitResult
 from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, TransferFunction, gaps
 from sysid.traces import Trace
@@ -150,16 +150,16 @@ def one_step_mse(found: FitResult, traces: Sequence[Trace], start: Start) -> flo
     return total / max(counted, 1)
 
 
-def score(finalist: Finalist, samples: int, criterion: Criterion) -> float:
+def score(finalist: Finalist, losses: OrderLosses, criterion: Criterion) -> float:
     """A criterion of one structure among others; smaller is better.
 
     Args:
         finalist: The structure.
-        samples: Of the estimation traces that count, the same for all.
+        losses: Those of the search, whose samples and rounding are the same for all.
         criterion: Which.
 
     Returns:
         It.
     """
-    mse, size = np.array([finalist.one_step_mse]), np.array([finalist.fit.model.n_parameters])
-    return float(weighed(mse, size, samples, criterion)[0])
+    mse = np.array([max(finalist.one_step_mse, losses.rounding)])
+    return float(weighed(mse, np.array([finalist.fit.model.n_parameters]), losses.n_samples, criterion)[0])

@@ -163,6 +163,20 @@ def test_structures_are_named_in_a_text_too_and_an_order_is_a_number_above_0() -
             sysid.search_orders(traces, "u -> y", structures="OE", most=most, **small)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_of_structures_that_are_exact_the_smallest_is_first(seed: int) -> None:
+    """Without noise larger ones are as exact, and rounding had chosen among them."""
+    u, y = np.random.default_rng(seed).standard_normal(400), np.zeros(400)
+    u[:10] = 0.0  # it begins at rest
+    for k in range(5, 400):
+        y[k] = 1.5 * y[k - 1] - 0.7 * y[k - 2] + 1e6 * u[k - 5]
+    found = sysid.search_orders(sysid.data((u, y + 1e5), sample_time=1.0), "u -> y", structures="ARX, OE")
+    for criterion in ("BIC", "AIC", "AICc"):
+        assert found.best(criterion).label == "ARX [2; 1; 5]"
+    first = found.contenders[0].fit.model
+    assert (first.structure.label, first.n_parameters) == ("ARX [2; 1; 5]", 4)
+
+
 def test_a_late_correlation_that_is_no_dead_time_costs_no_grid_of_all_lags() -> None:
     """An integrator under feedback answers a periodic reference a quarter of a period late, and at once."""
     rng, n = np.random.default_rng(0), 3000

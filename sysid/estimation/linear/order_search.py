@@ -6,7 +6,7 @@ import enum
 import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation.experiment import experiments_of
+from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import blocks_of
@@ -35,6 +35,24 @@ class Criterion(enum.Enum):
     """Hurvich and Tsai 1989: AIC with ``2 p (p + 1) / (N - p - 1)`` added, for short records."""
     BIC = "BIC"
     """Schwarz 1978, Rissanen's MDL: ``N ln V + p ln N``."""
+
+
+ROUNDING = 1e-12
+"""Root mean square error over that of the output below which an error is rounding, and no measure of a structure: records
+without noise had been given the order at which rounding happened to be least."""
+
+
+def rounding_of(experiments: Sequence[Experiment]) -> float:
+    """The mean squared error below which errors of an output are rounding.
+
+    Args:
+        experiments: Its records; samples without weight do not count.
+
+    Returns:
+        In its unit squared.
+    """
+    seen = [one.output if one.weights is None else one.output[one.weights > 0.0] for one in experiments]
+    return float(ROUNDING**2 * np.mean(np.concatenate(seen) ** 2))
 
 
 def weighed(mse: NDArray[np.float64], p: NDArray[np.int64], n: int, criterion: Criterion) -> NDArray[np.float64]:
@@ -134,6 +152,8 @@ class OrderLosses:
             ``(n_candidates,)``.
         n_samples: Samples that count.
         intercept: Whether a constant is fitted.
+        rounding: Mean squared error below which all are alike: of structures that are exact the smallest is the best,
+            not the one that rounding favours.
     """
 
     na: NDArray[np.int16]
@@ -142,6 +162,7 @@ class OrderLosses:
     mse: NDArray[np.float64]
     n_samples: int
     intercept: bool
+    rounding: float = 0.0
 
     def __len__(self) -> int:
         return len(self.mse)
@@ -172,7 +193,7 @@ class OrderLosses:
         Returns:
             Shape ``(n_candidates,)``.
         """
-        return weighed(self.mse, self.n_parameters, self.n_samples, criterion)
+        return weighed(np.maximum(self.mse, self.rounding), self.n_parameters, self.n_samples, criterion)
 
     def best(self, criterion: Criterion = Criterion.BIC) -> ARX:
         """The candidate with the least criterion.
@@ -212,7 +233,8 @@ class OrderLosses:
         """
         columns = {"na": self.na, "nb": self.nb, "nk": self.nk, "mse": self.mse}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
-            np.savez_compressed(file, n_samples=self.n_samples, intercept=self.intercept, **columns)  # type: ignore[arg-type]  # numpy's stub takes its keyword for ours
+            numbers = {"n_samples": self.n_samples, "intercept": self.intercept, "rounding": self.rounding}
+            np.savez_compressed(file, **numbers, **columns)  # type: ignore[arg-type]  # numpy's stub takes its keyword for ours
 
     @classmethod
     def read(cls, path: Path) -> OrderLosses:
@@ -226,7 +248,10 @@ class OrderLosses:
         """
         with np.load(path, allow_pickle=False) as file:
             columns = {name: file[name] for name in ("na", "nb", "nk", "mse")}
-            return cls(**columns, n_samples=int(file["n_samples"]), intercept=bool(file["intercept"]))
+            rounding = float(file["rounding"]) if "rounding" in file else 0.0
+            return cls(
+                **columns, n_samples=int(file["n_samples"]), intercept=bool(file["intercept"]), rounding=rounding
+            )
 
 
 def _ignore(_done: int, _total: int) -> None:
@@ -310,7 +335,8 @@ def search_orders(
         for losses in pool.map(block, dead_times):
             blocks.append(losses)
             on_progress(len(blocks) * per_block, grid.size(m))
-    return _collected(np.array(blocks) / rows, grid, dead_times, rows)
+    found = _collected(np.array(blocks) / rows, grid, dead_times, rows)
+    return replace(found, rounding=rounding_of(experiments))
 
 
 def _collected(
