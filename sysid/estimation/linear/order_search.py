@@ -38,8 +38,8 @@ class Criterion(enum.Enum):
 
 
 ROUNDING = 1e-12
-"""Root mean square error over that of the output below which an error is rounding, and no measure of a structure: records
-without noise had been given the order at which rounding happened to be least."""
+"""Root mean square error over that of the output below which an error is rounding, and no measure of a structure: it
+had decided which orders a record without noise was given."""
 
 
 def rounding_of(experiments: Sequence[Experiment]) -> float:
