@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ from sysid.traces import Trace
 NEGLIGIBLE = 1e-6
 """Squared residual below which a target counts as met: that of a thousandth of the error that counts as one. Without it
 a target that is exactly right on a trace, such as a channel held at its bound, would outweigh all others."""
+
+IN_WINDOWS = -1
+"""In the place of a seed: the start that was trained on windows first."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,7 +70,8 @@ class _Candidate:
 
     @property
     def origin(self) -> str:
-        return "the members as they were" if self.seed is None else f"seed {self.seed}"
+        named = {None: "the members as they were", IN_WINDOWS: "what windows led to"}
+        return named.get(self.seed, f"seed {self.seed}")
 
     @property
     def sentence(self) -> str:
@@ -99,16 +103,22 @@ class Joint:
     on_progress: Callable[[FitProgress], None] = lambda _: None
     scored: Callable[[Cascade, Trace], tuple[Dict[str, NDArray[np.float64]], int]] | None = None
 
-    def fit(self, starts: Sequence[tuple[int | None, NDArray[np.float64]]]) -> CascadeFit:
+    def fit(
+        self, starts: Sequence[tuple[int | None, NDArray[np.float64]]], windows: Sequence[CascadeProvider] = ()
+    ) -> CascadeFit:
         """Train from some starts, dropping half of them at each checkpoint.
 
         Args:
             starts: Seed, or ``None`` for the provider's own cascade, and parameters in the basis.
+            windows: The same residuals over windows of the traces, the shortest first: what training on one after the
+                other makes of the first start is one start more.
 
         Returns:
             The best state seen; a start that was given is one of them.
         """
         training, began = self.training, now() - checkpoints_of(self.on_progress).earlier_s
+        if windows:
+            starts = [*starts, (IN_WINDOWS, self._through(windows, starts[0][1], began))]
         numbers = {seed: number for number, (seed, _) in enumerate(starts, start=1)}
         seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
         alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
@@ -130,6 +140,16 @@ class Joint:
             if interrupted or late or not any(_unfinished(one) for _, one in reached):
                 break
         return self._result(seen, interrupted=interrupted, seconds=now() - began)
+
+    def _through(
+        self, windows: Sequence[CascadeProvider], where: NDArray[np.float64], began: float
+    ) -> NDArray[np.float64]:
+        """Where a start is led by ever longer windows; nobody chooses on the way."""
+        for inner in windows:
+            short = replace(self, provider=inner)
+            name = f"windows of {inner.window}"
+            where = short._advance(where, self.training.checkpoints, began, "1/1", name).theta
+        return where
 
     def _advance(
         self, where: Solution | NDArray[np.float64], checkpoint: int, began: float, which: str, name: str

@@ -35,6 +35,8 @@ class JointTraining(TypedFields):
             less: where sensitivities explode, the few rows that do would forbid every step (``leverage.py``).
         robust_scale: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
             its logarithm (Cauchy loss): a few traces on which the free run is lost do not rule it (``robust_loss.py``).
+        windows: Samples of the windows, the shortest first, on which a second start is trained before it is raced with
+            the members as they were: each window is begun with what is measured (``joint_record.py``).
         damping: How far a step may go, as in :class:`~sysid.estimation.Training`.
         workers: Records that are worked on at the same time.
     """
@@ -50,6 +52,7 @@ class JointTraining(TypedFields):
     moves: float = float("inf")
     leverage: float = float("inf")
     robust_scale: float = float("inf")
+    windows: tuple[int, ...] = ()
     damping: str = "marquardt"
     workers: int = 2
 
@@ -58,6 +61,13 @@ class JointTraining(TypedFields):
         for name in ("max_iterations", "patience", "checkpoints", "starts", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
+        object.__setattr__(self, "windows", tuple(self.windows))
+        if any(one < 2 for one in self.windows) or list(self.windows) != sorted(set(self.windows)):
+            raise ConfigError(
+                "these are no windows to train on", where="windows", got=self.windows,
+                expected="numbers of samples above 1, each larger than the one before, as in [200, 800, 2400]",
+                remedy="correct them, or leave them out",
+            )  # fmt: skip
         for name in ("moves", "leverage", "robust_scale"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
@@ -71,6 +81,7 @@ class JointTraining(TypedFields):
         *,
         begins: Callable[[Trace], Dict[str, float]] = lambda _: {},
         measured: Callable[[Trace], Experiment] | None = None,
+        window: int | None = None,
     ) -> CascadeProvider:
         """Residuals and Jacobians of a whole as these options have them count; every option that the provider has.
 
@@ -81,6 +92,7 @@ class JointTraining(TypedFields):
             trained: Outputs of the members that are trained; all by default.
             begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
             measured: From a trace its record, where it begins with measured samples.
+            window: Samples of the windows that traces are cut into; ``None`` for whole traces.
 
         Returns:
             The provider.
@@ -101,4 +113,5 @@ class JointTraining(TypedFields):
             workers=self.workers,
             begins=begins,
             measured=measured,
+            window=window,
         )

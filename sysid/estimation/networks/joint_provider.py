@@ -18,6 +18,7 @@ from sysid.estimation.least_squares.counted_rows import counted_rows
 from sysid.estimation.least_squares.leverage import leverage_roots
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.least_squares.robust_loss import counted
+from sysid.estimation.networks.joint_record import Record, windows_of
 from sysid.estimation.networks.trained_members import TrainedMembers
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import Program
@@ -40,21 +41,6 @@ ALIVE = 256 * 1500 * 4
 GATHERED = 1024
 """Rows at most that are gathered before they are squared, where there are fewer than parameters: adding a matrix of
 1,500 by 1,500 costs as much as some 500 rows."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Record:
-    """One trace: every channel in a first run, after as many rows as the lags reach back; the targets where they count.
-
-    Inputs, and outputs of members that come before any trained one, keep the values of the first run. ``rows`` are
-    those of the samples that count, among the samples. Targets stand column by column, and so do the roots of what
-    they weigh: none where a target, or an input, is masked.
-    """
-
-    values: NDArray[np.float64]
-    rows: NDArray[np.int64]
-    target: NDArray[np.float64]
-    root_weights: NDArray[np.float64] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +76,8 @@ class CascadeProvider(AbstractProvider):
         begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
         measured: From a trace its record, of all channels in the wiring's order, where it begins with measured samples:
             what came before is then not known.
+        window: Samples after which the free run of a trace begins anew from what is measured (``joint_record.py``);
+            ``None`` for one run over the whole trace.
 
     Raises:
         ChannelError: If a trace lacks an input or a target, or a name is no output of the cascade.
@@ -107,9 +95,10 @@ class CascadeProvider(AbstractProvider):
     workers: int = 1
     begins: Callable[[Trace], Dict[str, float]] = lambda _: {}
     measured: Callable[[Trace], Experiment] | None = None
+    window: int | None = None
     n_samples: int = field(init=False)
     _trained: TrainedMembers = field(init=False, repr=False)
-    _records: tuple[_Record, ...] = field(init=False, repr=False)
+    _records: tuple[Record, ...] = field(init=False, repr=False)
     _longest: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -119,7 +108,7 @@ class CascadeProvider(AbstractProvider):
         if strangers or not self.errors:
             raise ChannelError(strangers or ["(none)"], cascade.outputs, where="targets and trained members")
         put(self, "_trained", TrainedMembers.of(cascade, self.trained))
-        put(self, "_records", tuple(self._record(trace) for trace in self.traces))
+        put(self, "_records", tuple(part for trace in self.traces for part in self._in_windows(trace)))
         put(self, "n_samples", int(sum(_counted(record).sum() for record in self._records)))
         put(self, "_longest", np.inf if np.isinf(self.leverage) else self.leverage * self._median_row())
 
@@ -148,7 +137,7 @@ class CascadeProvider(AbstractProvider):
         """Half the weighted sum of squared residuals; see the base class."""
         program = self._trained.program_at(theta)
 
-        def one(record: _Record) -> float:
+        def one(record: Record) -> float:
             passed = self._pass(program, record, keep=False)
             return counted(self._residual(record, passed.values), self.robust_scale, _counted(record))[0]
 
@@ -161,7 +150,7 @@ class CascadeProvider(AbstractProvider):
         n = len(theta)
         gradient, matrix, loss, correlated, rows = np.zeros(n), np.zeros((n, n)), 0.0, 0.0, 0
 
-        def one(record: _Record) -> tuple[float, NDArray[np.float64], NDArray[np.float64], int, float]:
+        def one(record: Record) -> tuple[float, NDArray[np.float64], NDArray[np.float64], int, float]:
             own, part, square, residual = self._normal_equations(program, record, n)
             return own, part, square, len(residual), float(np.mean([correlation_time(column) for column in residual.T]))
 
@@ -217,7 +206,19 @@ class CascadeProvider(AbstractProvider):
         written = list(self._trained.program.output_channel)
         return [written.index(column) if column in written else -1 for column in self._columns]
 
-    def _record(self, trace: Trace) -> _Record:
+    def _in_windows(self, trace: Trace) -> list[Record]:
+        """The record of a trace; or its windows, each but the first begun with what is measured."""
+        whole = self._record(trace)
+        if self.window is None:
+            return [whole]
+        known = whole.values.copy()
+        for column, name in enumerate(self.cascade.wiring.channels):
+            if name in trace.channel_names:
+                seen, own = trace.usable_of([name]), known[self._trained.depth :, column]
+                own[seen] = trace[name][seen]
+        return list(windows_of(whole, known, self.window, self._trained.depth))
+
+    def _record(self, trace: Trace) -> Record:
         cascade = self.cascade
         inputs, target = trace.columns(cascade.inputs), trace.columns(list(self.errors))
         rest = self.begins(trace)
@@ -226,14 +227,14 @@ class CascadeProvider(AbstractProvider):
         run = cascade.simulate_trace(trace, rest=rest)
         counts = trace.counted(cascade.inputs, self.errors)
         rows = self._rows(target, counts)
-        return _Record(
+        return Record(
             values=np.concatenate([np.tile(cascade.levels(inputs[0], rest), (self._trained.depth, 1)), run.values]),
             rows=rows,
             target=np.asfortranarray(target[rows]),
             root_weights=_roots(counts[rows]),
         )
 
-    def _begun(self, experiment: Experiment) -> _Record:
+    def _begun(self, experiment: Experiment) -> Record:
         """A record whose first samples are measured, the oldest held where the lags reach further back."""
         names = (*self.cascade.inputs, *self.errors)
         order = [names.index(name) for name in self.cascade.wiring.channels]
@@ -246,7 +247,7 @@ class CascadeProvider(AbstractProvider):
         elif experiment.usable is not None:
             counts &= experiment.usable[:, np.newaxis]
         rows = self._rows(experiment.output, counts)
-        return _Record(
+        return Record(
             values=values,
             rows=rows,
             target=np.asfortranarray(experiment.output[rows]),
@@ -258,8 +259,8 @@ class CascadeProvider(AbstractProvider):
         over = np.where(counts, target / np.array(list(self.errors.values())), np.nan)
         return counted_rows(over, self.stride, self.moves)
 
-    def _each(self, work: Callable[[_Record], _Found]) -> Iterator[_Found]:
-        def quietly(record: _Record) -> _Found:
+    def _each(self, work: Callable[[Record], _Found]) -> Iterator[_Found]:
+        def quietly(record: Record) -> _Found:
             # A start that runs away has sensitivities beyond the largest number; its step is then not taken.
             with np.errstate(over="ignore", invalid="ignore"):
                 return work(record)
@@ -270,7 +271,7 @@ class CascadeProvider(AbstractProvider):
         with ThreadPoolExecutor(self.workers) as pool:  # results come in the order of the records: sums do not depend
             yield from pool.map(quietly, self._records)  # on which thread was first
 
-    def _pass(self, program: Program, record: _Record, *, keep: bool) -> _Passed:
+    def _pass(self, program: Program, record: Record, *, keep: bool) -> _Passed:
         depth = self._trained.depth
         n = len(record.values) - depth
         passed = _Passed(
@@ -281,7 +282,7 @@ class CascadeProvider(AbstractProvider):
         kernel.go_on(*self._trained.plan, program.numbers, depth, passed.values, passed.kept, passed.held)
         return passed
 
-    def _away(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _away(self, record: Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Residuals over their errors where they count, unweighted, shape ``(n_counted, n_targets)``."""
         ran, found = values[self._trained.depth :], np.empty_like(record.target)
         for j, column in enumerate(self._columns):  # column by column, as they stand in memory: five times as fast
@@ -290,13 +291,13 @@ class CascadeProvider(AbstractProvider):
         found /= list(self.errors.values())
         return found
 
-    def _residual(self, record: _Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _residual(self, record: Record, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weighted residuals over their errors, shape ``(n_counted, n_targets)``."""
         residual = self._away(record, values)
         return residual if record.root_weights is None else residual * record.root_weights
 
     def _normal_equations(
-        self, program: Program, record: _Record, n: int
+        self, program: Program, record: Record, n: int
     ) -> tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         passed = self._pass(program, record, keep=True)
         residual = self._residual(record, passed.values)
@@ -363,7 +364,7 @@ class CascadeProvider(AbstractProvider):
         program, n = self._trained.program, len(self.theta)
         per_error = self._per_error(program)
 
-        def one(record: _Record) -> NDArray[np.float64]:
+        def one(record: Record) -> NDArray[np.float64]:
             blocks = self._blocks(program, record, self._pass(program, record, keep=True), n)
             return np.concatenate(
                 [
@@ -377,7 +378,7 @@ class CascadeProvider(AbstractProvider):
         return float(np.median(lengths[lengths > 0.0])) if lengths.any() else 1.0
 
     def _blocks(
-        self, program: Program, record: _Record, passed: _Passed, n: int
+        self, program: Program, record: Record, passed: _Passed, n: int
     ) -> Iterator[tuple[slice, list[_Moving]]]:
         """Block by block which counted rows of every target's Jacobian move, and these, in its scaled numbers.
 
@@ -419,7 +420,7 @@ def _roots(counts: NDArray[np.bool_]) -> NDArray[np.float64] | None:
     return None if counts.all() else np.asfortranarray(counts, dtype=np.float64)
 
 
-def _counted(record: _Record) -> NDArray[np.int64]:
+def _counted(record: Record) -> NDArray[np.int64]:
     """Rows that count for each target, shape ``(n_targets,)``."""
     if record.root_weights is None:
         return np.full(record.target.shape[1], len(record.rows), dtype=np.int64)

@@ -57,11 +57,13 @@ def fit_cascade(
         ConfigError: If a member that is trained, or lies between trained ones and a target, has no flat parameters.
     """
     training = training or JointTraining()
-    provider = training.provider(cascade, traces, unit_errors(cascade, traces, targets), trained)
+    errors = unit_errors(cascade, traces, targets)
+    provider = training.provider(cascade, traces, errors, trained)
+    windows = [training.provider(cascade, traces, errors, trained, window=samples) for samples in training.windows]
     records = [_channels(cascade, trace) for trace in traces]
     layout = JointLayout.of(provider.members, records, shared)
     joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)
-    return joint.fit([(None, layout.in_basis(provider.theta))])
+    return joint.fit([(None, layout.in_basis(provider.theta))], windows)
 
 
 def unit_errors(

@@ -75,7 +75,7 @@ Reads = dict[str, dict[str, LagsField]]
 """By the output of a member, lags of the channels that it reads more."""
 
 
-OF_TRAINING = ("max_iterations", "moves", "leverage", "robust_scale")
+OF_TRAINING = ("max_iterations", "moves", "leverage", "robust_scale", "windows")
 """Options of a training that a round may have for itself."""
 
 
@@ -91,6 +91,7 @@ class RoundConfig(Words):
         moves: Of its training.
         leverage: Of its training.
         robust_scale: Of its training.
+        windows: Of its training; ``[]`` for none any more.
     """
 
     OLD: ClassVar[Mapping[str, str]] = {"everywhere": "share_weights", **JOINT_TRAINING}
@@ -103,6 +104,7 @@ class RoundConfig(Words):
     moves: float | None = Field(default=None, gt=0)
     leverage: float | None = Field(default=None, gt=0)
     robust_scale: float | None = Field(default=None, gt=0)
+    windows: tuple[int, ...] | None = None
 
 
 class AgainConfig(RoundConfig):

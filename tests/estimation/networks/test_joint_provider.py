@@ -47,6 +47,36 @@ def test_sensitivities_equal_finite_differences(cascade):
     check(provider(cascade))
 
 
+@pytest.mark.parametrize("window", [7, 30])
+def test_sensitivities_over_windows_equal_finite_differences(window: int) -> None:
+    check(provider(service(), window=window))
+
+
+def test_windows_begin_with_what_is_measured() -> None:
+    """What a whole put out itself is exact over every window, wherever it begins; one as long as the trace is the trace."""
+    truth = service()
+    record = truth.simulate(command(90, len(truth.inputs), 0)).trace("its own")
+    for window in (1, 7, 40):
+        one = provider(truth, traces=(record,), window=window)
+        assert one.n_samples == provider(truth, traces=(record,)).n_samples
+        assert one.loss(one.theta) == pytest.approx(0.0, abs=1e-18)
+        off = 1.02 * one.theta
+        assert 0.0 < one.loss(off) < provider(truth, traces=(record,)).loss(off)
+    long = provider(truth, window=60)
+    assert_array_equal(long.residuals(long.theta), provider(truth).residuals(long.theta))
+
+
+def test_no_window_begins_with_what_stands_under_a_mask() -> None:
+    truth = service()
+    record = truth.simulate(command(90, len(truth.inputs), 0)).trace("its own")
+    usable = np.ones(90, dtype=np.bool_)
+    usable[20:45] = False
+    broken = record.values.copy()
+    broken[np.ix_(~usable, [name in truth.outputs for name in record.channel_names])] = 1e3
+    one = provider(truth, traces=(replace(record, values=broken, usable=usable),), window=30)
+    assert one.loss(one.theta) == pytest.approx(0.0, abs=1e-18)
+
+
 @pytest.mark.parametrize("trained", [("BP",), ("AR",), ("BC",), ("BP", "BC")], ids="+".join)
 def test_some_members_alone_are_trained(trained):
     one = provider(service(), trained=trained)

@@ -118,7 +118,33 @@ def test_a_cascade_with_a_linear_member_is_trained_too():
     assert mse(fit.model, record) < 1e-3 * mse(start, record)
 
 
-@pytest.mark.parametrize("fields", [{"starts": 0}, {"stride": 0}, {"moves": 0.0}], ids=str)
+@pytest.mark.parametrize(("seed", "by"), [(2, 0.1), (2, 0.2), (3, 0.2), (0, 0.4)])
+def test_a_whole_that_goes_astray_is_led_back_by_windows(seed: int, by: float) -> None:
+    """Three times the iterations over whole traces stay lost, or far behind."""
+    start, traces, unseen = disturbed(seed=seed, by=by), [measured(), measured(seed=1)], measured(seed=3)
+    short, long = replace(TRAINING, max_iterations=15, windows=(20, 80)), replace(TRAINING, max_iterations=45)
+    ours, plain = (
+        fit_cascade(start, traces, training=training, selection=[measured(seed=2)]) for training in (short, long)
+    )
+    errors = [max(mse(one.model, unseen, name) for name in TRUTH.outputs) for one in (ours, plain)]
+    assert errors[0] < 0.01
+    assert errors[0] < errors[1]
+    assert any("what windows led to" in note for note in ours.notes)
+    assert {one.start for one in ours.attempts} == {1, 2}
+
+
+def test_windows_never_take_a_better_start_away() -> None:
+    other = measured(disturbed(seed=11, by=0.1))
+    fit = fit_cascade(TRUTH, [other], training=replace(TRAINING, windows=(20, 80)), selection=[measured(seed=2)])
+    assert fit.status is Status.NOT_IMPROVED
+    assert_array_equal(fit.model.simulate_trace(other).values, TRUTH.simulate_trace(other).values)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"starts": 0}, {"stride": 0}, {"moves": 0.0}, {"windows": (1,)}, {"windows": (80, 20)}, {"windows": (20, 20)}],
+    ids=str,
+)
 def test_training_that_cannot_be_is_refused(fields):
     with pytest.raises(ConfigError):
         JointTraining(**fields)
