@@ -53,7 +53,7 @@ def test_sensitivities_over_windows_equal_finite_differences(window: int) -> Non
 
 
 def test_windows_begin_with_what_is_measured() -> None:
-    """What a whole put out itself is exact over every window, wherever it begins; one as long as the trace is the trace."""
+    """What a whole put out itself is exact over every window; one as long as the trace is the trace."""
     truth = service()
     record = truth.simulate(command(90, len(truth.inputs), 0)).trace("its own")
     for window in (1, 7, 40):
