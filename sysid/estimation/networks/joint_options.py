@@ -61,16 +61,21 @@ class JointTraining(TypedFields):
         for name in ("max_iterations", "patience", "checkpoints", "starts", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        object.__setattr__(self, "windows", tuple(self.windows))
-        if any(one < 2 for one in self.windows) or list(self.windows) != sorted(set(self.windows)):
-            raise ConfigError(
-                "these are no windows to train on", where="windows", got=self.windows,
-                expected="numbers of samples above 1, each larger than the one before, as in [200, 800, 2400]",
-                remedy="correct them, or leave them out",
-            )  # fmt: skip
+        self._check_windows()
         for name in ("moves", "leverage", "robust_scale"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
+
+    def _check_windows(self) -> None:
+        given = self.windows
+        whole = isinstance(given, list | tuple) and all(type(one) is int and one > 1 for one in given)
+        if not whole or list(given) != sorted(set(given)):
+            raise ConfigError(
+                "these are no windows to train on", where="windows", got=given,
+                expected="numbers of samples above 1, each larger than the one before, as in [200, 800, 2400]",
+                remedy="correct them, or leave them out",
+            )  # fmt: skip
+        object.__setattr__(self, "windows", tuple(given))
 
     def provider(
         self,

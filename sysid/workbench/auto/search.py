@@ -280,6 +280,7 @@ class Search:
             told=(
                 *self.parts.told,
                 *([hurried] if hurried else []),
+                *([f"{choice.chosen.label} was {choice.chosen.reason}."] if choice.chosen.reason else []),
                 *_busy(plan),
                 *_left_out(plan),
                 *(f"Look at the data: {one}" for one in self.looked.cautions),

@@ -10,6 +10,7 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.runner.store import digest
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.search_space import Point
+from sysid.workbench.sweep.trial import NOT_DONE
 
 HOPELESS, SEEN = 2.0, 2
 """Times the error of the best so far on the same folds, from so many on, beyond which a point is dropped."""
@@ -51,6 +52,8 @@ class Trials:
     def run(self, points: Sequence[Point]) -> list[Trial]:
         """Try some points on every fold; what is far behind the best on the same folds is dropped on the way.
 
+        What the end of the time finds with folds enough behind it is set against the best on these.
+
         Args:
             points: The points.
 
@@ -67,7 +70,16 @@ class Trials:
         whole = [trials for trials in found.values() if len(trials) == len(self.drivers)]
         contenders = [*([list(self.best)] if self.best else []), *whole]
         self.best[:] = min(contenders, key=_mean, default=[])
-        return [together(found[point.number], of=len(self.drivers)) for point in points]
+        return [self._judged(found[point.number]) for point in points]
+
+    def _judged(self, trials: Sequence[Trial]) -> Trial:
+        of, done = len(self.drivers), [trial for trial in trials if trial.reason != NOT_DONE]
+        if len(done) == len(trials) or len(done) < SEEN or not self.best or not math.isfinite(_mean(done)):
+            return together(trials, of=of)
+        by = _mean(self.best) / max(_mean(self.best[: len(done)]), 1e-300)
+        error, told = by * _mean(done), f"scored on {len(done)} of {of} parts, against the best on the same"
+        one = together(done, of=len(done))
+        return one.model_copy(update={"selection_free_run_mse": error, "reason": f"{told}: the time was up"})
 
 
 def _mean(trials: Iterable[Trial]) -> float:

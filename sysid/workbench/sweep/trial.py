@@ -172,6 +172,10 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     return outcome | {"seconds": trained, "cpu_s": time.process_time() - cpu}
 
 
+NOT_DONE = "it was not done when the time of the search was up"
+"""The reason of a trial that was not waited for."""
+
+
 def gave_up(job: Job) -> dict[str, Any]:
     """The result of a job that was not waited for any longer.
 
@@ -181,8 +185,7 @@ def gave_up(job: Job) -> dict[str, Any]:
     Returns:
         JSON values.
     """
-    reason = "it was not done when the time of the search was up"
-    return _named(job) | {"status": FAILED, "usable": False, "reason": reason, "seconds": 0.0, "cpu_s": 0.0}
+    return _named(job) | {"status": FAILED, "usable": False, "reason": NOT_DONE, "seconds": 0.0, "cpu_s": 0.0}
 
 
 def _named(job: Job) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.search import error
 from sysid.workbench.auto.trials import HOPELESS, SEEN, Trials, together
 from sysid.workbench.sweep.search_space import Point
+from sysid.workbench.sweep.trial import NOT_DONE
 from tests.workbench.auto.test_plan import trial
 
 
@@ -68,6 +69,38 @@ def test_a_part_that_is_hard_for_all_drops_nobody() -> None:
 def test_what_fails_on_one_part_cannot_be_chosen() -> None:
     found, _ = over({1: 1.0}, {1: math.inf})
     (one,) = found.run(points(1))
+    assert (one.usable, error(one)) == (False, math.inf)
+
+
+@dataclass
+class Late(Fold):
+    """A driver whose time is up: what it is asked for is not done."""
+
+    def run(self, wanted: Sequence[Point]) -> list[Trial]:
+        failed = {"usable": False, "reason": NOT_DONE, "selection_free_run_mse": math.nan}
+        return [one.model_copy(update=failed) for one in super().run(wanted)]
+
+
+@pytest.mark.parametrize(("done", "scored"), [(1, False), (2, True), (3, True)])
+def test_what_the_end_of_the_time_finds_is_set_against_the_best_on_the_same_parts(done: int, scored: bool) -> None:
+    """A network that was better on three parts of four had been thrown away with the fourth."""
+    errors = [{1: easy, 2: 0.25 * easy} for easy in (1.0, 2.0, 4.0, 64.0)]
+    found, _ = over(*errors)
+    (best,) = found.run(points(1))
+    known: Any = tuple((Fold if k < done else Late)(errors=one) for k, one in enumerate(errors))
+    (one,) = Trials(drivers=known, best=found.best).run(points(2)[1:])
+    assert one.in_full == scored
+    assert error(one) == (pytest.approx(0.25 * error(best)) if scored else math.inf)
+    assert one.reason == (
+        f"scored on {done} of 4 parts, against the best on the same: the time was up" if scored else NOT_DONE
+    )
+
+
+def test_what_fails_is_not_saved_by_the_end_of_the_time() -> None:
+    found, _ = over({1: 1.0}, {1: 1.0}, {1: 1.0}, {1: 1.0})
+    found.run(points(1))
+    known: Any = (Fold(errors={2: 0.1}), Fold(errors={2: math.inf}), Late(errors={2: 0.1}), Late(errors={2: 0.1}))
+    (one,) = Trials(drivers=known, best=found.best).run(points(2)[1:])
     assert (one.usable, error(one)) == (False, math.inf)
 
 
