@@ -19,6 +19,7 @@ from sysid.workbench.auto.look import Looked
 from sysid.workbench.auto.parts import ENSEMBLE
 from sysid.workbench.runner.store import digest
 from sysid.workbench.sweep.search_space import Point
+from sysid.workbench.sweep.trial import NOT_DONE
 
 ROUND = 4
 """Trials of a round: the next round knows the results of all before it, whatever the number of workers."""
@@ -130,7 +131,7 @@ class Plan:
     def tell(self, trials: Sequence[Trial]) -> None:
         """The results of the last round, in its order."""
         self.budget.tell(trials)
-        repeated = [trial for trial in trials if trial.number in self._repeats]
+        repeated = [trial for trial in trials if trial.number in self._repeats and trial.reason != NOT_DONE]
         self.trials += [trial for trial in trials if trial.number not in self._repeats]
         for place in dict.fromkeys(self._repeats[trial.number] for trial in repeated):
             own = [trial for trial in repeated if self._repeats[trial.number] == place]
@@ -170,9 +171,10 @@ class Plan:
 
     @property
     def candidates(self) -> list[Trial]:
-        """What may be chosen: linear models, and nonlinear ones that were trained again, where some were, or united."""
+        """What may be chosen: linear models, and nonlinear ones that did well again, where some did, or united."""
         kinds = {family.kind for family in self.families if family.linear}
-        again = set(self._told_again)
+        # One that came to nothing again does not take away what all others have found.
+        again = {n for n in self._told_again if math.isfinite(self.error(self.trials[n]))}
         return [
             t
             for n, t in enumerate(self.trials)

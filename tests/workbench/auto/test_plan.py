@@ -206,6 +206,15 @@ def test_the_best_networks_are_trained_again_and_luck_does_not_choose() -> None:
     assert error(best) == pytest.approx(1.0)
 
 
+def test_what_comes_to_nothing_again_takes_no_other_away() -> None:
+    """The best network failed from its second start, and with it all of them: a linear model was chosen, far behind."""
+    plan, _ = searched(lambda point: math.inf if "seed" in point.training else by_size(point), again=1)
+    best = min(plan.candidates, key=error)
+    assert plan.n_again > 0
+    assert error(best) == min(map(error, plan.trials))
+    assert not ESTIMATORS[best.structure["kind"]].linear
+
+
 def test_the_mean_of_several_starts_of_the_best_may_be_chosen_too() -> None:
     def worth(point: Point) -> float:
         return 0.5 * by_size(point) if "ensemble" in point.training else by_size(point)
