@@ -191,9 +191,8 @@ class AbstractLaggedForm(AbstractForm):
         for step in range(1, min(steps, len(inputs)) + 1):
             for k, (j, lag) in enumerate(own, m):
                 room[:, k] = (newest[-lag] if lag < step else y)[:, j]
-            walk(
-                plan, room, depth + step - 1
-            )  # samples before were predicted from the history, fewer steps before them
+            # The samples before were predicted from the history, fewer steps before them.
+            walk(plan, room, depth + step - 1)
             newest.append(room[:, m + len(own) :].copy())
         return (newest[-1] if newest else y)[depth:].reshape(len(inputs), *history.output.shape[1:])
 

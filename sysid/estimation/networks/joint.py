@@ -57,7 +57,7 @@ class _Candidate:
         solution, evidence = self.solution, self.solution.evidence if self.solution else None
         return Attempt(
             start=self.start,
-            seed=self.seed,
+            seed=self.drawn_by,
             iterations=self.iteration,
             elapsed_s=solution.curve[-1].elapsed_s if solution and solution.curve else 0.0,
             estimation_mse=self.loss,
@@ -67,6 +67,11 @@ class _Candidate:
             chosen=chosen,
             status=solution.status.name if solution else "",
         )
+
+    @property
+    def drawn_by(self) -> int | None:
+        """Its seed; ``None`` where it was not drawn."""
+        return None if self.seed == IN_WINDOWS else self.seed
 
     @property
     def origin(self) -> str:
@@ -117,13 +122,13 @@ class Joint:
             The best state seen; a start that was given is one of them.
         """
         training, began = self.training, now() - checkpoints_of(self.on_progress).earlier_s
+        where, interrupted = self._through(windows, starts[0][1], began)
         if windows:
-            starts = [*starts, (IN_WINDOWS, self._through(windows, starts[0][1], began))]
+            starts = [*starts, (IN_WINDOWS, where)]
         numbers = {seed: number for number, (seed, _) in enumerate(starts, start=1)}
         seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
         alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
-        interrupted = False
-        for checkpoint in range(1, training.checkpoints + 1):
+        for checkpoint in range(1, 1 if interrupted else training.checkpoints + 1):
             reached: list[tuple[int | None, Solution]] = []
             for number, (seed, where) in enumerate(alive):
                 name = f"start {'as given' if seed is None else seed}, checkpoint {checkpoint}"
@@ -143,13 +148,15 @@ class Joint:
 
     def _through(
         self, windows: Sequence[CascadeProvider], where: NDArray[np.float64], began: float
-    ) -> NDArray[np.float64]:
-        """Where a start is led by ever longer windows; nobody chooses on the way."""
+    ) -> tuple[NDArray[np.float64], bool]:
+        """Where a start is led by windows, on which nobody chooses, and whether it was interrupted there."""
         for inner in windows:
             short = replace(self, provider=inner)
-            name = f"windows of {inner.window}"
-            where = short._advance(where, self.training.checkpoints, began, "1/1", name).theta
-        return where
+            found = short._advance(where, self.training.checkpoints, began, "1/1", f"windows of {inner.window}")
+            if found.status is Status.INTERRUPTED:
+                return where, True
+            where = found.theta
+        return where, False
 
     def _advance(
         self, where: Solution | NDArray[np.float64], checkpoint: int, began: float, which: str, name: str
@@ -237,7 +244,7 @@ class Joint:
                 "elapsed_s": np.array([entry.elapsed_s for entry in curve]),
             },
             train_time_s=seconds,
-            seed=chosen.seed,
+            seed=chosen.drawn_by,
             evidence=chosen.solution.evidence if chosen.solution else None,
             notes=(
                 f"Chosen {how} among {len(seen)} states: {chosen.sentence}.",

@@ -105,6 +105,8 @@ class Plan:
     _repeats: dict[int, int] = field(default_factory=dict)
     """By the number of a repeated point, the place of its trial."""
     _told_again: list[int] = field(default_factory=list)
+    _late: set[int] = field(default_factory=set)
+    """Places of trials that were to be repeated, for which the time was up."""
     _united: set[int] = field(default_factory=set)
     """Numbers of points that are ensembles of those."""
     _rounds: Iterator[list[Try]] | None = None
@@ -131,7 +133,9 @@ class Plan:
     def tell(self, trials: Sequence[Trial]) -> None:
         """The results of the last round, in its order."""
         self.budget.tell(trials)
-        repeated = [trial for trial in trials if trial.number in self._repeats and trial.reason != NOT_DONE]
+        again = [trial for trial in trials if trial.number in self._repeats]
+        repeated = [trial for trial in again if trial.reason != NOT_DONE]
+        self._late |= {self._repeats[trial.number] for trial in again if trial.reason == NOT_DONE}
         self.trials += [trial for trial in trials if trial.number not in self._repeats]
         for place in dict.fromkeys(self._repeats[trial.number] for trial in repeated):
             own = [trial for trial in repeated if self._repeats[trial.number] == place]
@@ -171,14 +175,17 @@ class Plan:
 
     @property
     def candidates(self) -> list[Trial]:
-        """What may be chosen: linear models, and nonlinear ones that did well again, where some did, or united."""
+        """What may be chosen: linear models, and nonlinear ones that did well again, where some did, or united.
+
+        One that came to nothing again does not take away what all others have found, and one for which the time was up
+        is worth what it was.
+        """
         kinds = {family.kind for family in self.families if family.linear}
-        # One that came to nothing again does not take away what all others have found.
         again = {n for n in self._told_again if math.isfinite(self.error(self.trials[n]))}
         return [
             t
             for n, t in enumerate(self.trials)
-            if n in again or not again or t.number in self._united or t.structure["kind"] in kinds
+            if n in again | self._late or not again or t.number in self._united or t.structure["kind"] in kinds
         ]
 
     def _all_rounds(self) -> Iterator[list[Try]]:

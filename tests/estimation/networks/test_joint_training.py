@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import CascadeFit, JointTraining, Status, fit_cascade, with_upstream_outputs
 from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.estimation.networks.training import FitProgress
 from sysid.models import Cascade
 from sysid.traces import Role, TraceSet
 from tests.models.cascades import command, linear, network, service
@@ -130,7 +131,22 @@ def test_a_whole_that_goes_astray_is_led_back_by_windows(seed: int, by: float) -
     assert errors[0] < 0.01
     assert errors[0] < errors[1]
     assert any("what windows led to" in note for note in ours.notes)
-    assert {one.start for one in ours.attempts} == {1, 2}
+    assert {(one.start, one.seed) for one in ours.attempts} == {(1, None), (2, None)}
+    assert ours.seed is None, "neither start was drawn"
+
+
+def test_an_interruption_on_windows_ends_the_fit() -> None:
+    told = []
+
+    def interrupt(progress: FitProgress) -> None:
+        told.append(progress.iteration)
+        if progress.iteration == 2:
+            raise KeyboardInterrupt
+
+    training = replace(TRAINING, windows=(20, 80))
+    fit = fit_cascade(disturbed(), [measured()], training=training, on_progress=interrupt)
+    assert (fit.status, told[-1], told.count(2)) == (Status.INTERRUPTED, 2, 1)
+    assert_array_equal(fit.model.member("BP").theta, disturbed().member("BP").theta)
 
 
 def test_windows_never_take_a_better_start_away() -> None:

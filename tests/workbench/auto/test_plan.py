@@ -17,6 +17,7 @@ from sysid.workbench.auto.parts import ENSEMBLE
 from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, PATIENCE, Plan, with_repeats
 from sysid.workbench.auto.search import error
 from sysid.workbench.sweep.search_space import Point
+from sysid.workbench.sweep.trial import NOT_DONE
 
 LOOKED = Looked(n_inputs=1, n_outputs=1, orders=(ARX(na=2, nb=(2,), nk=(1,)),))
 UNASKED = 4
@@ -213,6 +214,22 @@ def test_what_comes_to_nothing_again_takes_no_other_away() -> None:
     assert plan.n_again > 0
     assert error(best) == min(map(error, plan.trials))
     assert not ESTIMATORS[best.structure["kind"]].linear
+
+
+def test_a_network_for_whose_second_start_the_time_was_up_is_worth_what_it_was() -> None:
+    """One that was worse, and done again in time, had been chosen in its place."""
+    budget = Budget(wall_s=None, iterations=10**9, clock=lambda: 0.0, is_stored=lambda _: False)
+    plan = Plan(looked=LOOKED, budget=budget, error=error, training={"max_iterations": 50}, again=1)
+    late = {"usable": False, "reason": NOT_DONE, "selection_free_run_mse": math.nan}
+    while points := plan.ask():
+        found = [trial(point, by_size(point)) for point in points]
+        if "seed" in points[0].training and "ensemble" not in points[0].training:
+            best = min(found, key=error)
+            found = [one.model_copy(update=late) if one is best else one for one in found]
+        plan.tell(found)
+    least = min(plan.candidates, key=error)
+    assert plan.n_again == FINALISTS - 1
+    assert error(least) == min(map(error, plan.trials))
 
 
 def test_the_mean_of_several_starts_of_the_best_may_be_chosen_too() -> None:
