@@ -122,9 +122,9 @@ class Joint:
             The best state seen; a start that was given is one of them.
         """
         training, began = self.training, now() - checkpoints_of(self.on_progress).earlier_s
-        where, interrupted = self._through(windows, starts[0][1], began)
+        led, interrupted = self._through(windows, starts[0][1], began)
         if windows:
-            starts = [*starts, (IN_WINDOWS, where)]
+            starts = [*starts, (IN_WINDOWS, led)]
         numbers = {seed: number for number, (seed, _) in enumerate(starts, start=1)}
         seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
         alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
