@@ -14,7 +14,7 @@ from sysid.reporting.fit_tables import case_columns
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.results import AttemptRecord, CaseRecord, FitRecord, Results
-from sysid.reporting.tables import Cell, Table, figure_cell
+from sysid.reporting.tables import Cell, Table, figure_cell, plain_cell
 from sysid.units import squared
 
 RELATIVE = "relative"
@@ -282,7 +282,7 @@ def groups_table(fit: FitRecord) -> Table:
         rows.append(
             (
                 Cell(text=name, header=True),
-                figure_cell(count, missing="unknown"),
+                plain_cell(count if np.isnan(count) else int(count)),
                 figure_cell(effective),
                 figure_cell(100.0 * effective / count if count else float("nan"), missing="none"),
                 figure_cell(precision, missing="unknown"),

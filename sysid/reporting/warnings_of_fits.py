@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from sysid.reporting.parts import Section
-from sysid.reporting.results import FitRecord, Results
+from sysid.reporting.results import Results
 from sysid.reporting.tables import Cell, Table
 
 TITLE = "What to look at"
 
 
 def warnings_section(results: Results) -> Section | None:
-    """All warnings, those of the chosen fit first.
+    """All warnings, those of the chosen fit first; what is said of several fits is said once.
 
     Args:
         results: Of the run.
@@ -18,11 +18,10 @@ def warnings_section(results: Results) -> Section | None:
     Returns:
         The section; ``None`` where there is nothing to warn of.
     """
-    rows = tuple(
-        (Cell(text=fit.name, header=True), Cell(text=text)) for fit in _warned(results) for text in fit.warnings
-    )
-    if not rows:
+    said = _said(results)
+    if not said:
         return None
+    rows = tuple((Cell(text=", ".join(names), header=True), Cell(text=text)) for text, names in said.items())
     table = Table(
         caption="What the records and free runs say against a fit.", head=(("fit", ""), ("warning", "")), rows=rows
     )
@@ -38,14 +37,18 @@ def warning_points(results: Results) -> list[tuple[str, str]]:
     Returns:
         One point: of the chosen fit, or of the first one that has any; none without.
     """
-    warned = _warned(results)
-    if not warned:
+    said = _said(results)
+    if not said:
         return []
-    more = sum(len(fit.warnings) for fit in warned) - 1
-    rest = f" {more} more under '{TITLE}'." if more else ""
-    return [("Warning", f"{warned[0].name}: {warned[0].warnings[0]}{rest}")]
+    text, names = next(iter(said.items()))
+    rest = f" {len(said) - 1} more under '{TITLE}'." if len(said) > 1 else ""
+    return [("Warning", f"{names[0]}: {text}{rest}")]
 
 
-def _warned(results: Results) -> list[FitRecord]:
-    chosen = {id(fit) for fit in results.best_fits}
-    return sorted((fit for fit in results.fits if fit.warnings), key=lambda fit: id(fit) not in chosen)
+def _said(results: Results) -> dict[str, list[str]]:
+    """The fits that each warning is of, the chosen ones first."""
+    chosen, said = {id(fit) for fit in results.best_fits}, dict[str, list[str]]()
+    for fit in sorted(results.fits, key=lambda fit: id(fit) not in chosen):
+        for text in fit.warnings:
+            said.setdefault(text, []).append(fit.name)
+    return said

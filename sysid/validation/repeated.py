@@ -41,8 +41,8 @@ def repeated(channels: Sequence[str], fitted: Sequence[Trace], scored: Sequence[
         return ()
     names = f"{', '.join(told[:4])}{' and others' if len(told) > 4 else ''}"
     return (
-        f"{names}: up to {100 * most:.0f} % of the samples are in a record that was fitted too, to the last bit: "
-        "figures on them say nothing of another record. Score, and choose by, what was not fitted.",
+        f"{names}: up to {100 * most:.0f} % of the samples are in a record that was fitted too, to the last bit. "
+        "The error of these says nothing of another record. Score, and choose by, what was not fitted.",
     )
 
 

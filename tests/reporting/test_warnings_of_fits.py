@@ -29,6 +29,20 @@ def test_warnings_of_the_chosen_fit_stand_first(make_run: Callable[..., Path], t
     assert [row[0].text for row in table.rows] == ["NARX free run", "NARX free run", "ARX"]
 
 
+def repeated(document: dict[str, Any]) -> None:
+    document["fits"][0]["warnings"] = ["V was fitted too.", "it has too little memory."]
+    document["fits"][1]["warnings"] = ["V was fitted too."]
+
+
+def test_what_is_said_of_several_fits_is_said_once(make_run: Callable[..., Path], tmp_path: Path) -> None:
+    results = read_results(make_run(tmp_path / "run", samples=50, names=PAIR, edit=repeated))
+    assert warning_points(results) == [("Warning", "NARX free run: V was fitted too. 1 more under 'What to look at'.")]
+    section = warnings_section(results)
+    assert section is not None and isinstance(section.parts[0], Table)
+    told = [(row[0].text, row[1].text) for row in section.parts[0].rows]
+    assert told == [("NARX free run, ARX", "V was fitted too."), ("ARX", "it has too little memory.")]
+
+
 def test_without_warnings_there_is_neither(make_run: Callable[..., Path], tmp_path: Path) -> None:
     results = read_results(make_run(tmp_path / "run", samples=50, names=PAIR))
     assert warning_points(results) == [] and warnings_section(results) is None
