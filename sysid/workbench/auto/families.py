@@ -28,6 +28,8 @@ CURVE = "piecewise 6"
 LINEAR_ORDERS = range(1, 7)
 FURTHER_ORDERS = ((8, 10), (12, 14), (16, 18), (20,))
 """States of linear models beyond those, round by round: tried as long as the last round gained."""
+FEWEST_STATES = 2
+"""Of a network that is tried first: what a curve hides from a linear model may have a state of its own."""
 BLOCK_STATES = 6
 """Of a block at most; a linear model has more."""
 MANY_STATES = 4
@@ -116,7 +118,8 @@ def _transfer_functions(looked: Looked) -> list[Try]:
 def _neural(looked: Looked) -> list[Try]:
     if looked.integrators:
         return _neural_sums(looked)
-    sizes = ((2, 8, None), (2, 8, 0.03), (2, 8, 0.1), (2, 4, 1e-3), (3, 8, 0.03))
+    n = min(max(looked.states, FEWEST_STATES), LINEAR_ORDERS[-1])
+    sizes = ((n, 8, None), (n, 8, 0.03), (max(n - 1, FEWEST_STATES), 8, 0.1), (n, 4, 1e-3), (n + 1, 8, 0.03))
     found = [
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
         for n, k, r in sizes

@@ -261,7 +261,7 @@ class Plan:
             yield from self._near_the_best()
         yield from self._unasked(linear=True)
         yield from self._larger()
-        self.looked = replace(self.looked, states=self._best_states())
+        self.looked = replace(self.looked, states=self._linear_states())
         # On a slow machine linear models alone would have taken all. What trains side by side takes no longer than one.
         self.budget.unlimited = self.budget.side_by_side
         yield from self._unasked(linear=False)
@@ -312,11 +312,12 @@ class Plan:
         middle = (len(errors) + 1) // 2
         return min(errors[:middle], default=math.inf), min(errors[middle:], default=math.inf)
 
-    def _best_states(self) -> int:
-        """States of the best linear state space; 0 where there is none."""
+    def _linear_states(self) -> int:
+        """The fewest states of a linear state space that is no worse than the best of them; 0 where there is none."""
         found = [one for one in self.trials if one.structure["kind"] == LinearStateSpace.kind]
-        best = min(found, key=self._rank, default=None)
-        return 0 if best is None or not math.isfinite(self.error(best)) else int(best.structure["states"])
+        least = min(map(self.error, found), default=math.inf)
+        alike = [one for one in found if math.isfinite(least) and self.error(one) <= (1.0 + ALIKE) ** 2 * least]
+        return min((int(one.structure["states"]) for one in alike), default=0)
 
     def _least(self, *, linear: bool) -> list[Try]:
         """The least of each kind."""

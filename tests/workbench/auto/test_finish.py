@@ -8,7 +8,7 @@ from sysid.field_checks import check
 from sysid.models import ARX
 from sysid.reporting.fit_tables import DRAWN
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import FEWEST, PICTURE_S, SLOWEST_PACE, finish_s, pace, time_told
+from sysid.workbench.auto.finish import DRAWING_S, FEWEST, PICTURE_S, SLOWEST_PACE, finish_s, pace, time_told
 
 SEARCH = {"kind": "auto", "name": "a", "data": "rig", "mapping": "u -> a+b+c+d+e"}
 STRUCTURE = ARX(na=1, nb=(1,), nk=(1,))
@@ -39,6 +39,21 @@ def test_what_follows_is_planned_by_what_this_machine_takes_for_a_picture() -> N
     now, twice = (finish_s(40, 2, slowed=1.0, paced=times * pace()) for times in (1.0, 2.0))
     assert twice == pytest.approx(2.0 * now)
     assert finish_s(40, 2, slowed=1.0) == now
+
+
+def test_a_picture_during_which_garbage_is_looked_for_says_nothing_of_the_machine(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls, clock = [0], [0.0]
+
+    def drawn(*_: object, **__: object) -> None:
+        calls[0] += 1
+        clock[0] += DRAWING_S * (3.0 if calls[0] <= 2 else 1.0)
+
+    monkeypatch.setattr("sysid.reporting.figures.fit_figures.case_figure", drawn)
+    monkeypatch.setattr("sysid.reporting.figures.svg.svg", lambda *_, **__: None)
+    monkeypatch.setattr("time.process_time", lambda: clock[0])
+    assert pace.__wrapped__() == pytest.approx(1.0)
 
 
 def test_a_time_that_is_too_short_says_how_long_it_takes_and_what_would_do() -> None:

@@ -303,6 +303,19 @@ def test_what_adds_up_has_first_what_adds_up_exactly() -> None:
         assert min(one.states for one in spaces) > sums or not sums
 
 
+@pytest.mark.parametrize(("needed", "begun"), [(1, 2), (3, 3), (5, 5)])
+def test_networks_begin_with_as_many_states_as_a_linear_model_needs(needed: int, begun: int) -> None:
+    def worth(point: Point) -> float:
+        one = point.structure
+        if not isinstance(one, LinearStateSpace):
+            return 2.0
+        return 1.0 - 0.001 * one.states if one.states >= needed else 2.0  # more states than these gain next to nothing
+
+    plan, rounds = searched(worth)
+    first = next(point.structure for one in rounds for point in one if point.structure.kind == "NSS")
+    assert (plan.looked.states, first.states) == (needed, begun)
+
+
 def test_linear_models_get_more_states_as_long_as_these_gain() -> None:
     def worth(point: Point) -> float:
         one = point.structure
