@@ -271,7 +271,18 @@ def contradicted(
         One sentence for each output whose free run a constant beats or equals, for each that acts on the inputs, and
         for each input that acts at a lag which the model leaves out, or at once without being asked.
     """
-    runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
+    with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost, and its squares, are beyond any number
+        runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
+        return _against(model, traces, runs, training, uncertainty)
+
+
+def _against(
+    model: AbstractModel,
+    traces: Sequence[Trace],
+    runs: Sequence[FreeRun],
+    training: object,
+    uncertainty: Uncertainty | None,
+) -> tuple[str, ...]:
     longest = max(runs, key=lambda run: len(run.output))
     fed = feedback_told(model, traces, longest, training)
     levels = levels_told(model, traces[:MOST_TRACES], runs)
@@ -283,9 +294,10 @@ def contradicted(
     ratios = _beside_constants(runs)
     # A lag that is left out is a cause, and the nearer one; not of a run that has next to nothing of the output.
     worth = not lags or min(ratios.values(), default=0.0) > POOR
-    rest = (*lags, *(causes(model, longest, (*fed, *levels), but=known) if worth else ()))
-    told = _told_beside_constants(model, ratios, uncertainty)
-    return (*told, *fed.values(), *levels.values(), *known.values(), *rest)
+    told = {*known, *(i for i, ratio in ratios.items() if _lost(ratio))}
+    rest = (*lags, *(causes(model, longest, (*fed, *levels), but=told) if worth else ()))
+    poor = _told_beside_constants(model, ratios, uncertainty)
+    return (*poor, *fed.values(), *levels.values(), *known.values(), *rest)
 
 
 def _beside_constants(runs: Sequence[FreeRun]) -> dict[int, float]:
@@ -294,12 +306,15 @@ def _beside_constants(runs: Sequence[FreeRun]) -> dict[int, float]:
     simulated = np.concatenate([run.simulated[run.usable] for run in runs])
     if len(y) < LEAST_SAMPLES:
         return {}
-    with np.errstate(over="ignore", invalid="ignore"):
-        return {
-            i: float(np.mean((simulated[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
-            for i in range(y.shape[1])
-            if not still(y[:, i])
-        }
+    return {
+        i: float(np.mean((simulated[:, i] - y[:, i]) ** 2) / np.var(y[:, i]))
+        for i in range(y.shape[1])
+        if not still(y[:, i])
+    }
+
+
+def _lost(ratio: float) -> bool:
+    return not ratio < DIVERGED
 
 
 def _told_beside_constants(
@@ -310,8 +325,7 @@ def _told_beside_constants(
     for i, ratio in ratios.items():
         name = model.mapping.outputs[i]
         if not ratio <= HARDLY:
-            lost = not ratio < DIVERGED
-            fit = "it diverges" if lost else f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %"
+            fit = "it diverges" if _lost(ratio) else f"fit {100.0 * (1.0 - np.sqrt(ratio)):.0f} %"
             worse = not ratio <= WORSE
             how = "worse" if worse else "hardly better"
             told.append(

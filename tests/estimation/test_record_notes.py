@@ -372,3 +372,25 @@ def test_a_run_that_is_lost_diverges_and_has_no_percent() -> None:
         u[k] = rng.uniform(-1.0, 1.0) - 0.8 * y[k]
     fit = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.ARX(na=1, nb=1, nk=1))
     assert [note for note in fit.notes if "worse than a constant (it diverges)" in note]
+
+
+@pytest.mark.parametrize(
+    "structure", [sysid.ARX(na=1, nb=1, nk=1), sysid.LinearStateSpace(states=1)], ids=["ARX", "SS"]
+)
+@pytest.mark.parametrize("records", [1, 2])
+@pytest.mark.parametrize("n", [900, 2_000, 4_000, 9_000])
+def test_a_run_of_any_length_that_is_lost_ends_no_fit(structure: object, records: int, n: int) -> None:
+    """1.1 to the 4,000th: what was asked of the error of a plant that a controller holds ended in an overflow."""
+    rng = np.random.default_rng(3)
+    r = np.repeat(rng.choice([-1.0, 1.0], n // 30 + 1), 30)
+    u, y = np.zeros(n), np.zeros(n)
+    for k in range(1, n):
+        y[k] = 1.1 * y[k - 1] + 0.2 * u[k - 1] + 0.05 * rng.standard_normal()
+        u[k] = 3.0 * (r[k] - y[k])
+    traces = sysid.data([(u, y)] * records, sample_time=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit = sysid.fit(traces, "u -> y", structure)
+    assert fit.model.pole_radius == pytest.approx(1.1, abs=0.02)
+    assert [note for note in fit.notes if "worse than a constant (it diverges)" in note]
+    assert not [note for note in fit.notes if "no noise of a sensor" in note]
