@@ -235,8 +235,8 @@ class _Race:
         ways = _ways(records, structure, training)
         own = cls.between(records, structure, training, ways, began=began)
         smaller, cheaper = structure.smaller, _cheaper(training)
-        if smaller is None or now() - began >= training.max_time_s:
-            return own
+        if smaller is None or now() - began >= SMALLER * training.max_time_s:
+            return own  # where the smaller one begins takes as long to find as this one's starts did
         try:
             found, loss = cls.of(records, smaller, cheaper, began=now()).run()
         except TraceError:  # it has no free run where it begins: the larger one has starts of its own

@@ -280,6 +280,7 @@ class Excursions(AbstractSequences):
         if not records:
             raise TraceError("no trace is long enough for excursions", expected="20 usable samples in a row")
         longest = max(len(record) for record in records)
+        whole = max(len(trace) for trace in traces)  # a piece of a record stands still no sooner than the record
         return cls(
             inputs=tuple(inputs),
             outputs=tuple(outputs),
@@ -287,7 +288,7 @@ class Excursions(AbstractSequences):
             records=records,
             samples=min(max(longest // 4, 20), 5000),
             passage=(max(longest // 100, 2), max(longest // 8, 4)),
-            hold=max(longest // 20, 20),
+            hold=max(whole // 20, 20),
             amplitude=amplitude,
         )
 

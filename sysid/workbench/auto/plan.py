@@ -109,6 +109,8 @@ class Plan:
     """Places of trials that were to be repeated, for which the time was up."""
     _united: set[int] = field(default_factory=set)
     """Numbers of points that are ensembles of those."""
+    _no_time: list[Try] = field(default_factory=list)
+    """What was wanted and had no place in the time that there was then."""
     _rounds: Iterator[list[Try]] | None = None
     _asked: int = 0
 
@@ -125,6 +127,7 @@ class Plan:
             self._points |= {point.number: point for point in taken}
             by_number = {point.number: one for point, one in zip(points, tries, strict=True)}
             self._tries += [by_number[point.number] for point in taken]
+            self._no_time += [one for number, one in by_number.items() if number not in self._points]
             if taken:
                 return taken
         self.ended = self.ended or "nothing that is left to try has a place in the search"
@@ -192,6 +195,9 @@ class Plan:
         yield from self._search()
         yield from self._whatever_the_time()
         self.budget.kept = 0.0
+        # Of nothing that can be used there are no other starts: the time that was kept for these is for the rest.
+        if not math.isfinite(self.least(linear=False)):
+            yield [one for one in self._no_time if not estimator_of(one.structure).linear]
         yield from self._finals()
         yield from self._ensembles()
 

@@ -31,6 +31,7 @@ class Choice:
         refused: Trials of less error that were passed over, as their free run is not stable.
         nonlinear: Trials that are no linear model.
         finished: Of these the ones that came to a result, whatever it is worth; the others say nothing.
+        unusable: Where none of those can be used, how they ended.
         more_within: Over how many of the traces that choose it stays within the tolerance, in words, where that is
             why it comes before one of less error; empty elsewhere.
         stable: The best stable one, where that was passed over for one whose training goes on.
@@ -43,6 +44,7 @@ class Choice:
     refused: int
     nonlinear: int
     finished: int
+    unusable: tuple[str, ...] = ()
     more_within: str = ""
     stable: Trial | None = None
     alone: Trial | None = None
@@ -95,6 +97,7 @@ def choose(
         alone=alone[0] if alone and "ensemble" in smallest.values else None,
         chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=len(nonlinear),
         finished=sum(t.status != FAILED for t in nonlinear),
+        unusable=() if any(t.usable for t in nonlinear) else _ended(nonlinear),
         more_within=f"{1.0 - outside(chosen):.0%} of what chose within {tolerance:.0%} of its range" if more else "",
     )  # fmt: skip
     ahead = [k for k, t in enumerate(usable[:refused]) if goes_on(t) and RIVAL**2 * error(t) < error(chosen)]
@@ -115,12 +118,19 @@ def both_exact(*trials: Trial) -> bool:
     return all(one.selection_rms_shares and max(one.selection_rms_shares) <= EXACT for one in trials)
 
 
+def _ended(trials: Sequence[Trial]) -> tuple[str, ...]:
+    """How some trials ended, in words, each once."""
+    return tuple(sorted({trial.status.lower().replace("_", " ") for trial in trials}))
+
+
 def _beside_nonlinear(choice: Choice) -> str:
     """What nonlinear models have to do with the choice of a linear one: those that were not done are not worse."""
     if not choice.nonlinear:
         return "no nonlinear model was tried"
     if not choice.finished:
         return f"no nonlinear model came to a result ({choice.nonlinear} begun), so that none may be called worse"
+    if choice.unusable:
+        return f"none of the {choice.nonlinear} nonlinear models can be used ({', '.join(choice.unusable)})"
     without = choice.nonlinear - choice.finished
     return "and no nonlinear model does better" + (f" ({without} more came to no result)" if without else "")
 

@@ -187,6 +187,13 @@ def test_passages_do_not_cross_what_is_masked():
     assert [len(r) for r in source.records] == [700, 1250]
 
 
+def test_pieces_of_a_record_stand_still_no_sooner_than_the_record():
+    whole = record()
+    pieces = replace(whole, usable=np.arange(len(whole.values)) % 500 < 400)
+    assert excursions(pieces).hold == excursions(whole).hold == 100
+    assert excursions(pieces).passage[1] < excursions(whole).passage[1], "passages lie within a piece"
+
+
 def test_several_records_all_serve():
     source = excursions(record(0), record(1))
     assert all(sequence.judged.any() for sequence in source.draw(5, 0))

@@ -11,7 +11,7 @@ import pytest
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.models import ARX, HammersteinWiener, LinearStateSpace, NeuralStateSpace, WienerHammerstein
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.budget import Budget, price
+from sysid.workbench.auto.budget import FINAL, Budget, price
 from sysid.workbench.auto.look import Looked
 from sysid.workbench.auto.parts import ENSEMBLE
 from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, PATIENCE, Plan, with_repeats
@@ -301,6 +301,28 @@ def test_what_adds_up_has_first_what_adds_up_exactly() -> None:
         assert {one.output for one in spaces} <= {"plain", "absolute"} - ({"absolute"} if sums else set())
         assert linear(rounds[0][0]) is (sums == 0)
         assert min(one.states for one in spaces) > sums or not sums
+
+
+def test_where_no_network_can_be_used_the_time_for_their_other_starts_is_for_more_of_them() -> None:
+    clock = [0.0]
+    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
+    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    rounds: list[list[Point]] = []
+    while points := plan.ask():
+        rounds.append(points)
+        lost = [not linear(point) for point in points]
+        clock[0] += 6.0 * sum(lost)
+        plan.tell([
+            trial(p, math.nan if one else 1.0).model_copy(update={"seconds": 6.0 if one else 0.1})
+            for p, one in zip(points, lost, strict=True)
+        ])  # fmt: skip
+    tried = [(point.structure.label, str(point.training)) for points in rounds for point in points]
+    assert budget.kept == 0.0
+    assert len(tried) == len(set(tried)), "nothing is tried twice"
+    last = rounds[-1]
+    assert not any(map(linear, last))
+    before = clock[0] - 6.0 * len(last)
+    assert before <= (1.0 - budget.refit - FINAL) * 100.0 < clock[0] <= (1.0 - budget.refit) * 100.0
 
 
 @pytest.mark.parametrize(("needed", "begun"), [(1, 2), (3, 3), (5, 5)])

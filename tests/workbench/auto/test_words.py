@@ -57,6 +57,13 @@ def test_a_linear_model_that_is_as_good_is_chosen() -> None:
     assert "and no nonlinear model does better" in sentence(found, 2, unit="V", ended="", error=error)
 
 
+def test_where_no_network_can_be_used_none_is_said_to_be_worse() -> None:
+    lost = network(2, 1.0, 60).model_copy(update={"usable": False, "status": "UNSTABLE"})
+    said = sentence(choose([arx(1, 1.0), lost], error, stable), 2, unit="V", ended="", error=error)
+    assert "none of the 1 nonlinear models can be used (unstable)" in said
+    assert "no nonlinear model does better" not in said
+
+
 def test_what_came_to_no_result_is_not_said_to_be_worse() -> None:
     late = network(2, float("nan"), 20).model_copy(update={"status": "FAILED", "usable": False})
     said = sentence(choose([arx(1, 1.0), late], error, stable), 2, unit="V", ended="", error=error)
