@@ -17,8 +17,9 @@ from sysid.references.described import Wish
 from sysid.references.sources import KINDS, TABLES, source_of
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.runner.events import Watcher
-from sysid.workbench.surrogates.make import Made, Perform, make_surrogate
+from sysid.workbench.surrogates.make import Made, make_surrogate
 from sysid.workbench.surrogates.plan import written
+from sysid.workbench.surrogates.work import Perform
 from sysid.yaml_files import read_yaml
 
 T = TypeVar("T")

@@ -2,72 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Any, TypeVar
 
-import numpy as np
-
-from sysid.atomic import replacing
-from sysid.bounded_text import read_bounded
-from sysid.errors import ConfigError
 from sysid.export.reading import read_bundle
-from sysid.field_checks import check
-from sysid.models import Mapping, Start
-from sysid.references.config import ReferenceConfig
-from sysid.references.design import Design
-from sysid.references.runs import ReferenceRuns
-from sysid.reporting.growth import FILE
-from sysid.reporting.judging.results import FOLDER
-from sysid.reporting.records import write_record
-from sysid.reporting.report import write_report
-from sysid.traces import Role, Trace, TraceSet
-from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import finish_s, page_s, span
-from sysid.workbench.auto.jumps import jumps_told
-from sysid.workbench.auto.look import span_of
-from sysid.workbench.auto.run import Searched, auto_of
-from sysid.workbench.auto.run import program_of as search_program
-from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
-from sysid.workbench.experiments.run import DATASET, Experimented, Experiments
-from sysid.workbench.experiments.run import program_of as experiment_program
-from sysid.workbench.fits.config import PipelineConfig
-from sysid.workbench.fits.data import data_of
-from sysid.workbench.runner.events import StepDone, StepProgress, StepStarted, Watcher
-from sysid.workbench.runner.program import Program
-from sysid.workbench.runner.store import write_bytes
-from sysid.workbench.surrogates.grown import GROWN, Ground, grow
-from sysid.workbench.surrogates.grown import program_of as grown_program
-from sysid.workbench.surrogates.known import pipeline_of
-from sysid.workbench.surrogates.known import program_of as known_program
-from sysid.workbench.surrogates.plan import PROOF, RUNNING, SEARCHING, Times, times
-from sysid.workbench.surrogates.proof import FEWEST, Proof, fmu_of, prove
-from sysid.workbench.surrogates.told import beginning_of, failed, poor, restless, short_of_time, unlike, without_effect
-from sysid.yaml_files import read_yaml
-
-T = TypeVar("T")
-Perform = Callable[[Program[Any], Path], Any]
-"""Carries a program out in a folder, and gives its results."""
-RUNS_MOST = 1.0 - SEARCHING
-"""Share of the time beyond which it is told before, how long the experiments take."""
-GROWING = 0.25
-"""Share of the time in which data grow, where they do; it is taken from the search's."""
-TIMES = "search-seconds.txt"
-"""The search's time: decided once, so that a run that was killed finds its trials again."""
-LEAST_MINUTES = 0.1
-"""Of a surrogate."""
-TOLERANCE = 0.01
-"""Share of an output's range: what a proof counts, and what models are chosen by."""
-PROVING = "Proving it on new experiments"
-"""The step of the proof, for people."""
-EXPORT: dict[str, Any] = {"formats": ("c", "fmi2", "fmi3")}
-"""What leaves the workbench as a surrogate."""
+from sysid.workbench.experiments.run import Experiments
+from sysid.workbench.runner.events import Watcher
+from sysid.workbench.surrogates.proof import Proof
+from sysid.workbench.surrogates.told import poor, short_of_time
+from sysid.workbench.surrogates.work import TIMES, Perform, Proving, Work, first_look
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,247 +76,29 @@ def make_surrogate(
     Raises:
         UserError: If the pipeline or its reference cannot be used.
     """
-    if not LEAST_MINUTES <= minutes < float("inf"):
-        raise ConfigError(
-            "there is no such time, or nothing can be done in it", where="minutes",
-            expected=f"{LEAST_MINUTES:g} or more, and an end of them", got=minutes,
-            remedy="give some minutes: 5 for a fast model, 60 for a slow one",
-        )  # fmt: skip
-    config = check(ExperimentConfig, read_yaml(pipeline), where=pipeline)
-    config = config if workers is None else config.model_copy(update={"workers": workers})
-    growth = config.grow if rounds is None else (config.grow or GrowConfig()).model_copy(update={"rounds": rounds})
-    reference = config.reference.at(pipeline.resolve().parent)
-    mapping = Mapping(inputs=(*reference.inputs, *reference.parameters), outputs=tuple(reference.outputs))
-    work = _Work(
-        pipeline=pipeline, config=config, reference=reference, mapping=mapping, folder=folder, perform=perform,
-        seed=seed, iterations=iterations,
-    )  # fmt: skip
-    if config.fits:
-        work.known(Path(DATASET), None, None)  # what does not go together is refused before anything is run
-        if rounds is not None:
-            raise ConfigError(
-                "experiments grow around what a search has chosen", where=pipeline, expected="rounds, or fits",
-                got="both", remedy="leave rounds out, or the fits of the pipeline",
-            )  # fmt: skip
     began = time.monotonic() if began is None else began
-    if (first := first_look(Experiments(config=config, reference=reference), minutes=minutes)) is not None:
+    work = Work.of(
+        pipeline, folder, perform=perform, minutes=minutes, iterations=iterations, rounds=rounds, workers=workers,
+        seed=seed, say=say,
+    )  # fmt: skip
+    first = first_look(Experiments(config=work.config, reference=work.reference), minutes=minutes)
+    if first is not None:
         say(first)
     found = work.experimented()
-    _check_moving(found.traces.with_role(Role.ESTIMATION), reference)
-    # What a search has to learn; of fits that are asked for somebody knows it.
-    begins = [] if config.fits else restless(found, mapping)
-    jumps = [] if config.fits else jumps_told(found.traces.with_role(Role.ESTIMATION), mapping)
-    notes = [*failed(found), *unlike(work.place), *begins, *jumps]
-    for note in notes:  # before an hour is spent
-        say(f"note: {note}")
+    notes = work.noted(found)
     plan, planned, count = work.planned(found, minutes=minutes, spent=time.monotonic() - began, proof=proof)
     if not iterations and not (folder / TIMES).is_file():
         say(plan.sentence(planned, count))
-    # A search counts its scores, export and report in its minutes; fits that are asked for do not.
-    seconds_left = _kept(folder / TIMES, plan.search + (0.0 if config.fits else plan.finish))
-    seconds_left -= 0.0 if growth is None else GROWING * plan.whole
-    proving = _Proving(
-        reference=reference, design=config.experiment, taught=found.traces, count=count, workers=config.workers,
-        ends=inf if proof or iterations else began + plan.whole, search_s=seconds_left, watch=watch,
+    seconds_left = work.seconds_left(plan)
+    proving = Proving(
+        reference=work.reference, design=work.config.experiment, taught=found.traces, count=count,
+        workers=work.config.workers, ends=inf if proof or iterations else began + plan.whole, search_s=seconds_left,
+        watch=watch,
     )  # fmt: skip
-    place = folder / "model"
-    if config.fits:
-        work.fitted(found, seconds_left / 60.0)
-    else:
-        before_page = partial(proving, place) if growth is None else None
-        searched = work.searched(found, seconds_left / 60.0, before_page)
-        notes += [searched.hurried] if searched.hurried else []
-        if growth is not None:
-            ground = Ground(config=config, reference=reference, found=found, folder=folder)
-            seconds = None if iterations else GROWING * 60.0 * minutes
-            place, said = _grown(ground, growth, searched, seconds=seconds, perform=perform, say=say)
-            notes.append(said)
-    bundle = read_bundle(place / "bundle")
+    place, said = work.modelled(found, seconds_left / 60.0, proving, whole=minutes)
     shown = proving.done.get(place) or proving(place)
-    page, fmu = place / "report" / "index.html", fmu_of(bundle)
-    if page.stat().st_mtime < (place / FOLDER / "proof.json").stat().st_mtime:
-        page = write_report(place)
-    if fmu is not None:
-        fmu = _delivered(fmu, folder / f"{Path(reference.fmu or config.name).stem}-surrogate.fmu")
-    begun = beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if begins else []
-    notes += [*begun, *without_effect(bundle, found.traces.with_role(Role.ESTIMATION)), *poor(shown, minutes)]
+    page, fmu = work.page(place), work.delivered(place)
+    bundle = read_bundle(place / "bundle")
+    notes += [*said, *work.learnt(bundle, found), *poor(shown, minutes)]
     notes += short_of_time(shown, plan, count, took=time.monotonic() - began, asked=bool(proof or iterations))
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes, pipeline=pipeline)
-
-
-def _delivered(fmu: Path, target: Path) -> Path:
-    with replacing(target) as draft:
-        shutil.copyfile(fmu, draft)
-    return target
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Work:
-    """The parts of a surrogate that are programs, each kept in a folder of its own."""
-
-    pipeline: Path
-    config: ExperimentConfig
-    reference: ReferenceConfig
-    mapping: Mapping
-    folder: Path
-    perform: Perform
-    seed: int
-    iterations: int | None
-
-    @property
-    def place(self) -> Path:
-        """Of the experiments."""
-        return self.folder / "experiment"
-
-    def experimented(self) -> Experimented:
-        """The experiments."""
-        text, beside = self.pipeline.read_text(encoding="utf-8-sig"), self.pipeline.resolve().parent
-        found: Experimented = self.perform(experiment_program(self.config, text=text, folder=beside), self.place)
-        return found
-
-    def planned(
-        self, found: Experimented, *, minutes: float, spent: float, proof: int | None
-    ) -> tuple[Times, int, int]:
-        """How the time is spent, of how many experiments the proof is for certain, and if it has time of how many."""
-        whole = None if self.iterations else 60.0 * minutes
-        workers, finish = self.config.workers, finish_s(len(found.traces), len(self.mapping.outputs), whole)
-        with ReferenceRuns(config=self.reference) as runs:
-            each = runs.seconds_each()[0]
-        each = self.reference.time_limit if each is None else max(each, 1e-3)
-        # What is short of time is not the search first: a proof of fewer experiments says the same, less sharply.
-        left = (1.0 - SEARCHING) * 60.0 * minutes - spent - finish
-        planned, most = (
-            proof or int(np.clip(min(RUNNING * 60.0 * minutes, seconds) * workers / each, FEWEST, PROOF))
-            for seconds in (max(left, 0.0), inf)
-        )
-        plan = times(each, minutes=minutes, spent=spent, experiments=planned, workers=workers, finish=finish)
-        return plan, planned, most
-
-    def searched(self, found: Experimented, minutes: float, before_page: Callable[[], object] | None) -> Searched:
-        """A model that is looked for."""
-        fields: dict[str, Any] = {
-            **{"kind": "auto", "name": "model", "data": str((self.place / DATASET).resolve())},
-            **{"mapping": self.mapping, "start": Start(), "rest": dict(found.before), "seed": self.seed},
-            **({"iterations": self.iterations} if self.iterations else {"minutes": minutes}),
-            **{"workers": self.config.workers, "tolerance": TOLERANCE},
-            **{"export": EXPORT},
-        }
-        search = check(AutoConfig, fields, where=self.pipeline)
-        auto = replace(auto_of(search, load=lambda: data_of(found.traces, self.mapping)), before_page=before_page)
-        done: Searched = self.perform(search_program(auto), self.folder / "model")
-        return done
-
-    def known(self, data: Path, found: Experimented | None, minutes: float | None) -> PipelineConfig:
-        """The fits that are asked for in place of a search."""
-        seconds = None if minutes is None or self.iterations else 60.0 * minutes
-        return pipeline_of(
-            self.config, self.mapping, where=self.pipeline, data=data, rest={} if found is None else found.before,
-            seconds=seconds, seed=self.seed, export=EXPORT, tolerance=TOLERANCE,
-        )  # fmt: skip
-
-    def fitted(self, found: Experimented, minutes: float) -> None:
-        """They are fitted, scored and exported."""
-        place = self.folder / "model"
-        known = self.known((self.place / DATASET).resolve(), found, minutes)
-        self.perform(known_program(known, place), place)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Proving:
-    """The proof of a model, written beside its results: its report shows it."""
-
-    reference: ReferenceConfig
-    design: Design
-    taught: TraceSet
-    count: int
-    workers: int
-    ends: float
-    search_s: float
-    watch: Watcher
-    done: dict[Path, Proof] = field(default_factory=dict)
-
-    def __call__(self, place: Path) -> Proof:
-        """Prove the bundle in a folder; what time the page takes, which comes after it, is seen now."""
-        until = inf
-        if np.isfinite(self.ends):
-            until = self.ends - page_s(len(self.taught), len(self.reference.outputs), self.search_s)
-        self.watch(StepStarted(step=PROVING))
-        proof, section = prove(
-            read_bundle(place / "bundle"), self.reference, self.design, self.taught, count=self.count,
-            workers=self.workers, tolerance=TOLERANCE, until=until, progress=self._progress,
-        )  # fmt: skip
-        (place / FOLDER).mkdir(exist_ok=True)
-        write_record(place / FOLDER / "proof.json", section)
-        self.done[place] = proof
-        within = f"{100.0 * proof.share:.1f} % within {100.0 * TOLERANCE:g} % of the range"
-        self.watch(StepDone(step=PROVING, stored=False, detail=f"{len(proof.errors):,} new experiments, {within}"))
-        return proof
-
-    def _progress(self, _: str, n: int, of: int) -> None:
-        self.watch(StepProgress(step=PROVING, fraction=n / of, detail=f"{n:,} of {of:,} experiments"))
-
-
-def _grown(
-    ground: Ground,
-    how: GrowConfig,
-    searched: Searched,
-    *,
-    seconds: float | None,
-    perform: Perform,
-    say: Callable[[str], None],
-) -> tuple[Path, str]:
-    """The folder of the surrogate once its data have grown, and what that brought."""
-    grower, grown = grow(ground, how, searched, seconds=seconds, say=say)
-    place = ground.folder / (GROWN if grown.best.added else "model")
-    if grown.best.added:
-        perform(grown_program(ground, grower, grown, EXPORT), place)
-    else:
-        write_record(place / FILE, grown.record)
-    return place, grown.record.sentence
-
-
-def first_look(experiments: Experiments, *, minutes: float) -> str | None:
-    """What experiments take, told before they are run: the first is run to see where nobody knows.
-
-    Args:
-        experiments: What is to be run.
-        minutes: Time for all.
-
-    Returns:
-        A sentence where they take much of the time, or the first gave no record; else nothing.
-    """
-    config, cases = experiments.config, [case for some in experiments.cases().values() for case in some]
-    left, each, _ = experiments.lacking(cases)
-    failed = ""
-    if left and each is None:
-        with ReferenceRuns(config=experiments.reference, workers=1) as runs:
-            (one,) = runs.run(cases[:1])
-        left, each = left - (not one.stored), one.wall_s if np.isfinite(one.wall_s) else None
-        failed = "" if one.reason is None else f"; it gave no record: {one.reason}"
-    each = each or 0.0
-    seconds = left * each / config.workers
-    if seconds <= RUNS_MOST * 60.0 * minutes and not failed:
-        return None
-    return (
-        f"Time: {left} experiments are to be run, about {span(seconds)} of the {span(60.0 * minutes)} that were "
-        f"asked for, as one takes {each:.3g} s{failed}. Fewer runs take less, and a shorter time_limit where they hang."
-    )
-
-
-def _check_moving(traces: Sequence[Trace], reference: ReferenceConfig) -> None:
-    """Refuse outputs that no experiment moves: nothing is to be learnt of them, and there is no range for an error."""
-    still = [name for name in reference.outputs if span_of(traces, name) == 0.0]
-    if still:
-        raise ConfigError(
-            f"{still[0]} has one value in all experiments", where=f"output {still[0]}", expected="an output that moves",
-            got=f"{float(traces[0][still[0]][0]):.6g} throughout {len(traces)} experiments",
-            remedy="leave the output out, or move what it depends on: wider ranges, a longer duration",
-        )  # fmt: skip
-
-
-def _kept(file: Path, seconds: float) -> float:
-    """Seconds of the search, as they were decided first."""
-    with suppress(OSError, ValueError, TypeError):
-        return float(read_bounded(file))
-    write_bytes(file, f"{seconds:.1f}\n".encode())
-    return round(seconds, 1)

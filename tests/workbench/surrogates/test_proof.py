@@ -33,7 +33,7 @@ from sysid.workbench.experiments.run import Experimented, Experiments
 from sysid.workbench.experiments.run import program_of as experiment_program
 from sysid.workbench.runner.events import Event, StepDone, StepProgress, StepStarted, Watcher
 from sysid.workbench.runner.program import carry_out
-from sysid.workbench.surrogates import make
+from sysid.workbench.surrogates import work
 from sysid.workbench.surrogates.asked import surrogate_of, wish_of
 from sysid.workbench.surrogates.make import Made
 from sysid.workbench.surrogates.plan import affordable, times, written
@@ -168,7 +168,7 @@ def test_the_page_of_a_search_is_made_once_and_has_the_proof(tmp_path: Path, mon
     monkeypatch.setattr("sysid.workbench.auto.plan.suggested", lambda *_, **__: [])
     made_of: list[Path] = []
     monkeypatch.setattr(report, "write_report", lambda folder: made_of.append(folder) or write_report(folder))
-    monkeypatch.setattr(make, "write_report", report.write_report)
+    monkeypatch.setattr(work, "write_report", report.write_report)
     runs = {"estimation": 4, "selection": 2, "test": 1}
     content = {"kind": "experiment", "name": "lag", "workers": 1, "reference": REFERENCE}
     content["experiment"] = {"duration": 20.0, "runs": runs}
@@ -342,7 +342,7 @@ def test_what_experiments_take_is_told_before_they_are_run(monkeypatch: pytest.M
     def told(function: str, **more: object) -> str | None:
         config = check(ExperimentConfig, {**content, "reference": {**REFERENCE, "python": function, **more}}, where="")
         reference = config.reference.at(tmp_path)
-        return make.first_look(Experiments(config=config, reference=reference), minutes=1.0)
+        return work.first_look(Experiments(config=config, reference=reference), minutes=1.0)
 
     slow = told("slow_models:raises", cost=20.0)
     assert slow is not None
