@@ -20,7 +20,7 @@ from sysid.estimation.grey_box.preparing import (
 )
 from sysid.estimation.grey_box.readying import common, ready_for
 from sysid.estimation.grey_box.record import Record
-from sysid.estimation.grey_box.shot import AUTO, shooting_terms, way_of, with_starts_begun, with_way
+from sysid.estimation.grey_box.shot import AUTO, SINGLE, shooting_terms, way_of, with_starts_begun, with_way
 from sysid.estimation.grey_box.telling import told
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
@@ -181,6 +181,7 @@ def fit_equations(
         template, experiments, training, data, begins=begins, scattered=scattered, began=began, on_progress=on_progress
     )
     # The latest first: of a start that converged, the last look at it is chosen, and not one that saw the same.
+    training = multistart.training
     candidates = [settled(one, ready.provider) for one in reversed(starts.run(multistart))]
     choice = choose(candidates, _chosen_by(training, ready), vet)
     if windows.samples:
@@ -253,6 +254,8 @@ def _prepared(
     windows = Windows.of(experiments, replace(training, window=0) if template.grey.by_case else training)
     ready = ready_for(template, windows.experiments)
     starts.check_samples(ready.provider)
+    if not len(ready.theta):  # nothing to estimate, and one start is as good as another
+        training = replace(training, starts=1, shooting=SINGLE)
     way = way_of(training, ready.template, begins)
     layout = EquationLayout(
         declared=2 if way == AUTO else 1,

@@ -16,6 +16,7 @@ from sysid.models import (
     NeuralStateSpace,
     PolynomialNARX,
     TransferFunction,
+    VectorGreyBox,
     VectorNARX,
     WienerHammerstein,
 )
@@ -72,6 +73,7 @@ class Family:
             remembers one sample alone.
         at_ends: What of it is tried before all else where outputs stand at ends: what is held there.
         adds_up: What of it is tried before all else where outputs add up what inputs bring.
+        at_events: What of it is tried before all else where outputs jump at events.
     """
 
     kind: str
@@ -83,6 +85,7 @@ class Family:
     in_motion: Callable[[Looked], Sequence[Try]] = lambda _: ()
     at_ends: Callable[[Looked], Sequence[Try]] = lambda _: ()
     adds_up: Callable[[Looked], Sequence[Try]] = lambda _: ()
+    at_events: Callable[[Looked], Sequence[Try]] = lambda _: ()
 
 
 def _arx(looked: Looked) -> list[Try]:
@@ -340,6 +343,12 @@ FAMILIES = (
         at_ends=_narx_at_ends,
     ),
     Family(kind=VectorNARX.kind, linear=False, first=lambda _: [], at_ends=_vector_at_ends),
+    Family(
+        kind=VectorGreyBox.kind,
+        linear=False,
+        first=lambda _: [],
+        at_events=lambda looked: [] if looked.resets is None else [Try(structure=looked.resets)],
+    ),
     Family(kind=HammersteinWiener.kind, linear=False, first=_blocks, around=_around_blocks),
     Family(kind=PolynomialNARX.kind, linear=False, first=_polynomials),
 )

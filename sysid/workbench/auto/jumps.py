@@ -19,6 +19,12 @@ QUIET = 3
 FEWEST = 0.2
 """Share of the records that have one at least."""
 
+UNDERSTOOD = (
+    "Between its jumps the reference is linear, and a level tells when one comes: equations of that were found in the "
+    "experiments and are tried first (docs/how/events.md)"
+)
+"""What is said of jumps where equations of them were found."""
+
 
 def jumps_of(traces: Sequence[Trace], mapping: Mapping) -> dict[str, NDArray[np.float64]]:
     """Of each output that jumps the sizes of its jumps, as shares of its range.
@@ -55,12 +61,13 @@ def jumps_of(traces: Sequence[Trace], mapping: Mapping) -> dict[str, NDArray[np.
     return found
 
 
-def jumps_told(traces: Sequence[Trace], mapping: Mapping) -> list[str]:
+def jumps_told(traces: Sequence[Trace], mapping: Mapping, *, understood: bool = False) -> list[str]:
     """What of some records no smooth model does, in words, and what one can do about it.
 
     Args:
         traces: The records.
         mapping: What moves, and what answers.
+        understood: Whether equations of the events were found in the records.
 
     Returns:
         A sentence for each output that jumps.
@@ -70,9 +77,15 @@ def jumps_told(traces: Sequence[Trace], mapping: Mapping) -> list[str]:
     for name, sizes in jumps_of(traces, mapping).items():
         usual = float(np.median(sizes))
         late = 100.0 * usual / np.sqrt(longest)
-        told.append(
+        jumps = (
             f"{name} jumps within a sample while no input moves, by {100.0 * usual:.2g} % of its range ({len(sizes)} "
-            "times), as a velocity that flips or a state that is reset. What is searched is smooth from sample to "
+            "times), as a velocity that flips or a state that is reset. "
+        )
+        if understood:
+            told.append(f"{jumps}{UNDERSTOOD}")
+            continue
+        told.append(
+            f"{jumps}What is searched is smooth from sample to "
             f"sample; one jump a sample early or late is an error of {late:.2g} % over a run (root mean square). Where "
             "you know what happens then, write it as equations (fits: in the pipeline of experiments; "
             "docs/how/events.md)"

@@ -12,10 +12,12 @@ from sysid.advice.dynamics import INTEGRATES
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
 from sysid.estimation.output_ends import found_ends
-from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind
+from sysid.estimation.resets import found_resets, grey_box_of
+from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind, VectorGreyBox
 from sysid.reporting.advice_record import AdviceRecord
 from sysid.reporting.advice_words import lines
 from sysid.traces import Role, Trace, TraceSet
+from sysid.workbench.auto.jumps import jumps_of
 from sysid.workbench.auto.parts import ends_held_out
 from sysid.workbench.fits.data import Data
 
@@ -45,6 +47,7 @@ class Looked:
         in_motion: Whether outputs move before any input does though each run begins as if they had stood: then what
             remembers one sample, or learns where it begins, is tried first.
         states: Of the best linear state space, once linear models were tried; 0 before.
+        resets: Where outputs jump and are linear between, the equations of that: then it is tried before all else.
         seen_from: Samples after which an input is seen to act first, in a response that takes no drift for its own.
     """
 
@@ -60,6 +63,7 @@ class Looked:
     integrators: int = 0
     states: int = 0
     seen_from: int | None = None
+    resets: VectorGreyBox | None = None
 
     @property
     def lags(self) -> int:
@@ -105,7 +109,24 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
             default=None,
         ),
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
+        resets=resets_of(data.estimation, mapping) if start.kind is StartKind.REST else None,
     )
+
+
+def resets_of(traces: Sequence[Trace], mapping: Mapping) -> VectorGreyBox | None:
+    """Equations of what is linear between events and jumps at them, as a ball that bounces.
+
+    Args:
+        traces: Records that begin at one place.
+        mapping: What moves, and what answers.
+
+    Returns:
+        The equations, with no parameter that is left to estimate; ``None`` where nothing jumps, or not so.
+    """
+    if not jumps_of(traces, mapping) or any(trace.usable is not None for trace in traces):
+        return None
+    found = found_resets([(trace.columns(mapping.inputs), trace.columns(mapping.outputs)) for trace in traces])
+    return None if found is None else grey_box_of(found, mapping)
 
 
 def is_suggested(mapping: Mapping) -> bool:

@@ -38,6 +38,10 @@ ALIKE = 0.03
 """Part of the least error within which another one counts as no worse; of those the smallest is chosen."""
 
 
+MET = "what is linear between its events stays within the tolerance on every trace that chooses"
+"""Why a search ends that has found a model of events."""
+
+
 Rank = Callable[[Trial], tuple[float, float, int]]
 """Sorting key of a trial, the best first: the share of what chooses that it does not stay within the tolerance on, its
 error, its number."""
@@ -245,6 +249,13 @@ class Plan:
 
     def _search(self) -> Iterator[list[Try]]:
         nonlinear_first = sorted(self.families, key=lambda family: family.linear)
+        # A smooth map meets no jump; what is exact where it was fitted has nothing to gain from others.
+        if self.looked.resets is not None:
+            self.budget.unlimited = 1
+            yield from self._rounds_of([one for family in nonlinear_first for one in family.at_events(self.looked)])
+            if self.tolerance is not None and self._least_outside() == 0.0:
+                self.ended = MET
+                return
         # Whatever else adds up drifts, and is close to what was held out by luck.
         if self.looked.integrators:
             self.budget.unlimited = 1

@@ -31,7 +31,7 @@ from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.finish import finish_s, page_s, span
 from sysid.workbench.auto.jumps import jumps_told
-from sysid.workbench.auto.look import span_of
+from sysid.workbench.auto.look import resets_of, span_of
 from sysid.workbench.auto.run import Searched, auto_of
 from sysid.workbench.auto.run import program_of as search_program
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
@@ -130,7 +130,7 @@ class Work:
         fitted = found.traces.with_role(Role.ESTIMATION)
         _check_moving(fitted, self.reference)
         # What a search has to learn; of fits that are asked for somebody knows it.
-        learnt = [] if self.config.fits else [*restless(found, self.mapping), *jumps_told(fitted, self.mapping)]
+        learnt = [] if self.config.fits else [*restless(found, self.mapping), *self._jumps(fitted)]
         notes = [*failed(found), *unlike(self.place), *learnt]
         for note in notes:
             self.say(f"note: {note}")
@@ -153,6 +153,10 @@ class Work:
         )
         plan = times(each, minutes=minutes, spent=spent, experiments=planned, workers=workers, finish=finish)
         return plan, planned, most
+
+    def _jumps(self, traces: Sequence[Trace]) -> list[str]:
+        understood = resets_of(traces, self.mapping) is not None
+        return jumps_told(traces, self.mapping, understood=understood)
 
     def seconds_left(self, plan: Times) -> float:
         """The time of the search, or of the fits that are asked for."""

@@ -38,6 +38,15 @@ def test_a_velocity_that_flips_is_told_with_what_a_sample_costs() -> None:
     assert "fits: in the pipeline" in said
 
 
+def test_jumps_whose_equations_were_found_ask_for_none() -> None:
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m/s"))
+    values = np.column_stack([np.full(N, 0.8), velocity(0.8)])
+    trace = Trace(name="r", sample_time=0.01, channels=channels, values=values)
+    (said,) = jumps_told([trace], MAPPING, understood=True)
+    assert "equations of that were found" in said
+    assert "fits:" not in said
+
+
 def test_what_inputs_and_ends_and_time_constants_do_is_no_jump() -> None:
     rng = np.random.default_rng(0)
     steps, still = np.repeat(rng.uniform(-1.0, 1.0, N // 20), 20), np.zeros(N)

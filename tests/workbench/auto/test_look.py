@@ -50,6 +50,24 @@ def test_outputs_that_stand_at_an_end_while_an_input_moves_on_are_known() -> Non
         assert set(at_ends([trace], MAPPING).values()) == {ends}
 
 
+def test_what_is_linear_between_its_events_is_known_with_its_equations() -> None:
+    """A charge that is emptied at 1; not where a record may begin anywhere."""
+    runs = []
+    for k, level in enumerate((1.2, 1.6, 2.0, 2.4, 3.0)):
+        y, charge = [], 0.0
+        for _ in range(200):
+            charge += 0.05 * (level - charge)
+            charge = 0.0 if charge >= 1.0 else charge
+            y.append(charge)
+        runs.append(replace(record("a", 200), name=f"r{k}", values=np.column_stack([np.full(200, level), y])))
+    known = data(*runs)
+    found = look(known, MAPPING, Start(kind=StartKind.REST)).resets
+    assert found is not None
+    assert "event_0_0 = on_0_0 >= 1" in found.equations
+    assert look(known, MAPPING, ESTIMATED).resets is None
+    assert look(data(record("a", 200)), MAPPING, Start(kind=StartKind.REST)).resets is None
+
+
 def test_what_asks_to_be_looked_at_is_told_in_words(looked: Looked) -> None:
     assert any("linear" in one for one in looked.cautions)
 

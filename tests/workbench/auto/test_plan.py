@@ -9,12 +9,12 @@ from dataclasses import replace
 import pytest
 
 from sysid.estimation.estimators import ESTIMATORS
-from sysid.models import ARX, HammersteinWiener, LinearStateSpace, NeuralStateSpace, WienerHammerstein
+from sysid.models import ARX, HammersteinWiener, LinearStateSpace, NeuralStateSpace, VectorGreyBox, WienerHammerstein
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import FINAL, Budget, price
 from sysid.workbench.auto.look import Looked
 from sysid.workbench.auto.parts import ENSEMBLE
-from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, PATIENCE, Plan, with_repeats
+from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, MET, PATIENCE, Plan, with_repeats
 from sysid.workbench.auto.search import error
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import NOT_DONE
@@ -376,3 +376,19 @@ def test_only_what_can_be_cut_short_has_a_limit_and_that_has_it() -> None:
     assert {p.structure.kind: p.training.get("max_time_s") for p in points} == {
         "ARX": None, "TransferFunction": 10.0, "SS": 10.0,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("shares", [(0.001, 0.004), (0.001, 0.04)])
+def test_equations_of_events_come_first_and_end_the_search_where_they_stay_within_the_tolerance(
+    shares: tuple[float, ...],
+) -> None:
+    events = VectorGreyBox(equations="y = where(before >= 1, 0, before + u)\nbefore[k+1] = y", initial={"before": 0})
+    budget = Budget(wall_s=None, iterations=10**9, clock=lambda: 0.0, is_stored=lambda _: False)
+    looked = replace(LOOKED, resets=events)
+    training = {"max_iterations": 50}
+    plan = Plan(looked=looked, budget=budget, error=error, training=training, tolerance=0.01, again=0)
+    (first,) = plan.ask()
+    assert first.structure == events
+    plan.tell([trial(first, 1e-6).model_copy(update={"selection_rms_shares": list(shares)})])
+    assert bool(plan.ask()) is (max(shares) > 0.01)
+    assert (plan.ended == MET) is (max(shares) <= 0.01)

@@ -1,0 +1,9 @@
+"""What is linear from sample to sample, and reset at events: found in records, and written as equations."""
+
+from __future__ import annotations
+
+from sysid.estimation.resets.found import found_resets
+from sysid.estimation.resets.reset_map import Guard, ResetMap, Rest
+from sysid.estimation.resets.written import grey_box_of
+
+__all__ = ["Guard", "ResetMap", "Rest", "found_resets", "grey_box_of"]

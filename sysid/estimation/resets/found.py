@@ -1,0 +1,331 @@
+"""Find in records what is linear from sample to sample and reset at events, as a ball that bounces.
+
+Samples that one linear map leads to are the flow; the others are events. An event is told by a level that a reference
+which looks for it so many times a sample reaches at every event, and at no other sample. What it sets the outputs to is
+seen by running the flow backwards from the sample behind it. A reference without noise fits exactly or not at all: what
+is not near enough is no such thing, and is left to the search.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.resets.reset_map import Array, Guard, ResetMap, Rest, features
+
+STEPS: Final = (1, 2, 4, 5, 8, 10, 16, 20)
+"""Times in a sample that a reference may look for events."""
+NEAR: Final = (1e-9, 1e-7, 1e-5)
+"""Shares of each output's range that the map may be off at a sample."""
+FLOWS, RESETS = 0.5, 0.85
+"""Shares of the samples that move which the flow leads to, and of the events which a reset does: in a sample with two
+events, or with the last, it is another."""
+MOST_GUARDS, FEWEST = 3, 8
+"""Events of different kinds, and samples of each at least."""
+STANDS: Final = 1e-9
+"""Share of the range within which an output stands."""
+DRAWS, LOOKED = 400, 4000
+"""Times that samples are drawn at random to find what most of them follow, and samples on which that is seen."""
+SAMPLES: Final = 40_000
+"""Of all records, at most."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Steps:
+    """From each sample to the next: what was, what acted, what came of it; a row each."""
+
+    before: Array
+    inputs: Array
+    after: Array
+    span: Array
+
+    @property
+    def terms(self) -> Array:
+        return np.hstack([self.before, self.inputs, np.ones((len(self.before), 1))])
+
+
+def found_resets(records: Sequence[tuple[Array, Array]], *, seed: int = 0) -> ResetMap | None:
+    """Find such a map.
+
+    Args:
+        records: Inputs, shape ``(n_samples, n_inputs)``, and outputs, shape ``(n_samples, n_outputs)``; the outputs of
+            a sample are those at its end.
+        seed: Of what is drawn at random.
+
+    Returns:
+        The map that has fewest looks for events a sample among those that fit best; ``None`` where there is none.
+
+    Example:
+        >>> h, v, fall = 1.0, 0.0, []
+        >>> for _ in range(400):
+        ...     h, v = h + 0.01 * v, v - 0.0981
+        ...     h, v = (0.0, -0.8 * v) if h <= 0.0 else (h, v)
+        ...     fall.append((h, v))
+        >>> found = found_resets([(np.zeros((400, 0)), np.array(fall))])
+        >>> found.steps, found.guards[0].level, found.guards[0].reset.round(6).tolist()
+        (1, 0.0, [[0.0, 0.0], [0.0, -0.8], [0.0, 0.0]])
+    """
+    steps, rng = _steps_of(records), np.random.default_rng(seed)
+    if steps is None:
+        return None
+    for near in NEAR:
+        moves = ~_still(steps)
+        flow = _common(steps.terms, steps.after, steps.span, near, rng=rng, among=moves)
+        if flow is None:
+            continue
+        led = _within(steps.terms @ flow - steps.after, steps.span, near)
+        if led[moves].mean() < FLOWS or led.all():
+            continue
+        best = max(
+            (_with_events(steps, flow.T, led, n, near=near, rng=rng) for n in STEPS),
+            key=lambda one: 0.0 if one is None else one[0],
+        )
+        if best is not None and best[0] >= RESETS:
+            begin = _begin(records, best[1])
+            return None if begin is None else _named(best[1], begin)
+    return None
+
+
+def _steps_of(records: Sequence[tuple[Array, Array]]) -> _Steps | None:
+    parts = [(y[:-1], u[1:], y[1:]) for u, y in records if len(y) > 1]
+    if not parts:
+        return None
+    before, inputs, after = (np.concatenate(some)[:SAMPLES] for some in zip(*parts, strict=True))
+    span = np.ptp(np.concatenate([before, after]), axis=0)
+    if not (span > 0.0).all() or len(before) < 10 * (before.shape[1] + inputs.shape[1] + 1):
+        return None
+    return _Steps(before=before, inputs=inputs, after=after, span=span)
+
+
+def _still(steps: _Steps) -> NDArray[np.bool_]:
+    return _within(steps.after - steps.before, steps.span, STANDS)
+
+
+def _within(off: Array, span: Array, near: float) -> NDArray[np.bool_]:
+    return np.asarray((np.abs(off) <= near * span).all(axis=1))
+
+
+def _common(
+    terms: Array, values: Array, span: Array, near: float, *, rng: np.random.Generator, among: NDArray[np.bool_]
+) -> Array | None:
+    """The linear map that most of some samples follow: of maps through a few of them that which passes nearest to most.
+
+    As in RANSAC (Fischler and Bolles 1981).
+    """
+    places, n = np.flatnonzero(among), terms.shape[1]
+    if len(places) < 2 * n:
+        return None
+    size = np.maximum(np.abs(terms[places]).max(axis=0), 1e-300)
+    looked = rng.choice(places, min(len(places), LOOKED), replace=False)
+    best = np.zeros(len(looked), dtype=bool)
+    for _ in range(DRAWS):
+        few = rng.choice(looked, n + 1, replace=False)
+        some = np.linalg.lstsq(terms[few] / size, values[few], rcond=None)[0]
+        follow = _within(terms[looked] / size @ some - values[looked], span, near)
+        best = follow if follow.sum() > best.sum() else best
+        if best.mean() > 0.95:
+            break
+    if best.sum() < 2 * n:
+        return None
+    chosen = looked[best]
+    for _ in range(3):
+        found = np.linalg.lstsq(terms[chosen] / size, values[chosen], rcond=None)[0] / size[:, np.newaxis]
+        chosen = places[_within(terms[places] @ found - values[places], span, near)]
+    return _plain(found, terms[chosen], values[chosen], span, near) if len(chosen) >= n else None
+
+
+def _plain(found: Array, terms: Array, values: Array, span: Array, near: float) -> Array:
+    """The same map with as few terms as do: what is not needed is noise, and is far off elsewhere."""
+    plain = found.copy()
+    for j in range(values.shape[1]):
+        used = list(np.argsort(-np.abs(found[:, j]) * np.abs(terms).max(axis=0)))
+        for k in used[::-1]:
+            fewer = [one for one in used if one != k]
+            own = np.linalg.lstsq(terms[:, fewer], values[:, j], rcond=None)[0] if fewer else np.zeros(0)
+            if np.abs(terms[:, fewer] @ own - values[:, j]).max() <= near * span[j]:
+                used = fewer
+        plain[:, j] = 0.0
+        if used:
+            plain[used, j] = np.linalg.lstsq(terms[:, used], values[:, j], rcond=None)[0]
+    return plain
+
+
+def _with_events(
+    steps: _Steps, flow: Array, led: NDArray[np.bool_], n: int, *, near: float, rng: np.random.Generator
+) -> tuple[float, ResetMap] | None:
+    """The map where the reference looks for events so often, and the share of the events that it leads through."""
+    part = _root(flow, n)
+    if part is None:
+        return None
+    path, at = [], steps.terms.T
+    for _ in range(n):
+        at = np.vstack([part @ at, at[len(part) :]])
+        path.append(at[: len(part)])
+    runs, open_ = np.array(path), ~led  # runs: (n, n_outputs, samples)
+    still, guards, through = _still(steps), [], 0
+    for _ in range(MOST_GUARDS):
+        found = _guard(runs, led, open_)
+        if found is None:
+            break
+        output, sign, level = found
+        here = open_ & (sign * runs[:, output] <= sign * level).any(axis=0)
+        guard, led_through = _reset(steps, part, runs, here & ~still, (output, sign, level), near=near, rng=rng)
+        open_ = open_ & ~here
+        if guard is not None:
+            guards.append(guard)
+            through += led_through
+    events = int((~led & ~still).sum())
+    if not guards or not events:
+        return None
+    rest = _rest(steps, runs, guards, ~led, still)
+    return through / events, ResetMap(flow=part, steps=n, guards=tuple(guards), rest=rest, begin=steps.before[0])
+
+
+def _root(flow: Array, n: int) -> Array | None:
+    """The map of an n-th of a sample: with so many of them it is the whole."""
+    p, whole = len(flow), np.eye(flow.shape[1])
+    whole[:p] = flow
+    if n == 1:
+        return flow
+    part = whole
+    with np.errstate(all="ignore"):
+        part = np.eye(len(whole)) + (whole - np.eye(len(whole))) / n
+        for _ in range(60):  # Newton's method: all of these commute
+            step = np.linalg.lstsq(np.linalg.matrix_power(part, n - 1), np.linalg.matrix_power(part, n) - whole)[0] / n
+            part = part - step
+            if not np.isfinite(part).all():
+                return None
+            if np.abs(step).max() <= 1e-15 * np.abs(part).max():
+                break
+    near = np.allclose(np.linalg.matrix_power(part, n), whole, rtol=1e-11, atol=1e-13)
+    return np.where(np.abs(part[:p]) < 1e-14 * np.abs(part[:p]).max(), 0.0, part[:p]) if near else None
+
+
+def _guard(runs: Array, led: NDArray[np.bool_], open_: NDArray[np.bool_]) -> tuple[int, int, float] | None:
+    """The output and the level that most of the open events reach, and no sample of the flow."""
+    best, most = None, FEWEST - 1
+    for output in range(runs.shape[1]):
+        for sign in (1, -1):
+            least = (sign * runs[:, output]).min(axis=0)
+            edge = least[led].min()
+            reach = open_ & (least < edge)
+            if reach.sum() > most:
+                low = float(least[reach].max())
+                most, best = int(reach.sum()), (output, sign, sign * simplest(low, float(edge)))
+    return best
+
+
+def simplest(low: float, high: float) -> float:
+    """The number with fewest digits from one number on to below another: a level that somebody wrote.
+
+    Args:
+        low: It may be this one.
+        high: It is less.
+
+    Returns:
+        The number.
+
+    Example:
+        >>> simplest(-1e-5, 2e-4), simplest(0.0993, 0.1012), simplest(-2.4, -2.1)
+        (0.0, 0.1, -2.2)
+    """
+    if low <= 0.0 < high:
+        return 0.0
+    for digits in range(1, 17):
+        scale = 10.0 ** (math.floor(math.log10(max(abs(low), abs(high)))) + 1 - digits)
+        one = math.ceil(low / scale) * scale
+        if low <= float(f"{one:.{digits}g}") < high:
+            return float(f"{one:.{digits}g}")
+    return low
+
+
+def _reset(
+    steps: _Steps, part: Array, runs: Array, here: NDArray[np.bool_], guard: tuple[int, int, float], *, near: float,
+    rng: np.random.Generator,
+) -> tuple[Guard | None, int]:  # fmt: skip
+    """What an event sets the outputs to, and in how many of these samples it does."""
+    output, sign, level = guard
+    places = np.flatnonzero(here)
+    if len(places) < FEWEST:
+        return None, 0
+    first = (sign * runs[:, output, places] <= sign * level).argmax(axis=0)
+    met, inputs = runs[first, :, places].T, steps.inputs[places].T
+    terms = features(met, inputs)
+    set_to = _backwards(steps, part, places, len(runs) - 1 - first)
+    some = _common(terms, set_to, steps.span, 10.0 * near, rng=rng, among=np.ones(len(places), dtype=bool))
+    if some is None:
+        return None, 0
+    led = _within(terms @ some - set_to, steps.span, 10.0 * near)
+    return Guard(output=output, sign=sign, level=level, reset=some), int(led.sum())
+
+
+def _backwards(steps: _Steps, part: Array, places: NDArray[np.int64], by: NDArray[np.int64]) -> Array:
+    """Outputs so many steps before the sample behind, as if nothing but the flow had led there."""
+    p, found = len(part), np.empty((len(places), len(part)))
+    whole = np.eye(part.shape[1])
+    whole[:p] = part
+    after = np.hstack([steps.after, steps.inputs, np.ones((len(steps.after), 1))])
+    for n in np.unique(by):
+        own = by == n
+        found[own] = np.linalg.solve(np.linalg.matrix_power(whole, int(n)), after[places[own]].T)[:p].T
+    return found
+
+
+def _rest(
+    steps: _Steps, runs: Array, guards: Sequence[Guard], events: NDArray[np.bool_], still: NDArray[np.bool_]
+) -> Rest | None:
+    """Below what the outputs stand still at an event; of the outputs that by which it is told most clearly."""
+    if (events & still).sum() < FEWEST:
+        return None
+    values = np.median(steps.after[events & still], axis=0)
+    ends = events & _within(steps.after - values, steps.span, STANDS)
+    to, told = np.full((runs.shape[1], runs.shape[2]), np.nan), np.zeros(runs.shape[2], dtype=bool)
+    for guard in guards[::-1]:
+        hit = guard.sign * runs[:, guard.output] <= guard.sign * guard.level
+        own = hit.any(axis=0) & events
+        met = runs[hit.argmax(axis=0), :, np.arange(runs.shape[2])].T
+        set_to = (features(met, steps.inputs.T) @ guard.reset).T
+        to, told = np.where(own, set_to, to), told | own
+    return _edge(to, told & ends, told & ~ends, values)
+
+
+def _edge(to: Array, ends: NDArray[np.bool_], goes_on: NDArray[np.bool_], values: Array) -> Rest | None:
+    best, gap = None, 1.0
+    for j, one in enumerate(np.abs(to)):
+        if not ends.any() or not goes_on.any():
+            continue
+        # An event behind another of the same sample is not seen: few may lie on the wrong side.
+        low, high = float(np.quantile(one[ends], 0.99)), float(np.quantile(one[goes_on], 0.01))
+        low, high = _tightened(one[ends], one[goes_on], low, high)
+        if low < high and high / max(low, 1e-300) > gap:
+            best, gap = (
+                Rest(output=j, below=simplest(np.nextafter(low, np.inf), high), values=values),
+                high / max(low, 1e-300),
+            )
+    return best
+
+
+def _tightened(ends: Array, goes_on: Array, low: float, high: float) -> tuple[float, float]:
+    """The edge between most of both: the largest that ends, and the least that goes on, each on its side of it."""
+    middle = math.sqrt(max(low, 1e-300) * max(high, 1e-300))
+    return float(ends[ends <= middle].max(initial=low)), float(goes_on[goes_on >= middle].min(initial=math.inf))
+
+
+def _begin(records: Sequence[tuple[Array, Array]], found: ResetMap) -> Array | None:
+    """Where all records begin: the flow backwards from the first sample; ``None`` where they begin elsewhere."""
+    p, whole = found.n_outputs, np.eye(found.flow.shape[1])
+    whole[:p] = found.flow
+    far = np.linalg.matrix_power(whole, found.steps)
+    begins = np.array([np.linalg.solve(far, np.concatenate([y[0], u[0], [1.0]]))[:p] for u, y in records])
+    span = np.ptp(np.concatenate([y for _, y in records]), axis=0)
+    return np.median(begins, axis=0) if (np.ptp(begins, axis=0) <= 1e-6 * span).all() else None
+
+
+def _named(found: ResetMap, begin: Array) -> ResetMap:
+    begin = np.where(np.abs(begin) < 1e-12 * max(1.0, float(np.abs(begin).max())), 0.0, begin)
+    return ResetMap(flow=found.flow, steps=found.steps, guards=found.guards, rest=found.rest, begin=begin)

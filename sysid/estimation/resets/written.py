@@ -1,0 +1,100 @@
+"""Such a map as equations of a grey box, which every export knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from sysid.estimation.resets.reset_map import Array, Guard, ResetMap, Rest
+from sysid.models import Mapping, VectorGreyBox
+
+DIGITS = 13
+"""Of a number: what is behind them is rounding."""
+
+
+def grey_box_of(found: ResetMap, mapping: Mapping) -> VectorGreyBox:
+    """The equations, with the outputs of the sample before as states.
+
+    Args:
+        found: The map.
+        mapping: Names of inputs and outputs.
+
+    Returns:
+        The structure; nothing of it is left to estimate.
+    """
+    names, inputs = _quoted(mapping.outputs), _quoted(mapping.inputs)
+    before = [f"before_{k}" for k in range(len(names))]
+    lines, now = list[str](), before
+    for step in range(found.steps):
+        last = step + 1 == found.steps
+        after = names if last else [f"at_{step}_{k}" for k in range(len(names))]
+        lines += _step(found, now, after, inputs, step)
+        now = after
+    lines += [f"{one}[k+1] = {name}" for one, name in zip(before, names, strict=True)]
+    initial = {
+        one: {"start": float(f"{value:.{DIGITS}g}"), "fixed": True}
+        for one, value in zip(before, found.begin, strict=True)
+    }
+    return VectorGreyBox(equations="\n".join(lines), initial=initial)
+
+
+def _quoted(names: Sequence[str]) -> list[str]:
+    return [name if name.isidentifier() and name.isascii() else f'"{name}"' for name in names]
+
+
+def _step(found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str], step: int) -> Iterator[str]:
+    falls = [f"on_{step}_{k}" for k in range(len(now))]
+    for name, row in zip(falls, found.flow, strict=True):
+        yield f"{name} = {_sum(row, [*now, *inputs, ''])}"
+    value = list(falls)
+    for number, guard in reversed(list(enumerate(found.guards))):
+        event = f"event_{step}_{number}"
+        yield f"{event} = {falls[guard.output]} {'<=' if guard.sign > 0 else '>='} {_number(guard.level)}"
+        set_to = [f"set_{step}_{number}_{k}" for k in range(len(now))]
+        yield from _set(guard, falls, inputs, set_to)
+        value = [
+            f"where({event}, {one}, {other})" for one, other in zip(_resting(found.rest, set_to), value, strict=True)
+        ]
+    for name, one in zip(after, value, strict=True):
+        yield f"{name} = {one}"
+
+
+def _set(guard: Guard, falls: Sequence[str], inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
+    own = [*falls, ""]
+    terms = [*own, *(f"{one}*{other}" if one else other for other in inputs for one in own)]
+    for name, column in zip(names, guard.reset.T, strict=True):
+        yield f"{name} = {_sum(column, terms)}"
+
+
+def _resting(rest: Rest | None, names: Sequence[str]) -> list[str]:
+    if rest is None:
+        return list(names)
+    stands = f"abs({names[rest.output]}) < {_number(rest.below)}"
+    return [f"where({stands}, {_number(value)}, {one})" for one, value in zip(names, rest.values, strict=True)]
+
+
+def _sum(row: Array, terms: Sequence[str]) -> str:
+    """A sum of those terms that are there; the last, or one without a name, is a number."""
+    parts = []
+    for value, term in zip(row, terms, strict=True):
+        if value == 0.0:
+            continue
+        number = _number(float(value))
+        factor = "" if number == "1" else "-" if number == "-1" else f"{number}*"
+        parts.append(f"{factor}{term}" if term else number)
+    return " + ".join(parts).replace("+ -", "- ") or "0"
+
+
+def _number(value: float) -> str:
+    """A number in as few digits as come to it.
+
+    Example:
+        >>> _number(0.010000000000000002), _number(-0.98), _number(2e-308)
+        ('0.01', '-0.98', '2e-308')
+    """
+    return (
+        np.format_float_positional(float(f"{value:.{DIGITS}g}"), trim="-")
+        if 1e-4 <= abs(value) < 1e6
+        else f"{value:.{DIGITS}g}"
+    )

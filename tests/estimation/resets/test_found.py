@@ -1,0 +1,161 @@
+"""What is linear between events is found exactly, whatever its events are; what is not is left alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import sysid
+from sysid.estimation.resets import ResetMap, found_resets, grey_box_of
+from sysid.estimation.resets.found import simplest
+from sysid.models import Mapping, Start
+
+Array = NDArray[np.float64]
+Reference = Callable[[Array], Array]
+"""Inputs, shape ``(n, n_inputs)``, to outputs."""
+
+
+def ball(steps: int) -> Reference:
+    """Let go at 1 m, with the share of its speed that an impact leaves as an input; it looks for impacts so often."""
+
+    def run(inputs: Array) -> Array:
+        h, v, found, dt = 1.0, 0.0, [], 0.01 / steps
+        moves = True
+        for e in inputs[:, 0]:
+            for _ in range(steps):
+                h, v = (h + dt * v, v - 9.81 * dt) if moves else (h, v)
+                if h <= 0.0 and v < 0.0:
+                    h, v = 0.0, -e * v
+                    moves = v >= 0.1
+                    v = v if moves else 0.0
+            found.append((h, v))
+        return np.array(found)
+
+    return run
+
+
+def neuron(inputs: Array) -> Array:
+    """Charges towards its input, and is emptied at 1."""
+    y, found = 0.0, []
+    for u in inputs[:, 0]:
+        y += 0.05 * (u - y)
+        y = 0.0 if y >= 1.0 else y
+        found.append((y,))
+    return np.array(found)
+
+
+def between_walls(inputs: Array) -> Array:
+    """Driven by a force, and thrown back at -1 and at 2 with 0.9 and 0.7 of its speed."""
+    x, v, found = 0.0, 0.0, []
+    for force in inputs[:, 0]:
+        x, v = x + 0.02 * v, v + 0.02 * (force - 0.3 * v)
+        x, v = (-1.0, -0.9 * v) if x <= -1.0 else (2.0, -0.7 * v) if x >= 2.0 else (x, v)
+        found.append((x, v))
+    return np.array(found)
+
+
+def held(rng: np.random.Generator, low: float, high: float, each: int, n: int = 300) -> Array:
+    return np.repeat(rng.uniform(low, high, (n // each, 1)), each, axis=0)
+
+
+REFERENCES = {
+    "ball, by the sample": (ball(1), 0.5, 0.9, 300),
+    "ball, ten times a sample": (ball(10), 0.6, 0.9, 300),
+    "neuron": (neuron, 0.5, 3.0, 20),
+    "between walls": (between_walls, -12.0, 12.0, 15),
+}
+
+
+def of(name: str) -> tuple[ResetMap | None, list[tuple[Array, Array]]]:
+    """What is found in twelve records, and twenty others."""
+    run, low, high, each = REFERENCES[name]
+    rng = np.random.default_rng(0)
+    records = [(u, run(u)) for u in (held(rng, low, high, each) for _ in range(32))]
+    return found_resets(records[:12]), records[12:]
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_what_is_found_runs_as_the_reference_does(name: str) -> None:
+    found, others = of(name)
+    assert found is not None
+    off = [np.sqrt(np.mean((found.run(u) - y) ** 2, axis=0)) / np.ptp(y, axis=0) for u, y in others]
+    # Where the ball's last impact is, two of a sample may have been taken for one; it hardly moves then.
+    assert np.median(off) < 1e-9
+    assert np.max(off) < 2e-3
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_its_equations_run_as_it_does(name: str) -> None:
+    found, others = of(name)
+    assert found is not None
+    mapping = Mapping(inputs=("u",), outputs=tuple(f"y {k}" for k in range(found.n_outputs)))
+    u, y = others[0]
+    record = sysid.data(
+        {"r": (u[:, 0], y)}, inputs="u", outputs=mapping.outputs, sample_time=0.01, split=["estimation"]
+    )
+    rest = dict(zip(mapping.outputs, found.begin.tolist(), strict=True))
+    fit = sysid.fit(record, mapping, grey_box_of(found, mapping), start=Start(), rest_output=rest)
+    np.testing.assert_allclose(np.reshape(fit.simulate(u[:, 0]), y.shape), found.run(u), atol=1e-9)
+
+
+def test_the_events_are_those_of_the_reference() -> None:
+    found, _ = of("ball, ten times a sample")
+    assert found is not None
+    assert found.rest is not None
+    (guard,) = found.guards
+    assert (found.steps, guard.output, guard.sign, guard.level) == (10, 0, 1, 0.0)
+    assert (found.rest.output, found.rest.below, found.rest.values.tolist()) == (1, 0.1, [0.0, 0.0])
+    np.testing.assert_allclose(found.begin, [1.0, 0.0], atol=1e-12)
+    walls, _ = of("between walls")
+    assert walls is not None
+    assert sorted((one.output, one.level) for one in walls.guards) == [(0, -1.0), (0, 2.0)]
+    assert walls.rest is None
+
+
+def smooth(inputs: Array) -> Array:
+    """Van der Pol, driven."""
+    x, v, found = 1.0, 0.0, []
+    for u in inputs[:, 0]:
+        x, v = x + 0.05 * v, v + 0.05 * ((1.0 - x**2) * v - x + u)
+        found.append((x, v))
+    return np.array(found)
+
+
+def noisy(inputs: Array) -> Array:
+    return neuron(inputs) + 1e-3 * np.random.default_rng(1).standard_normal((len(inputs), 1))
+
+
+def bent(inputs: Array) -> Array:
+    """A pendulum against a stop: not linear between its impacts."""
+    x, v, found = 1.0, 0.0, []
+    for u in inputs[:, 0]:
+        x, v = x + 0.05 * v, v + 0.05 * (u - 9.0 * np.sin(x))
+        x, v = (-0.5, -0.8 * v) if x <= -0.5 else (x, v)
+        found.append((x, v))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("reference", [smooth, noisy, bent, lambda u: 2.0 * u, lambda u: np.zeros((len(u), 1))])
+def test_what_is_no_such_thing_is_left_to_the_search(reference: Reference) -> None:
+    rng = np.random.default_rng(0)
+    assert found_resets([(u, reference(u)) for u in (held(rng, 0.5, 3.0, 20) for _ in range(8))]) is None
+
+
+def test_records_that_begin_elsewhere_or_are_short_have_none() -> None:
+    rng = np.random.default_rng(0)
+    records = [(u, neuron(u)) for u in (held(rng, 0.5, 3.0, 20) for _ in range(8))]
+    assert found_resets(records) is not None
+    assert found_resets([(u[7 * k :], y[7 * k :]) for k, (u, y) in enumerate(records)]) is None
+    assert found_resets([(u[:3], y[:3]) for u, y in records]) is None
+    assert found_resets([]) is None
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "level"),
+    [(-1e-5, 2e-4, 0.0), (0.0993, 0.1012, 0.1), (-2.45, -2.35, -2.4), (0.99, 1.02, 1.0), (1234.5, 1234.6, 1234.5)],
+)
+def test_a_level_is_the_shortest_number_between(low: float, high: float, level: float) -> None:
+    assert simplest(low, high) == level
