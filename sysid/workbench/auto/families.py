@@ -26,11 +26,12 @@ from sysid.workbench.auto.look import Looked
 
 CURVE = "piecewise 6"
 """A learnt curve that can be any."""
-LINEAR_ORDERS = range(1, 7)
-FURTHER_ORDERS = ((8, 10), (12, 14), (16, 18), (20,))
+LINEAR_ORDERS = range(1, 5)
+FURTHER_ORDERS = ((5, 6), (8, 10), (12, 14), (16, 18), (20,))
 """States of linear models beyond those, round by round: tried as long as the last round gained."""
-FEWEST_STATES = 2
-"""Of a network that is tried first: what a curve hides from a linear model may have a state of its own."""
+FEWEST_STATES, MOST_STATES = 2, 6
+"""Of a network that is tried first: what a curve hides from a linear model may have a state of its own; and from how
+many on a smaller one is tried before it."""
 BLOCK_STATES = 6
 """Of a block at most; a linear model has more."""
 MANY_STATES = 4
@@ -67,6 +68,7 @@ class Family:
         linear: Whether it is tried in the first round.
         first: What of it is tried unasked.
         leads: Whether it is tried before other kinds, where there may not be time for all.
+        waits: Whether it is tried after all of the other kinds where it does not lead, as it takes several times as long.
         around: What stands next to one of it, the most promising first; nothing for what is tried in full at once.
         larger: Rounds of it that are tried as long as the one before gained.
         in_motion: What of it is tried before all else where runs do not begin at rest: what learns where it begins, or
@@ -80,6 +82,7 @@ class Family:
     linear: bool
     first: Callable[[Looked], Sequence[Try]]
     leads: Callable[[Looked], bool] = lambda _: False
+    waits: bool = False
     around: Callable[[Try, Looked], Sequence[Try]] = lambda _, __: ()
     larger: Callable[[Looked], Sequence[Sequence[Try]]] = lambda _: ()
     in_motion: Callable[[Looked], Sequence[Try]] = lambda _: ()
@@ -121,13 +124,13 @@ def _transfer_functions(looked: Looked) -> list[Try]:
 def _neural(looked: Looked) -> list[Try]:
     if looked.integrators:
         return _neural_sums(looked)
-    n = min(max(looked.states, FEWEST_STATES), LINEAR_ORDERS[-1])
+    n = min(max(looked.states, FEWEST_STATES), MOST_STATES)
     sizes = ((n, 8, None), (n, 8, 0.03), (max(n - 1, FEWEST_STATES), 8, 0.1), (n, 4, 1e-3), (n + 1, 8, 0.03))
     found = [
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
         for n, k, r in sizes
     ]
-    if looked.states > LINEAR_ORDERS[-1]:
+    if looked.states > MOST_STATES:
         found.insert(0, Try(structure=NeuralStateSpace(states=looked.states, neurons=8)))
     if looked.never_negative:
         signless = NeuralStateSpace(states=3, neurons=4, output="absolute")
@@ -237,7 +240,7 @@ def _around_blocks(one: Try, _: Looked) -> list[Try]:
     blocks = cast("HammersteinWiener", one.structure)
     before = any(curve.kind != NONE for curve in blocks.input)
     other = {"output": CURVE if blocks.output.kind == NONE else NONE} if before else {"input": CURVE}
-    sizes = [{"states": n} for n in (blocks.states + 1, blocks.states - 1) if 1 <= n <= LINEAR_ORDERS[-1]]
+    sizes = [{"states": n} for n in (blocks.states + 1, blocks.states - 1) if 1 <= n <= BLOCK_STATES]
     return _changed(one, [*sizes[:1], other, *sizes[1:]])
 
 
@@ -333,6 +336,7 @@ FAMILIES = (
         first=_two_blocks,
         around=_around_two_blocks,
         leads=_has_many_states,
+        waits=True,
     ),
     Family(
         kind=NARX.kind,

@@ -337,8 +337,10 @@ class Plan:
         return min((int(one.structure["states"]) for one in alike), default=0)
 
     def _least(self, *, linear: bool) -> list[Try]:
-        """The least of each kind."""
-        wanted, least = self._first(linear=linear), dict[str, Try]()
+        """The least of each kind, without those that wait."""
+        late = {family.kind for family in self.families if family.waits and not family.leads(self.looked)}
+        wanted = [one for one in self._first(linear=linear) if one.structure.kind not in late]
+        least = dict[str, Try]()
         for one in sorted(wanted, key=lambda one: size_of(one.structure)):
             least.setdefault(one.structure.kind, one)
         return [one for one in wanted if least[one.structure.kind] is one]
@@ -346,9 +348,10 @@ class Plan:
     def _first(self, *, linear: bool) -> list[Try]:
         """What is tried unasked."""
         some = [family for family in self.families if family.linear is linear]
-        first = [one for family in some if family.leads(self.looked) for one in family.first(self.looked)]
-        rest = [one for family in some if not family.leads(self.looked) for one in family.first(self.looked)]
-        return [*first, *suggested(self.looked, linear=linear), *rest]
+        leading = [family for family in some if family.leads(self.looked)]
+        rest = sorted((family for family in some if family not in leading), key=lambda family: family.waits)
+        first, later = ([one for family in kinds for one in family.first(self.looked)] for kinds in (leading, rest))
+        return [*first, *suggested(self.looked, linear=linear), *later]
 
     def _rounds_of(self, wanted: Sequence[Try]) -> Iterator[list[Try]]:
         new = self._new(wanted, len(wanted))
