@@ -68,7 +68,7 @@ class Family:
         linear: Whether it is tried in the first round.
         first: What of it is tried unasked.
         leads: Whether it is tried before other kinds, where there may not be time for all.
-        waits: Whether it is tried after all of the other kinds where it does not lead, as it takes several times as long.
+        waits: Whether it is tried after all other kinds where it does not lead, as it takes several times as long.
         around: What stands next to one of it, the most promising first; nothing for what is tried in full at once.
         larger: Rounds of it that are tried as long as the one before gained.
         in_motion: What of it is tried before all else where runs do not begin at rest: what learns where it begins, or
