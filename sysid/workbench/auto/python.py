@@ -25,6 +25,7 @@ from sysid.workbench.auto.run import Searched, auto_of, run_auto
 from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.fits.record import read_fit
+from sysid.workbench.fits.table import told_of_fits
 from sysid.workbench.runner.store import RunFolder
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class AutoSearch:
         fit: The chosen model, fitted to all estimation traces.
         linear: The best linear one; the same as ``fit`` where no network does better.
         why: Why this one, in words.
-        notes: What chose, and what in the record asks to be looked at.
+        notes: What speaks against a fit, what chose, and what in the record asks to be looked at.
         hurried: Of these, that there was no search, as the time was up before structures were compared; else empty.
         record: Every trial.
     """
@@ -143,8 +144,8 @@ def auto(
     if best is None:
         raise ConfigError("the chosen fit has gone from the folder", where=folder, remedy="run the search again")
     return AutoSearch(
-        fit=best, linear=fits[LINEAR] or best, why=found.record.chosen_by, notes=found.told, hurried=found.hurried,
-        record=found.record,
+        fit=best, linear=fits[LINEAR] or best, why=found.record.chosen_by,
+        notes=(*told_of_fits(found.results, in_full=True), *found.told), hurried=found.hurried, record=found.record,
     )  # fmt: skip
 
 

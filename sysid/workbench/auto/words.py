@@ -130,7 +130,12 @@ def _beside_nonlinear(choice: Choice) -> str:
     if not choice.finished:
         return f"no nonlinear model came to a result ({choice.nonlinear} begun), so that none may be called worse"
     if choice.unusable:
-        return f"none of the {choice.nonlinear} nonlinear models can be used ({', '.join(choice.unusable)})"
+        none = (
+            "the one nonlinear model cannot"
+            if choice.nonlinear == 1
+            else f"none of {choice.nonlinear} nonlinear ones can"
+        )
+        return f"{none} be used ({', '.join(choice.unusable)})"
     without = choice.nonlinear - choice.finished
     return "and no nonlinear model does better" + (f" ({without} more came to no result)" if without else "")
 

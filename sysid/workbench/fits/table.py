@@ -90,11 +90,12 @@ def _mean_fit(fit: FitRecord) -> str:
     return f"{percent(mean_fit(case.free_run.nrmse_fit for case in judged.values()))} %"
 
 
-def told_of_fits(results: Results) -> list[str]:
+def told_of_fits(results: Results, *, in_full: bool = False) -> list[str]:
     """What is to be looked at before a figure is believed: of each fit how it ended, where it is of no use, and why.
 
     Args:
         results: What the run found.
+        in_full: Whether all of it is said, as where no report is written.
 
     Returns:
         A line for each thing to say, of one fit or of several alike; the report has the rest.
@@ -103,8 +104,8 @@ def told_of_fits(results: Results) -> list[str]:
     for fit in results.fits:
         ended = Status[fit.status]
         told = [*([ended.value] if not ended.usable else []), *fit.warnings]
-        more = f" ({len(told) - 1} more in the report)" if len(told) > 1 else ""
-        for one in told[:1]:
+        more = f" ({len(told) - 1} more in the report)" if len(told) > 1 and not in_full else ""
+        for one in told if in_full else told[:1]:
             alike.setdefault(f"{one}{more}", []).append(fit.name)
     return [f"Look at {'; '.join(names)}: {one}" for one, names in alike.items()]
 

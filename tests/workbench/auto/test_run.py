@@ -234,6 +234,13 @@ def test_python_searches_what_is_in_memory() -> None:
     assert run.shape == (150,)
 
 
+def test_python_says_that_what_was_found_explains_next_to_nothing() -> None:
+    rng = np.random.default_rng(0)
+    found = sysid.auto(sysid.data((rng.normal(size=300), rng.normal(size=300)), sample_time=1.0), iterations=20)
+    assert f"Look at {FOUND}: Over the records that were fitted the free run of y is hardly better than a" in str(found)
+    assert "more in the report" not in str(found)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [

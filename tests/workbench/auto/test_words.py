@@ -60,7 +60,7 @@ def test_a_linear_model_that_is_as_good_is_chosen() -> None:
 def test_where_no_network_can_be_used_none_is_said_to_be_worse() -> None:
     lost = network(2, 1.0, 60).model_copy(update={"usable": False, "status": "UNSTABLE"})
     said = sentence(choose([arx(1, 1.0), lost], error, stable), 2, unit="V", ended="", error=error)
-    assert "none of the 1 nonlinear models can be used (unstable)" in said
+    assert "the one nonlinear model cannot be used (unstable)" in said
     assert "no nonlinear model does better" not in said
 
 
