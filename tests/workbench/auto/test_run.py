@@ -237,7 +237,8 @@ def test_python_searches_what_is_in_memory() -> None:
 def test_python_says_that_what_was_found_explains_next_to_nothing() -> None:
     rng = np.random.default_rng(0)
     found = sysid.auto(sysid.data((rng.normal(size=300), rng.normal(size=300)), sample_time=1.0), iterations=20)
-    assert f"Look at {FOUND}: Over the records that were fitted the free run of y is hardly better than a" in str(found)
+    against = [line for line in str(found).splitlines() if line.startswith(f"Look at {FOUND}")]
+    assert any("hardly better than a constant" in line for line in against)
     assert "more in the report" not in str(found)
 
 
