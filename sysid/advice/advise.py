@@ -63,7 +63,7 @@ def advise(traces: TraceSet, mapping: Mapping, *, suggest: bool = True) -> Advic
 def _advice(traces: TraceSet, mapping: Mapping, chosen: Sequence[Trace], *, suggest: bool) -> Advice:
     for trace in chosen:
         trace.check_sizes([*mapping.inputs, *mapping.outputs])
-    record = Record(traces=tuple(trace.seen_by(mapping.channels) for trace in chosen), mapping=mapping)
+    record = Record(traces=tuple(trace.seen_by(mapping.channels, each=True) for trace in chosen), mapping=mapping)
     findings = tuple(finding for check in CHECKS for finding in check(record))
     impulse, response = record.slowed[0].impulse, record.response
     if not isinstance(response, str):  # others have it too

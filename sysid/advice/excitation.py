@@ -36,7 +36,8 @@ def check_excitation(record: Record) -> Iterator[Finding]:
 
 
 def _input(record: Record, name: str) -> Iterator[Finding]:
-    parts = record.values(name)
+    j = record.mapping.inputs.index(name)
+    parts = [run.inputs[:, j] for run in record.runs]
     order, condition = excitation_order(parts)
     moves = sum(int(np.count_nonzero(np.diff(part))) for part in parts)
     levels = max(len(np.unique(part)) for part in parts)
@@ -77,11 +78,11 @@ def _together(record: Record) -> Iterator[Finding]:
     names = record.moving
     places = [record.mapping.inputs.index(name) for name in names]
     enough = 4 * (2 * ACROSS + 1) * (len(names) - 1)
-    across = ACROSS if sum(len(s) for s in record.segments) > 2 * enough else 0
+    across = ACROSS if sum(len(s) for s in record.runs) > 2 * enough else 0
     shares = dict[str, float]()
     for j, name in zip(places, names, strict=True):
         blocks = []
-        for segment in record.some.segments if len(names) == len(record.mapping.inputs) else record.segments:
+        for segment in record.some.runs if len(names) == len(record.mapping.inputs) else record.runs:
             if len(segment) > 2 * across + 2:
                 rows = slice(across, len(segment) - across)
                 others = [

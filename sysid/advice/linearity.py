@@ -34,7 +34,9 @@ NOTHING_LEFT = 1e-6
 """Part of the output's variance that a linear response leaves, below which there is nothing to ask."""
 NEIGHBOURS, SMOOTH = 6, 10
 """Excited lines to either side over which a response is a parabola; settling times that make a period long enough."""
-COHERENT = 0.9
+COHERENT, SMEARED = 0.9, 0.1
+"""Share of the output from which the inputs account for it, and how much less than an impulse response explains it is
+where the windows are what is seen: what is linear is coherent."""
 
 
 def check_linearity(record: Record) -> Iterator[Finding]:
@@ -165,7 +167,7 @@ def _curvature(record: Record) -> Finding:
         return Finding(topic=Topic.LINEARITY, code="linearity.nothing_explained", verdict=Verdict.LOOK, figures=figures)
     records = _long_enough(record)
     if not records:
-        return _unknown("the record is too short")
+        return _unknown("the record is too short, or parted by gaps into stretches that are")
     total = float(np.sum([np.var(one.segment.output) * len(one.left) for one in records]))
     rest = float(np.sum([np.var(one.left) * len(one.left) for one in records]))
     if rest <= NOTHING_LEFT * total:
@@ -317,6 +319,11 @@ def _coherence(record: Record) -> Iterator[Finding]:
         )  # fmt: skip
         return
     mean, top = seen
+    impulse = record.slowed[0].impulse
+    if not isinstance(impulse, str) and mean < impulse.explained - SMEARED:
+        reason = "windows that fit between gaps, and its resolution, blur a response that explains more than they show"
+        yield Finding(topic=Topic.LINEARITY, code="coherence.unknown", verdict=Verdict.UNKNOWN, reason=reason)
+        return
     yield Finding(
         topic=Topic.LINEARITY,
         code="coherence" if mean >= COHERENT else "coherence.low",

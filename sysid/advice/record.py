@@ -17,7 +17,7 @@ from sysid.estimation.nonparametric.feedback import Feedback, find_feedback
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.remembered import remembered_response
 from sysid.estimation.nonparametric.response import FrequencyResponse, estimate_frequency_response
-from sysid.estimation.nonparametric.segments import Segment, segments_of
+from sysid.estimation.nonparametric.segments import Segment, segments_of, stretches
 from sysid.models import Mapping
 from sysid.traces import Trace
 
@@ -32,6 +32,8 @@ HARDLY_OWN = 0.01
 """Part of an input's movement that is its own, below which what it does is not told from what others do."""
 LONGER = 0.1
 """Share of the output that an equation must explain, beyond what the response does, to be told to last longer."""
+FEWEST_LEFT = 8
+"""A stretch of the output with no more samples says nothing of what a response leaves."""
 SLOWER, FEWEST_BLOCKS = (4, 16, 64, 256), 200
 """How many times slower a record with a longer response is looked at, and how many samples that must leave."""
 
@@ -76,6 +78,11 @@ class Record:
     def segments(self) -> tuple[Segment, ...]:
         """All stretches of samples that count."""
         return segments_of(self.traces, self.mapping)
+
+    @cached_property
+    def runs(self) -> tuple[Segment, ...]:
+        """All stretches whose inputs are known: where the output alone is missing they go on."""
+        return segments_of(self.traces, self.mapping, of_inputs=True)
 
     @cached_property
     def some(self) -> Record:
@@ -165,7 +172,7 @@ class Record:
             return self.some, 1
         seen, most, explained = _seen(found), (self.some, 1), found.explained
         for factor in SLOWER:
-            slow = _blocks(self.traces, factor)
+            slow = _blocks(self.traces, factor, self.mapping.output)
             if sum(map(len, slow)) < FEWEST_BLOCKS:
                 break
             other = Record(traces=slow, mapping=self.some.mapping)
@@ -187,28 +194,42 @@ class Record:
         if isinstance(found, str) or (found.settled and not self.lasts):
             return False
         factor = -(-sum(map(len, self.some.traces)) // SAMPLES)
-        return integrates(_blocks(self.some.traces, factor), self.some.mapping)
+        return integrates(_blocks(self.some.traces, factor, self.mapping.output), self.some.mapping)
 
     @cached_property
     def residuals(self) -> list[Residual]:
-        """What the impulse response leaves at the rate at which it settles, where it has a past to know it by."""
+        """What the impulse response leaves at the rate at which it settles, where it has a past to know it by.
+
+        Of each stretch of the output; the inputs are known before it, too, where the output alone is missing.
+        """
         record, factor = self.slowed
         found = record.impulse
         if isinstance(found, str):
             return []
         deepest = int(found.lags[-1])
         made = []
-        for segment in record.some.segments:
-            if len(segment) > deepest + 8:
-                simulated = found.simulate(segment.inputs)
-                made.append(
-                    Residual(
-                        segment=segment,
-                        simulated=simulated[deepest:],
-                        left=(segment.output - simulated)[deepest:],
-                        first=(segment.first + deepest) * factor,
+        for run in record.some.runs:
+            if len(run) <= deepest + FEWEST_LEFT:
+                continue
+            simulated = found.simulate(run.inputs)
+            for part in stretches(run.counts()[deepest:]):
+                # From as many samples before it as the response is long.
+                whole, a = slice(part.start, part.stop + deepest), part.start + deepest
+                if part.stop - part.start > FEWEST_LEFT:
+                    segment = Segment(
+                        inputs=run.inputs[whole],
+                        output=run.output[whole],
+                        trace=run.trace,
+                        first=run.first + part.start,
                     )
-                )
+                    made.append(
+                        Residual(
+                            segment=segment,
+                            simulated=simulated[a : part.stop + deepest],
+                            left=(run.output - simulated)[a : part.stop + deepest],
+                            first=(run.first + a) * factor,
+                        )
+                    )
         return made
 
 
@@ -234,26 +255,37 @@ class Residual:
     first: int
 
 
-def _blocks(traces: Sequence[Trace], factor: int) -> tuple[Trace, ...]:
-    """Means over blocks; a block with a sample that does not count does not count."""
+def _blocks(traces: Sequence[Trace], factor: int, output: str) -> tuple[Trace, ...]:
+    """Means over blocks of the samples that count: at least half of an output's, and all of an input's."""
     slow = []
     for trace in traces:
         n = len(trace) // factor
         if n < 2:
             continue
         whole = slice(0, n * factor)
-        usable = trace.usable_samples if trace.weights is None else trace.usable_samples & (trace.weights > 0.0)
+        usable = np.ones(trace.values.shape, dtype=np.bool_) & (True if trace.usable is None else _by_channel(trace))
+        usable &= True if trace.weights is None else (trace.weights > 0.0)[:, None]
+        blocks, counts = (x[whole].reshape(n, factor, -1) for x in (trace.values, usable))
+        count = counts.sum(axis=1)
+        least = np.where([name == output for name in trace.channel_names], factor / 2, factor)
+        of_counted = np.where(counts, blocks, 0.0).sum(axis=1) / np.maximum(count, 1)
+        mean = np.where(count >= least, of_counted, blocks.mean(axis=1))
         slow.append(
             Trace(
                 name=trace.name,
                 sample_time=trace.sample_time * factor,
                 channels=trace.channels,
-                values=trace.values[whole].reshape(n, factor, -1).mean(axis=1),
+                values=mean,
                 start_time=trace.start_time,
-                usable=np.asarray(usable[whole].reshape(n, factor).all(axis=1)),
+                usable=count >= least,
             )
         )
     return tuple(slow)
+
+
+def _by_channel(trace: Trace) -> NDArray[np.bool_]:
+    assert trace.usable is not None  # noqa: S101 - asked before
+    return trace.usable if trace.usable.ndim == 2 else trace.usable[:, None]
 
 
 def _head(trace: Trace, count: int) -> Trace:

@@ -227,6 +227,34 @@ def test_levels_of_a_command_are_no_fault_of_a_channel() -> None:
     assert looks(look(trace(u, plant(u) + noise(1500, 14, 0.02)))) == set()
 
 
+@pytest.mark.parametrize("share", [0.06, 0.2, 0.5])
+def test_a_response_is_seen_through_an_output_of_which_samples_are_missing(share: float) -> None:
+    """Its inputs are known all along; a fifth missing had made it begin at once and not settle within 1 s."""
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.choice([-1.0, 1.0], 240), 10)
+    y = lfilter([0.0, 0.2, 0.1], [1.0, -1.5, 0.7], u)
+    y = y / y.std() + noise(2400, 1, 0.05)
+    seen = np.column_stack([np.ones(2400, dtype=np.bool_), rng.random(2400) >= share])
+    whole, found = look(trace(u, y, sample_time=0.1)), look(trace(u, np.where(seen[:, 1], y, 99.0), usable=seen))
+    assert finding(found, "dead_time").figures["best"] == 1.0
+    gains = [finding(one, "settling").figures for one in (whole, found)]
+    assert gains[1]["gain"] == pytest.approx(gains[0]["gain"], abs=4.0 * gains[1]["gain_deviation"])
+    assert gains[1]["gain_deviation"] < 1.5 * gains[0]["gain_deviation"] / np.sqrt(1.0 - share)
+    assert abs(gains[1]["samples"] - gains[0]["samples"]) <= 2.0
+    assert found.impulse is not None
+    assert found.impulse.explained > 0.995
+    assert finding(found, "excitation.rich").figures["order"] == finding(whole, "excitation.rich").figures["order"]
+    assert not codes(found) & {"coherence.low", "settling.never", "effect.none"}
+
+
+def test_a_slow_plant_is_looked_at_slowly_where_samples_of_its_output_are_missing() -> None:
+    u, rng = steps(12_000, 3, hold=150), np.random.default_rng(0)
+    y = np.asarray(lfilter([0.0, 0.005], [1.0, -0.995], u)) + noise(12_000, 2, 0.005)
+    seen = np.column_stack([np.ones(12_000, dtype=np.bool_), rng.random(12_000) >= 0.2])
+    found = look(trace(u, np.where(seen[:, 1], y, 99.0), usable=seen))
+    assert finding(found, "settling").figures["gain"] == pytest.approx(1.0, abs=0.05)
+
+
 def test_what_is_masked_and_what_scores_is_not_looked_at() -> None:
     u = steps(1500, 12)
     y = plant(u) + noise(1500, 12, 0.02)

@@ -81,13 +81,11 @@ def estimate_impulse_response(
     """
     m = len(mapping.inputs)
     _check(mapping, lags, dead_times, noise_order)
-    segments = segments_of(traces, mapping, shortest=2)
+    segments = segments_of(traces, mapping, shortest=2, of_inputs=True)
     scale = _scale(segments, mapping)
-    late = int(dead_times is None and _set_at_once(segments))
+    late = int(dead_times is None and _set_at_once(segments_of(traces, mapping, shortest=2)))
     if late:
-        segments = tuple(
-            replace(s, inputs=s.inputs[:-1], output=s.output[1:], first=s.first + 1) for s in segments if len(s) > 2
-        )
+        segments = tuple(_one_later(s) for s in segments if len(s) > 2 and s.counts()[1:].any())
     room = _room(segments, m, lags)
     length = room if lags is not None else min(FIRST_LENGTH, room)
     most = length if lags is not None else min(room, longest, MOST_COLUMNS // m)
@@ -102,6 +100,12 @@ def estimate_impulse_response(
             result = _result(_doubted(_whitened(found, given, kernels, noise_order)), traces, mapping)
             return _later(result) if late else result
         length = min(2 * length, most)
+
+
+def _one_later(s: Segment) -> Segment:
+    """Each output beside the inputs of the sample before."""
+    seen = None if s.seen is None else s.seen[1:]
+    return replace(s, inputs=s.inputs[:-1], output=s.output[1:], first=s.first + 1, seen=seen)
 
 
 def _set_at_once(segments: Sequence[Segment]) -> bool:
@@ -138,8 +142,8 @@ def _scale(segments: Sequence[Segment], mapping: Mapping) -> NDArray[np.float64]
     """Root mean squares about the means of the stretches."""
     if not segments:
         raise TraceError("no samples that count", expected="two in a row at least", remedy="use a longer record")
-    together = np.concatenate([np.column_stack([s.inputs, s.output]) - _mean(s) for s in segments])
-    size = np.concatenate([np.abs(np.column_stack([s.inputs, s.output])) for s in segments]).max(axis=0)
+    together = np.concatenate([_seen_signals(s) - _mean(s) for s in segments])
+    size = np.concatenate([np.abs(_seen_signals(s)) for s in segments]).max(axis=0)
     # Neither the square of what is tiny nor of what is huge may be lost.
     most = np.abs(together).max(axis=0)
     scale = most * np.sqrt(np.mean((together / np.where(most > 0.0, most, 1.0)) ** 2, axis=0))
@@ -153,15 +157,21 @@ def _scale(segments: Sequence[Segment], mapping: Mapping) -> NDArray[np.float64]
     return np.where(scale > 0.0, scale, 1.0)
 
 
+def _seen_signals(segment: Segment) -> NDArray[np.float64]:
+    """Inputs and output where the output counts."""
+    signals = np.column_stack([segment.inputs, segment.output])
+    return signals if segment.seen is None else signals[segment.seen]
+
+
 def _mean(segment: Segment) -> NDArray[np.float64]:
-    return np.append(segment.inputs.mean(axis=0), segment.output.mean())
+    return np.asarray(_seen_signals(segment).mean(axis=0))
 
 
 def _room(segments: Sequence[Segment], m: int, lags: int | None) -> int:
     """The longest response that the record has rows for."""
     longest = max(map(len, segments))
     if lags is not None:
-        rows = sum(max(len(s) - lags + 1, 0) for s in segments)
+        rows = sum(int(np.count_nonzero(s.counts()[lags - 1 :])) for s in segments)
         if rows < FEWEST_ROWS:
             raise TraceError(
                 "the record is too short for so long a response",
@@ -170,21 +180,21 @@ def _room(segments: Sequence[Segment], m: int, lags: int | None) -> int:
                 remedy=f"use at most {max(longest - FEWEST_ROWS + 1, 2)} lags, or a longer record",
             )
         return lags
-    if longest < 2 * FEWEST_ROWS:
+    total = sum(int(np.count_nonzero(s.counts())) for s in segments)
+    if min(longest, total) < 2 * FEWEST_ROWS:
         raise TraceError(
             "the record is too short for an impulse response",
             expected=f"{2 * FEWEST_ROWS} samples in a row",
             got=f"stretches of at most {longest}",
             remedy="use a longer record",
         )
-    total = sum(map(len, segments))
     return max(2, min(longest // 2, longest - FEWEST_ROWS, MOST_COLUMNS // m, max(total // (2 * m), 4)))
 
 
 def _reach(segments: Sequence[Segment], m: int, most: int) -> int:
     """Lags that a response needs which begins later than the lags that are tried first: it would be taken for none."""
     found = 0
-    targets = [s.output - s.output.mean() for s in segments]
+    targets = [np.where(s.counts(), s.output - s.output[s.counts()].mean(), 0.0) for s in segments]
     for j in range(m):
         share = shares([s.inputs[:, j] - s.inputs[:, j].mean() for s in segments], targets, most, 1)
         early = float(share[: FIRST_LENGTH // 2].max())
@@ -287,7 +297,9 @@ def _result(fitted: _Fitted, traces: Sequence[Trace], mapping: Mapping) -> Impul
     units = problem.scale[-1] / np.repeat(problem.scale[:-1], n)
     covariance = np.zeros((m * n, m * n))
     covariance[np.ix_(prior.kept, prior.kept)] = found.covariance
-    left, y = problem.residuals(g), [s.output[n - 1 :] / problem.scale[-1] for s in problem.segments if len(s) > n]
+    left = problem.residuals(g)
+    seen = [s.output[n - 1 :][s.counts()[n - 1 :]] / problem.scale[-1] for s in problem.segments if len(s) > n]
+    y = [part for part in seen if len(part)]
     total = sum(float(np.sum((part - part.mean()) ** 2)) for part in y)
     rest = sum(float(part @ part) for part in left)
     unsettled = [name for name, row in zip(mapping.inputs, g, strict=True) if not settled(row)]

@@ -61,6 +61,6 @@ def key_of(segments: Sequence[Segment], *further: object) -> str:
     sha = hashlib.sha256(repr(further).encode())
     for segment in segments:
         sha.update(repr((segment.trace, segment.first, segment.inputs.shape)).encode())
-        for signal in (segment.inputs, segment.output):
+        for signal in (segment.inputs, segment.output, segment.counts()):
             sha.update(np.ascontiguousarray(signal).tobytes())
     return sha.hexdigest()

@@ -34,7 +34,7 @@ def remembered_response(traces: Sequence[Trace], mapping: Mapping, *, longest: i
         UserError: As :func:`~sysid.estimation.nonparametric.impulse.estimate_impulse_response` does.
     """
     units = [(trace.sample_time, *(trace.channel(name).unit for name in mapping.channels)) for trace in traces]
-    key = key_of(segments_of(traces, mapping), mapping, longest, units)
+    key = key_of(segments_of(traces, mapping, of_inputs=True), mapping, longest, units)
     return _memory.get(key, lambda: _read_only(estimate_impulse_response(traces, mapping, longest=longest)))
 
 

@@ -12,8 +12,10 @@ from sysid.errors import ConfigError, TraceError
 from sysid.estimation.nonparametric.evidence import Triangle, factored, posterior, triangle
 from sysid.estimation.nonparametric.impulse import estimate_impulse_response
 from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
+from sysid.estimation.nonparametric.lagged_rows import Regression
 from sysid.estimation.nonparametric.noise import whitener
 from sysid.estimation.nonparametric.prior import Prior, _Search
+from sysid.estimation.nonparametric.segments import segments_of
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
 
@@ -45,6 +47,37 @@ def test_it_is_nearer_the_truth_than_least_squares() -> None:
     X = np.column_stack([np.roll(a["u1"], k)[39:] for k in range(40)] + [np.ones(361)])
     plain = np.linalg.lstsq(X, a["y"][39:], rcond=None)[0][:40]
     assert np.linalg.norm(found.values[0] - truth(40)) < 0.5 * np.linalg.norm(plain - truth(40))
+
+
+@pytest.mark.parametrize("whiten", [[1.0], [1.0, -0.4, 0.1]])
+def test_rows_are_those_whose_output_counts_with_all_inputs_before_them(whiten: list[float]) -> None:
+    """Lag by lag and sample by sample, of two records with gaps in the output and one in an input."""
+    rng, n, length = np.random.default_rng(4), 120, 5
+    made, expected = [], []
+    for name in ("a", "b"):
+        u, y = rng.standard_normal((n, 2)), rng.standard_normal(n) + 5.0
+        usable = np.ones((n, 3), dtype=np.bool_)
+        usable[:, 2] = rng.random(n) > 0.2
+        usable[60, 0] = False
+        made.append(trace(u, y, name=name, usable=usable))
+        rows = []
+        for k in range(n):
+            past, back = range(k - length - len(whiten) + 2, k + 1), range(k - len(whiten) + 1, k + 1)
+            if past[0] >= 0 and usable[past, :2].all() and usable[back, 2].all():
+                lagged = [
+                    sum(w * u[k - lag - i, j] for i, w in enumerate(whiten)) for j in (0, 1) for lag in range(length)
+                ]
+                rows.append([*lagged, sum(w * y[k - i] for i, w in enumerate(whiten))])
+        expected.append(np.array(rows) - np.mean(rows, axis=0))
+    segments = segments_of(made, TWO, shortest=2, of_inputs=True)
+    problem = Regression(segments=segments, scale=np.ones(3), length=length)
+    found = np.concatenate(list(problem.blocks(np.array(whiten))))
+    assert found == pytest.approx(np.concatenate(expected), abs=1e-12)
+    assert problem.count(np.array(whiten)) == (len(found), 2)
+    g = rng.standard_normal((2, length))
+    left = np.concatenate(problem.residuals(g))
+    counted = [s.counts()[length - 1 :] for s in segments]
+    assert len(left) == sum(int(c.sum()) for c in counted)
 
 
 def test_the_dead_time_is_that_of_the_plant_and_nothing_comes_before_it() -> None:
