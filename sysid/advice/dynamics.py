@@ -23,6 +23,8 @@ MOST_LOST = 0.1
 """Share of the output's variance that a slower rate may lose."""
 SUMS = "the plant integrates, and a step response that does not end has no time in which it rises"
 QUICKER = "the output moves faster than the linear response that was found, which does not show how fast it answers"
+CURVED, MOST_EXPLAINED = "past outputs act along a curve, and a linear response does not show how fast it answers", 0.9
+"""Also the share of the output from which a linear response shows it all the same."""
 AWAY = "the plant runs away by itself, and what is seen is the loop"
 QUIET, LOUD = 20.0, 5.0
 """Signal-to-noise ratios in decibel from which a record is quiet, and below which it is loud."""
@@ -198,8 +200,10 @@ def check_sampling(record: Record) -> Iterator[Finding]:
     subject = (found.mapping.inputs[j],)
     figures = {"rise": samples, "sample_time": record.sample_time, "factor": factor}
     every, response = max(int(samples / GOOD), 2), np.abs(found.values[j])
-    if samples > TOO_FAST and (record.integrates or lost(record, every) > MOST_LOST):
-        reason = SUMS if record.integrates else QUICKER
+    # Beside a curve in the state, a linear response that explains little is no measure of how fast the plant is.
+    curved = record.state_curve is not None and found.explained < MOST_EXPLAINED
+    if samples > TOO_FAST and (record.integrates or curved or lost(record, every) > MOST_LOST):
+        reason = SUMS if record.integrates else CURVED if curved else QUICKER
         yield Finding(topic=Topic.SAMPLING, code="sampling.unknown", verdict=Verdict.UNKNOWN, reason=reason)
         return
     if samples > TOO_FAST:

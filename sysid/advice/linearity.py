@@ -5,8 +5,8 @@ distortion (Pintelon and Schoukens, "System identification: a frequency domain a
 excited lines the response is a parabola over some neighbours, at the others it is nothing.
 
 Otherwise squares and cubes of the linear response, and the linear responses to squares and cubes of the inputs, are
-looked for in what it leaves. That sees curvature and saturation; it does not see friction, play or what depends on a
-state that moves little.
+looked for in what it leaves; then those of past outputs (:mod:`.curved_state`). That sees curvature, saturation and
+what a state does to itself; it does not see friction, play or what depends on a state that moves little.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def check_linearity(record: Record) -> Iterator[Finding]:
     if not record.moving:
         return
     periodic = _periodic(record)
-    yield periodic if periodic is not None else _curvature(record)
+    yield periodic if periodic is not None else _curved(record)
     yield from _changed(record)
     yield from _coherence(record)
 
@@ -151,6 +151,15 @@ def _local_rest(u: NDArray[np.complex128], y: NDArray[np.complex128], lines: NDA
         A = u[part, None] * d[:, None] ** np.arange(3)
         rest += float(np.sum(np.abs(y[part] - A @ np.linalg.lstsq(A, y[part], rcond=None)[0]) ** 2)) / (width - 3)
     return rest
+
+
+def _curved(record: Record) -> Finding:
+    """By curves of the response to the inputs; where these leave it open, by those of past outputs."""
+    found, curve = _curvature(record), record.state_curve
+    if curve is None or found.code == "linearity.curved":
+        return found
+    figures = {"share": curve.share, "p": curve.p, "seconds": curve.samples * record.sample_time}
+    return Finding(topic=Topic.LINEARITY, code="linearity.curved_state", verdict=Verdict.LOOK, figures=figures)
 
 
 def _curvature(record: Record) -> Finding:

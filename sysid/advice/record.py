@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.advice.curved_state import StateCurve, curve_of_state
 from sysid.advice.equation import Equation, least_bic
 from sysid.advice.integrators import SAMPLES, integrates
 from sysid.errors import UserError
@@ -30,6 +31,8 @@ BARELY = 0.3
 """Share of the output that a linear response explains, below which nothing is built on it."""
 HARDLY_OWN = 0.01
 """Part of an input's movement that is its own, below which what it does is not told from what others do."""
+ENOUGH = 0.98
+"""The same from which no curve is looked for in the state."""
 LONGER = 0.1
 """Share of the output that an equation must explain, beyond what the response does, to be told to last longer."""
 FEWEST_LEFT = 8
@@ -172,7 +175,7 @@ class Record:
             return self.some, 1
         seen, most, explained = _seen(found), (self.some, 1), found.explained
         for factor in SLOWER:
-            slow = _blocks(self.traces, factor, self.mapping.output)
+            slow = blocks_of(self.traces, factor, self.mapping.output)
             if sum(map(len, slow)) < FEWEST_BLOCKS:
                 break
             other = Record(traces=slow, mapping=self.some.mapping)
@@ -194,7 +197,23 @@ class Record:
         if isinstance(found, str) or (found.settled and not self.lasts):
             return False
         factor = -(-sum(map(len, self.some.traces)) // SAMPLES)
-        return integrates(_blocks(self.some.traces, factor, self.mapping.output), self.some.mapping)
+        return integrates(blocks_of(self.some.traces, factor, self.mapping.output), self.some.mapping)
+
+    @property
+    def explained(self) -> float:
+        """Share of the output that a linear model explains, by its response or by an equation with past outputs."""
+        found = self.slowed[0].impulse
+        of_equation = self.equation.explained if self.lasts and self.equation is not None else 0.0
+        return max(0.0 if isinstance(found, str) else found.explained, of_equation)
+
+    @cached_property
+    def state_curve(self) -> StateCurve | None:
+        """The curve in the state, where there is one and a linear model leaves something to explain."""
+        response = self.some.impulse
+        if isinstance(response, str) or self.runs_away or self.explained > ENOUGH:
+            return None
+        found = curve_of_state(self.some.segments, response)
+        return found if found is not None and found.sure else None
 
     @cached_property
     def residuals(self) -> list[Residual]:
@@ -255,8 +274,17 @@ class Residual:
     first: int
 
 
-def _blocks(traces: Sequence[Trace], factor: int, output: str) -> tuple[Trace, ...]:
-    """Means over blocks of the samples that count: at least half of an output's, and all of an input's."""
+def blocks_of(traces: Sequence[Trace], factor: int, output: str) -> tuple[Trace, ...]:
+    """Means over blocks of the samples that count: at least half of an output's, and all of an input's.
+
+    Args:
+        traces: The traces.
+        factor: Samples of a block.
+        output: Name of the output.
+
+    Returns:
+        The same, so many times slower; without traces of less than two blocks.
+    """
     slow = []
     for trace in traces:
         n = len(trace) // factor

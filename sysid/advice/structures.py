@@ -10,6 +10,7 @@ from sysid.advice.record import Record
 from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
 
 NOT_LINEAR = {"linearity.curved", "linearity.distorted", "linearity.perhaps_curved", "linearity.nothing_explained"}
+NOT_LINEAR |= {"linearity.curved_state"}
 NOT_LINEAR |= {"channel.clipped_above", "channel.clipped_below"}
 """Findings that ask for a network."""
 NOISY, FEEDBACK = {"noise.some", "noise.loud", "noise.coloured"}, {"feedback.found", "feedback.exchanged"}

@@ -259,6 +259,11 @@ SAID: Final[dict[str, Words]] = {
         "Not linear: curvature explains {share:.0%} of the {left:.2%} that a linear response leaves.",
         "Fit a network; the linear model is its start and its yardstick.",
     ),
+    "linearity.curved_state": Words(
+        "Not linear: curves of past outputs explain {share:.0%} of what a linear equation leaves {seconds:.3g} s"
+        " ahead.",
+        "Fit a network with past outputs or states; the linear model is its start and its yardstick.",
+    ),
     "linearity.nothing_explained": Words(
         "A linear response explains {explained:.1%}: nothing can be said of curvature.",
         "Inputs that are missing, or a system that answers to no sign of its input (a square, an absolute value): try"
