@@ -88,6 +88,8 @@ def array_column(
             array, unit = _seconds(array), "s"
         if array.dtype.kind == "m":
             array, unit = np.where(np.isnat(array), np.nan, array.astype("timedelta64[ns]").astype(np.int64) / 1e9), "s"
+        if array.dtype.kind == "c" and not array.imag.any():
+            array = array.real  # as of what went through a Fourier transform and back
         if array.dtype.kind in "ui" and array.size and (span := _beyond_float64(array)) is not None:
             origin, array = span
         values, problem = _as_float64(array, where=f"{where}, column {name}"), None
@@ -150,7 +152,7 @@ def _as_float64(array: NDArray[Any], *, where: str) -> NDArray[np.float64]:
             "a column is not numeric",
             where=where,
             expected="real numbers",
-            got=f"values of type {array.dtype}",
+            got="complex numbers" if array.dtype.kind == "c" else f"values of type {array.dtype}",
             remedy="choose other columns, or export this one as plain real numbers",
         )
     converted = array.astype(np.float64, copy=False)

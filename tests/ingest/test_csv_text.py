@@ -280,3 +280,24 @@ def test_signals_that_stand_one_after_the_other_are_a_long_table(write: Write) -
     rows = "".join(f"{k / 10},y,{k * k}\n" for k in range(10))
     finding = inspect_file(write("run.csv", "time,name,value\n0.0,u,1\n0.5,u,3\n" + rows))
     assert [(column.name, column.maximum) for column in finding.columns] == [("u", 3.0), ("y", 81.0)]
+
+
+@pytest.mark.parametrize(
+    ("above", "names", "step"),
+    [
+        ("Sample rate;2,5 kHz\nu;y\n", ("u", "y"), 4e-4),
+        ("Sampling rate;10 Hz\nT;A\n", ("T", "A"), 0.1),
+        ("Date;2024-01-01\nT;A\n", ("T", "A"), None),
+        ("Date;01.02.2024 08:15\nu;v\n", ("u", "v"), None),
+        ("t;25 mm\ns;V\n", ("t", "25 mm"), None),
+        ("in;out\nV;A\n", ("in", "out"), None),
+    ],
+)
+def test_a_line_of_what_the_record_is_about_is_no_header(
+    write: Write, above: str, names: tuple[str, ...], step: float | None
+) -> None:
+    """Over two columns it looks like names, and names as short as u and y look like units."""
+    path = write("run.csv", above + "0,5;1,5\n0,7;2,5\n0,6;1,5\n0,9;2,5\n")
+    assert read_table(path).names == names
+    if step is not None:
+        assert inspect_file(path).sample_time == pytest.approx(step)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ReaderError
-from sysid.ingest import FileOptions, read_table
+from sysid.ingest import FileOptions, inspect_file, read_table
 from tests.ingest.recordings import TIME, VOLT
 
 
@@ -87,3 +87,27 @@ def test_a_stand_in_of_fewer_digits_than_the_values_is_missing(tmp_path: Path) -
         file["u"].attrs["missing_value"] = np.float32(1e20)
     missing = np.isnan(read_table(tmp_path / "run.h5").find("u").values)
     assert np.flatnonzero(missing).tolist() == [1]
+
+
+@pytest.mark.parametrize("kind", ["fixed", "of any length", "a table"])
+def test_stamps_and_words_as_text_are_read(tmp_path: Path, kind: str) -> None:
+    """A clock of text was left out without a word, and 1 s between samples was guessed."""
+    import h5py
+
+    n = 30
+    stamps = [f"2024-01-01T00:00:{0.5 * k:06.3f}" for k in range(n)]
+    valve, y = ["open" if k % 7 > 3 else "closed" for k in range(n)], np.arange(n) ** 2.0
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        if kind == "a table":
+            rows = list(zip(*(map(str.encode, some) for some in (stamps, valve)), y, strict=True))
+            file["log"] = np.array(rows, dtype=[("time", "S23"), ("valve", "S6"), ("y", "f8")])
+        else:
+            text = "S23" if kind == "fixed" else h5py.string_dtype()
+            for name, some in (("time", stamps), ("valve", valve)):
+                file.create_dataset(name, data=np.array(some, dtype=object if kind != "fixed" else "S23"), dtype=text)
+            file["y"] = y
+    read = inspect_file(tmp_path / "run.h5")
+    assert read.sample_time == pytest.approx(0.5)
+    table = read_table(tmp_path / "run.h5", files=FileOptions(states={"open": 1.0, "closed": 0.0}))
+    assert table.find("valve").values.tolist() == [float(k % 7 > 3) for k in range(n)]
+    assert table.find("y").values.tolist() == y.tolist()

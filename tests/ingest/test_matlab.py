@@ -175,3 +175,42 @@ def test_signals_that_were_saved_apart_with_clocks_of_their_own_are_one_record(t
     assert any("level: interpolated from 0.2 s" in note for note in table.notes)
     mat("5", est=_structure(t, np.cos(t), "a"), val=_structure(t[:15], np.sin(t[:15]), "b"))(tmp_path / "two.mat")
     assert read_table(tmp_path / "two.mat").notes == (), "records stay apart"
+
+
+@pytest.mark.parametrize("clock", ["of each", "one", "none"])
+def test_structures_of_a_name_and_samples_are_signals_and_no_records(tmp_path: Path, clock: str) -> None:
+    """Two signals were two records of one channel, ``Data``."""
+    from scipy.io import savemat
+
+    own = {"Raster": TIME} if clock == "of each" else {}
+    signals = [{"Name": "u", "Unit": "V", "Data": VOLT, **own}, {"Name": "p pipe", "Unit": "bar", "Data": PIPE, **own}]
+    savemat(tmp_path / "run.mat", {"X": signals, **({"t": TIME} if clock == "one" else {})})
+    table = read_table(tmp_path / "run.mat")
+    names = [name for name in table.names if name not in {"t", "time"}]
+    head = "X." if clock == "one" else ""  # as of any structure beside which something stands
+    assert names == [f"{head}u", f"{head}p pipe"]
+    for name, values, unit in ((names[0], VOLT, "V"), (names[1], PIPE, "bar")):
+        np.testing.assert_array_equal(table.find(name).values, values)
+        assert table.find(name).unit == unit
+    assert (table.time is None) == (clock == "none")
+
+
+def test_structures_that_are_records_stay_records(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    runs = [{"name": name, "data": k * PIPE} for k, name in enumerate(("est", "val"), 1)]
+    other = [{"name": "a", "u": VOLT, "y": PIPE}, {"name": "b", "u": VOLT, "y": PIPE}]
+    savemat(tmp_path / "run.mat", {"X": runs})
+    savemat(tmp_path / "other.mat", {"X": other})
+    assert set(read_table(tmp_path / "run.mat").names) == {"X{1}.data", "X{2}.data"}
+    assert set(read_table(tmp_path / "other.mat").names) == {"X{1}.u", "X{1}.y", "X{2}.u", "X{2}.y"}
+
+
+def test_numbers_without_an_imaginary_part_are_real_and_others_are_named(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "run.mat", {"t": TIME, "u": VOLT + 0j, "y": VOLT + 1j})
+    table = read_table(tmp_path / "run.mat")
+    np.testing.assert_array_equal(table.find("u").values, VOLT)
+    with pytest.raises(ReaderError, match="complex numbers"):
+        table.find("y")

@@ -15,6 +15,8 @@ from sysid.ingest.time_columns import is_called_time
 
 _BRACKET = re.compile(r"(?P<name>.*?)\s*(?P<unit>[\[(<][^\])>]*[\])>])")
 
+_WORTH = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?\s*[A-Za-zµ°%][A-Za-z0-9µ°%/^*.-]{0,11}")
+_DATE = re.compile(r"\d+([-./])\d+\1\d+.*")
 _MARKS = "#%!;/*'\" \t"
 
 
@@ -159,7 +161,17 @@ def _is_units(above: list[Row], split: Split) -> bool:
     # Short names are units too (t, u, V): without brackets it is the line above that must look like names.
     if any(is_called_time(cell) for cell in units[:1]) and not any(map(is_called_time, names)) and _rises(split):
         return False
+    if _says_of_record(names):
+        return False
     return sum(map(_filled, names)) >= sum(map(_filled, units)) and not any(kind_of(cell) in DATA for cell in names[:1])
+
+
+def _says_of_record(cells: list[str]) -> bool:
+    """Whether a line is a word and what it is worth, a number with a unit or a date: no names of columns."""
+    filled = [cell.strip() for cell in cells if _filled(cell)]
+    if len(filled) != 2:
+        return False
+    return bool(_DATE.fullmatch(filled[1]) or (_WORTH.fullmatch(filled[1]) and not is_called_time(filled[0])))
 
 
 def _rises(split: Split) -> bool:

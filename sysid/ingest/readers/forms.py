@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ _SECONDS = {
     "days": 86400.0, "weeks": 604800.0, "months": 2629746.0, "years": 31556952.0,
 }  # fmt: skip
 
+_NAME, _SAMPLES = ("name", "label", "signalname", "channelname"), ("data", "values", "value", "samples")
+_CLOCK = ("time", "t", "raster", "timestamps", "stamps")
 _NAMED = {"InputName", "OutputName", "InputUnit", "OutputUnit"}
 
 
@@ -33,7 +36,7 @@ def understood(node: Any, notes: list[str]) -> Any:
         The tree of columns.
     """
     if isinstance(node, list):
-        return [understood(item, notes) for item in node]
+        return _named_signals(node) or [understood(item, notes) for item in node]
     if not isinstance(node, Mapping) or isinstance(node, Whole):
         return node
     for is_one, columns in _FORMS:
@@ -42,6 +45,31 @@ def understood(node: Any, notes: list[str]) -> Any:
     found = {str(key): understood(value, notes) for key, value in node.items()}
     clocked = [str(key) for key, value in node.items() if isinstance(value, Mapping) and _is_clocked(value)]
     return _on_one_clock(found, clocked, notes) if len(clocked) > 1 else found
+
+
+def _named_signals(items: list[Any]) -> dict[str, Leaf]:
+    """Structures with a name and the samples of one signal each, as measurement tools save their channels.
+
+    They may bring their clock, where all have the same. Names that say what records are for are none of signals.
+    """
+    found, clocks = dict[str, Leaf](), list[Leaf]()
+    for item in items:
+        fields = {str(key).casefold(): value for key, value in item.items()} if isinstance(item, Mapping) else {}
+        name = next((text for key in _NAME for text in texts_of(fields.get(key))), "")
+        vectors = {key: leaf for key, value in fields.items() if (leaf := leaf_of(value)) is not None and leaf.vector}
+        numbers = {key: leaf for key, leaf in vectors.items() if leaf.values.dtype.kind in "buif"}
+        samples = [key for key in _SAMPLES if key in numbers]
+        clock = [key for key in _CLOCK if key in numbers]
+        if not name or name in found or role_of(name) or len(samples) != 1 or len(numbers) > 1 + len(clock):
+            return {}
+        unit = next((text for key in ("unit", "units") for text in texts_of(fields.get(key))), None)
+        found[name] = replace(numbers[samples[0]], unit=unit or numbers[samples[0]].unit)
+        clocks += [numbers[key] for key in clock]
+    same = all(np.array_equal(one.values, clocks[0].values) for one in clocks)
+    lengths = {len(leaf.values) for leaf in (*found.values(), *clocks)}
+    if len(found) < 2 or len(lengths) > 1 or not same or len(clocks) not in {0, len(found)} or "time" in found:
+        return {}
+    return {**({"time": clocks[0]} if clocks else {}), **found}
 
 
 def _is_clocked(node: Mapping[str, Any]) -> bool:

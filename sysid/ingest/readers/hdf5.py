@@ -156,13 +156,24 @@ def _dataset(name: str, item: Any, notes: list[str]) -> Any:
         return None
     if item.dtype.names:  # a table: one column per field
         table = item[()]
-        return _Table({field: table[field] for field in item.dtype.names if table[field].dtype.kind in "buif"})
+        read = {field: _numbers_or_words(table[field], item.dtype[field]) for field in item.dtype.names}
+        return _Table({field: array for field, array in read.items() if array is not None})
     if item.dtype.kind not in "buif":
-        return None
+        words = _numbers_or_words(item[()], item.dtype)
+        return None if words is None else Leaf(values=words)
     attributes = {key: item.attrs[key] for key in item.attrs if _is_said(key)}
     leaf = _leaf(name, np.asarray(item[()]), attributes, notes)
     names, units = _texts(attributes, _COLUMN_NAMES), _texts(attributes, ("units", "unit"))
     return replace(leaf, names=names, units=units if len(units) > 1 else ())
+
+
+def _numbers_or_words(array: Any, kind: np.dtype[Any]) -> NDArray[Any] | None:
+    """Numbers as they are, text as strings, and nothing of references, enumerations and blobs."""
+    import h5py
+
+    if kind.kind in "buif" or h5py.check_string_dtype(kind) is None or np.ndim(array) != 1:
+        return np.asarray(array) if kind.kind in "buif" else None
+    return np.array([_text(cell) or "" for cell in array], dtype=np.str_)
 
 
 def _texts(attributes: Mapping[str, Any], keys: Sequence[str]) -> tuple[str, ...]:
