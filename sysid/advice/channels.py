@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.advice.answered import answered
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, stacked
 from sysid.estimation.held_output import held_for, straight_for
@@ -99,7 +100,7 @@ def _channel(record: Record, name: str) -> Iterator[Finding]:
     # Of coarse steps the outermost is an end that is stayed at, and none that anything runs into.
     if name == record.mapping.output and not any(map(coarse_step, parts)):
         yield from _ends(name, parts, x)
-    yield from _spikes(name, parts, x, levels)
+    yield from _spikes(record, name, levels)
 
 
 def _resolution(name: str, parts: Sequence[NDArray[np.float64]], levels: NDArray[np.float64]) -> Iterator[Finding]:
@@ -154,16 +155,11 @@ def _roughness(parts: Sequence[NDArray[np.float64]]) -> float:
     return float(np.median(np.concatenate(bends))) if bends else 0.0
 
 
-def _spikes(
-    name: str, parts: list[NDArray[np.float64]], x: NDArray[np.float64], levels: NDArray[np.float64]
-) -> Iterator[Finding]:
-    """Single samples that jump away and back, further than any other does."""
-    heights = []
-    for part in parts:
-        if len(part) >= 3:
-            before, after = part[1:-1] - part[:-2], part[1:-1] - part[2:]
-            heights.append(np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0))
-    height = stacked(heights)
+def _spikes(record: Record, name: str, levels: NDArray[np.float64]) -> Iterator[Finding]:
+    """Single samples that jump away and back, further than any other does, and that no output answers."""
+    parts = record.values(name)
+    x, heights = stacked(parts), [_heights(part) for part in parts]
+    height = np.abs(stacked([one[1:-1] for one in heights]))
     if len(height) < 20:
         return
     # Spikes must not set the scale that they are measured by.
@@ -171,6 +167,8 @@ def _spikes(
     floor = max(0.1 * float(core[1] - core[0]), 2.0 * float(np.diff(levels).min()))
     bound = max(SPIKE_FACTOR * float(np.quantile(height, 1.0 - MOST_SPIKES)), floor)
     count = int(np.count_nonzero(height > bound))
+    if 0 < count <= max(1, MOST_SPIKES * len(height)):
+        count -= _answered(record, name, heights, bound)
     if 0 < count <= max(1, MOST_SPIKES * len(height)):
         yield Finding(
             topic=Topic.CHANNELS,
@@ -183,6 +181,30 @@ def _spikes(
                 "usual": float(np.quantile(height, 1.0 - MOST_SPIKES)),
             },
         )
+
+
+def _answered(record: Record, name: str, heights: Sequence[NDArray[np.float64]], bound: float) -> int:
+    """How many samples beyond a bound the output answers; those far larger than the others are asked by themselves."""
+    if name == record.mapping.output:
+        return 0
+    sizes = np.abs(stacked(heights))
+    far, count = SPIKE_FACTOR * float(np.median(sizes[sizes > bound])), 0
+    for low, high in ((bound, far), (max(bound, far), np.inf)):
+        away = [np.where((np.abs(one) > low) & (np.abs(one) <= high), one, 0.0) for one in heights]
+        some = sum(int(np.count_nonzero(one)) for one in away)
+        if some and answered(record.segments, record.mapping.inputs.index(name), away):
+            count += some
+    return count
+
+
+def _heights(part: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far each sample stands off both neighbours, on one side of them; nothing at the ends."""
+    height = np.zeros(len(part))
+    if len(part) >= 3:
+        before, after = part[1:-1] - part[:-2], part[1:-1] - part[2:]
+        nearer = np.where(np.abs(before) < np.abs(after), before, after)
+        height[1:-1] = np.where(before * after > 0.0, nearer, 0.0)
+    return height
 
 
 def _trends(record: Record) -> Iterator[Finding]:

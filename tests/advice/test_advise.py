@@ -227,6 +227,38 @@ def test_levels_of_a_command_are_no_fault_of_a_channel() -> None:
     assert looks(look(trace(u, plant(u) + noise(1500, 14, 0.02)))) == set()
 
 
+def kicked(n: int = 3000, pole: float = 1.1) -> tuple[Array, Array]:
+    """A plant and the controller that kicks it where its set point steps."""
+    rng = np.random.default_rng(3)
+    r, e = np.repeat(rng.choice([-1.0, 1.0], n // 30), 30), noise(n, 5, 0.05)
+    u, y = np.zeros(n), np.zeros(n)
+    for k in range(1, n):
+        y[k] = pole * y[k - 1] + 0.2 * u[k - 1] + e[k]
+        u[k] = 3.0 * (r[k] - y[k])
+    return u, y
+
+
+@pytest.mark.parametrize("pole", [1.1, 0.9])
+def test_the_kicks_of_a_controller_are_no_faults_of_the_recording(pole: float) -> None:
+    """It was told to mask 52 samples of the input, which is what moved the plant."""
+    u, y = kicked(pole=pole)
+    assert look(trace(u, y)).find("channel.spikes", "u1") is None
+    u = steps(3000, 2, hold=20)
+    u[::100] += 3.0
+    assert look(trace(u, plant(u) + noise(3000, 1, 0.02))).find("channel.spikes", "u1") is None
+
+
+@pytest.mark.parametrize("count", [1, 10])
+def test_what_no_output_answers_is_a_fault_in_a_loop_too(count: int) -> None:
+    at = np.arange(157, 2900, 260)[:count]
+    u = steps(3000, 2, hold=20) + noise(3000, 3, 0.02)
+    y, faults = plant(u) + noise(3000, 1, 0.02), np.zeros(3000)
+    faults[at] = 60.0
+    assert finding(look(trace(u + faults, y)), "channel.spikes", "u1").figures["count"] == count
+    u, y = kicked()
+    assert finding(look(trace(u + faults, y)), "channel.spikes", "u1").figures["count"] == count
+
+
 @pytest.mark.parametrize("share", [0.06, 0.2, 0.5])
 def test_a_response_is_seen_through_an_output_of_which_samples_are_missing(share: float) -> None:
     """Its inputs are known all along; a fifth missing had made it begin at once and not settle within 1 s."""
