@@ -232,7 +232,13 @@ def silverbox() -> None:
         n_initial=50,
         grid=tuple(
             (NeuralStateSpace(states=n, neurons=k, activation=activation), None)
-            for activation, n, k in (("cubic", 2, 4), ("cubic", 3, 4), ("cubic", 5, 2))
+            for activation, n, k in (
+                ("cubic", 2, 4),
+                ("cubic", 3, 4),
+                ("cubic", 5, 2),
+                ("cubic", 6, 4),
+                ("cubic", 8, 2),
+            )
         ),
         seeds=2,
         starts=12,

@@ -214,9 +214,14 @@ class EquationProvider(AbstractProvider):
     def linearise(self, theta: Array) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
         with np.errstate(over="ignore", invalid="ignore"):  # likewise
-            return self._linearised(theta)
+            return self._linearised(theta, correlation=True)
 
-    def _linearised(self, theta: Array) -> Linearisation:
+    def without_news(self, theta: Array) -> Linearisation:
+        """The same without the correlation time; see the base class."""
+        with np.errstate(over="ignore", invalid="ignore"):  # likewise
+            return self._linearised(theta, correlation=False)
+
+    def _linearised(self, theta: Array, *, correlation: bool) -> Linearisation:
         gradient, matrix, shared = np.zeros(len(theta)), np.zeros((len(theta), len(theta))), self.at(theta)
         loss = correlated = samples = 0.0
         for number in range(len(self.records)):
@@ -229,7 +234,7 @@ class EquationProvider(AbstractProvider):
                 matrix[np.ix_(places, places)] += flat.T @ flat
                 errors.append(error)
             for column in np.concatenate(errors).T:
-                correlated += len(column) * correlation_time(column)
+                correlated += len(column) * (correlation_time(column) if correlation else np.nan)
                 samples += len(column)
         return Linearisation(
             loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / max(samples, 1.0)

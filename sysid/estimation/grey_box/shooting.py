@@ -143,7 +143,7 @@ class Shooting(EquationProvider):
     def _apart(self, end: Array, begun: Array) -> Array:
         return self.weight * (end - begun) / self.form.terms.scale
 
-    def _linearised(self, theta: Array) -> Linearisation:
+    def _linearised(self, theta: Array, *, correlation: bool) -> Linearisation:  # noqa: ARG002 - pieces have none
         theta = self.plain(theta)
         shared, every = self.at(theta), np.arange(len(theta))
         gradient, matrix, loss = np.zeros(len(theta)), np.zeros((len(theta), len(theta))), 0.0

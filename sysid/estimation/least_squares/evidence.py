@@ -32,13 +32,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.least_squares.provider import Linearisation
+from sysid.estimation.least_squares.small_matrices import add_to_diagonal, cholesky, inverse_of
 from sysid.estimation.result import Evidence
+from sysid.kernels.arrays import read_only
 
 BETA_LIMIT = float(np.finfo(np.float64).eps ** -2)
 """Precision of the residuals where nothing but rounding is left of them: outputs are scaled to about 1."""
@@ -84,13 +87,13 @@ class Prior:
     alphas: NDArray[np.float64]
     beta: float
 
-    @property
+    @cached_property
     def precision(self) -> NDArray[np.float64]:
         """Precision of each parameter, shape ``(n_parameters,)``."""
         precision = np.empty(len(self.centre))
         for group, alpha in zip(self.groups, self.alphas, strict=True):
             precision[group.members] = alpha
-        return precision
+        return read_only(precision)
 
     def penalty(self, theta: NDArray[np.float64]) -> float:
         """The prior's part of the loss, over ``beta``, so that it adds to the residuals' part.
@@ -121,7 +124,7 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     independent = n_samples / tau
     root = np.sqrt(prior.beta / prior.precision)
     M = at.gauss_newton * root[:, None] * root[None, :]
-    M[np.diag_indices_from(M)] += 1.0
+    add_to_diagonal(M, 1.0)
     shrunk, log_det = _inverse_diagonal(M)
     determined = np.clip(1.0 - shrunk, 0.0, 1.0)
     gammas = np.array([determined[group.members].sum() for group in prior.groups])
@@ -150,12 +153,11 @@ def _named(groups: Sequence[Group], values: NDArray[np.float64]) -> dict[str, fl
 
 def _inverse_diagonal(M: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """Diagonal of the inverse, and the log determinant, of a matrix whose eigenvalues are at least 1."""
-    try:
-        factor = linalg.cholesky(M, lower=True)
-    except linalg.LinAlgError:
+    factor = cholesky(M)
+    if factor is None:
         # Rounding in entries above 1e16 can outweigh the identity; the true eigenvalues are known to be 1 or more.
         values, vectors = linalg.eigh(M)
         values = np.maximum(values, 1.0)
         return (vectors**2) @ (1.0 / values), float(np.log(values).sum())
-    inverse = linalg.solve_triangular(factor, np.eye(len(M)), lower=True)
+    inverse = inverse_of(factor)
     return np.einsum("ij,ij->j", inverse, inverse), 2.0 * float(np.log(np.diag(factor)).sum())

@@ -58,13 +58,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.damping import DAMPINGS, DEFAULT
 from sysid.estimation.least_squares.damping.base import AbstractDamping
 from sysid.estimation.least_squares.evidence import Prior, update
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.least_squares.small_matrices import add_to_diagonal, cholesky, solved
 from sysid.estimation.least_squares.termination import MAX_DAMPING, Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.result import Evidence, Status
@@ -247,7 +247,7 @@ class LevenbergMarquardt:
         # BLAS threads that wake for matrices of this size cost more than they give (measured: 92 ms an epoch of
         # 20,000 x 281 with two threads, 45 ms with one); the second core is better spent on another start.
         with one_blas_thread():
-            state = State(theta=theta, at=provider.linearise(theta), damping=self.damping, prior=prior)
+            state = State(theta=theta, at=provider.without_news(theta), damping=self.damping, prior=prior)
         return self.resume(provider, self._record(state, provider, 0.0))
 
     def resume(
@@ -287,6 +287,8 @@ class LevenbergMarquardt:
                         status = Status.INTERRUPTED
             except KeyboardInterrupt:
                 status = Status.INTERRUPTED
+            if np.isnan(state.at.correlation_time):  # who makes something of the solution may ask the evidence
+                state = replace(state, at=provider.linearise(state.theta))
         if status is Status.STALLED and at_minimum(state, provider):
             status = Status.CONVERGED
         if status is Status.STALLED and state.at.loss >= first:
@@ -296,7 +298,7 @@ class LevenbergMarquardt:
     def _step(self, state: State, provider: AbstractProvider) -> State:
         ridge = state.prior.precision / state.prior.beta
         H = state.at.gauss_newton.copy()
-        H[np.diag_indices_from(H)] += ridge
+        add_to_diagonal(H, ridge)
         g = state.at.gradient + ridge * (state.theta - state.prior.centre)
         now = state.at.loss + state.prior.penalty(state.theta)
         damping = state.damping.scaled_by(np.diag(H))
@@ -313,15 +315,19 @@ class LevenbergMarquardt:
                     continue
             gain = (now - loss - state.prior.penalty(trial)) / promised if promised > 0.0 else -1.0
             if gain > MIN_GAIN:
-                at = provider.linearise(trial)
+                at = provider.linearise(trial) if self._asks(state.iteration + 1) else provider.without_news(trial)
                 if at.finite:
                     state = replace(state, theta=trial, at=at, damping=damping.accepted(gain))
                     return self._with_evidence(replace(state, iteration=state.iteration + 1), provider)
             damping = damping.rejected()
         return replace(state, damping=damping, iteration=state.iteration + 1)
 
+    def _asks(self, iteration: int) -> bool:
+        """Whether the evidence is asked after an iteration."""
+        return self.evidence_after is not None and iteration >= self.evidence_after
+
     def _with_evidence(self, state: State, provider: AbstractProvider) -> State:
-        if self.evidence_after is None or state.iteration < self.evidence_after:
+        if not self._asks(state.iteration):
             return state
         prior, evidence = update(state.prior, state.theta, state.at, provider.n_samples)
         return replace(state, prior=prior, evidence=evidence)
@@ -386,10 +392,8 @@ def _solve(H: NDArray[np.float64], damping: AbstractDamping, g: NDArray[np.float
     # A start whose free run explodes may have sensitivities near the largest number; its step is then not a number.
     with np.errstate(over="ignore", invalid="ignore"):
         A = H * root[:, None] * root[None, :]
-        A[np.diag_indices_from(A)] += damping.factor * scale * root**2
+        add_to_diagonal(A, damping.factor * scale * root**2)
         rescaled = root * g
-    try:
-        return np.asarray(-root * linalg.cho_solve(linalg.cho_factor(A, lower=True, overwrite_a=True), rescaled))
-    except (linalg.LinAlgError, ValueError):
-        # Not positive definite to working precision, or not finite: no step, and the caller damps more.
-        return np.zeros(len(g))
+    factor = cholesky(A) if np.isfinite(rescaled).all() else None
+    # Not positive definite to working precision, or not finite: no step, and the caller damps more.
+    return np.zeros(len(g)) if factor is None else -root * solved(factor, rescaled)

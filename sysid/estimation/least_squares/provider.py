@@ -21,7 +21,7 @@ class Linearisation:
         gradient: :math:`J^T W e` with :math:`e = \hat y - y`, shape ``(n_parameters,)``.
         gauss_newton: :math:`J^T W J`, shape ``(n_parameters, n_parameters)``.
         correlation_time: Counted samples after which the residuals count as new information, at least 1 (see
-            :func:`correlation_time`).
+            :func:`correlation_time`); NaN where nobody asked for it.
     """
 
     loss: float
@@ -75,5 +75,18 @@ class AbstractProvider(ABC):
             theta: Flat parameters.
 
         Returns:
-            All three.
+            All three, and the correlation time that the evidence asks for.
         """
+
+    def without_news(self, theta: NDArray[np.float64]) -> Linearisation:
+        """The same without the correlation time: what a step needs before the evidence is asked.
+
+        A pass over a short record is so fast that a transform of its residuals is a tenth of it.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            Loss, gradient and Gauss-Newton matrix; of a provider that has no such time to find, as :meth:`linearise`.
+        """
+        return self.linearise(theta)

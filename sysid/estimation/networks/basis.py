@@ -156,6 +156,12 @@ class RebasedProvider(AbstractProvider):
 
     def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix with respect to the parameters in the basis."""
+        return self._in_basis(self.inner.linearise(self.to_plain @ theta))
+
+    def without_news(self, theta: NDArray[np.float64]) -> Linearisation:
+        """The same without the correlation time; see the base class."""
+        return self._in_basis(self.inner.without_news(self.to_plain @ theta))
+
+    def _in_basis(self, at: Linearisation) -> Linearisation:
         P = self.to_plain
-        at = self.inner.linearise(P @ theta)
         return replace(at, gradient=P.T @ at.gradient, gauss_newton=P.T @ at.gauss_newton @ P)

@@ -146,20 +146,28 @@ class CascadeProvider(AbstractProvider):
 
     def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
+        return self._linearised(theta, correlation=True)
+
+    def without_news(self, theta: NDArray[np.float64]) -> Linearisation:
+        """The same without the correlation time; see the base class."""
+        return self._linearised(theta, correlation=False)
+
+    def _linearised(self, theta: NDArray[np.float64], *, correlation: bool) -> Linearisation:
         program = self._trained.program_at(theta)
         n = len(theta)
         gradient, matrix, loss, correlated, rows = np.zeros(n), np.zeros((n, n)), 0.0, 0.0, 0
 
         def one(record: Record) -> tuple[float, NDArray[np.float64], NDArray[np.float64], int, float]:
             own, part, square, residual = self._normal_equations(program, record, n)
-            return own, part, square, len(residual), float(np.mean([correlation_time(column) for column in residual.T]))
+            news = np.mean([correlation_time(column) for column in residual.T]) if correlation else np.nan
+            return own, part, square, len(residual), float(news)
 
         with np.errstate(invalid="ignore"):  # infinities of two records may cancel
-            for own, part, square, length, correlation in self._each(one):
+            for own, part, square, length, news in self._each(one):
                 loss += own
                 gradient += part
                 matrix += square
-                correlated += length * correlation
+                correlated += length * news
                 rows += length
         return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / rows)
 

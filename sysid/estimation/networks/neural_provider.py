@@ -199,9 +199,14 @@ class NeuralProvider(AbstractProvider):
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
         # A random start whose free run explodes has none; it is not told as a warning, the engine sees it.
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._linearised(theta)
+            return self._linearised(theta, correlation=True)
 
-    def _linearised(self, theta: NDArray[np.float64]) -> Linearisation:
+    def without_news(self, theta: NDArray[np.float64]) -> Linearisation:
+        """The same without the correlation time; see the base class."""
+        with np.errstate(over="ignore", invalid="ignore"):  # likewise
+            return self._linearised(theta, correlation=False)
+
+    def _linearised(self, theta: NDArray[np.float64], *, correlation: bool) -> Linearisation:
         gradient, matrix = np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
         loss, correlated = 0.0, 0.0
         for record in self._records:
@@ -215,7 +220,7 @@ class NeuralProvider(AbstractProvider):
                 raw_matrix += weighted.T @ weighted  # one array twice: NumPy calls syrk, half the flops
                 residuals[rows] = residual.reshape(-1, residuals.shape[1])
             self._add(self._of_begun(record, theta), raw_gradient, raw_matrix, gradient, matrix)
-            for whole in residuals.T:
+            for whole in residuals.T if correlation else ():
                 correlated += len(whole) * correlation_time(whole)
         held = self.template.sizes.held
         gradient[held], matrix[held], matrix[:, held] = 0.0, 0.0, 0.0
@@ -223,7 +228,9 @@ class NeuralProvider(AbstractProvider):
             loss=loss,
             gradient=gradient,
             gauss_newton=matrix,
-            correlation_time=correlated / sum(record.target.size for record in self._records),
+            correlation_time=correlated / sum(record.target.size for record in self._records)
+            if correlation
+            else np.nan,
         )
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -131,6 +131,13 @@ class RecursionProvider(AbstractProvider):
 
     def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
+        return self._linearised(theta, correlation=True)
+
+    def without_news(self, theta: NDArray[np.float64]) -> Linearisation:
+        """The same without the correlation time; see the base class."""
+        return self._linearised(theta, correlation=False)
+
+    def _linearised(self, theta: NDArray[np.float64], *, correlation: bool) -> Linearisation:
         n_p = len(theta)
         gradient = np.zeros(n_p)
         matrix = np.zeros((n_p, n_p))
@@ -139,7 +146,8 @@ class RecursionProvider(AbstractProvider):
             passed = self._pass(record, theta)
             residual = self._residual(record, passed)
             residual = residual if record.root_weights is None else residual * record.root_weights
-            correlated += len(residual) * max(1.0, correlation_time(residual) / self.stride)
+            if correlation:
+                correlated += len(residual) * max(1.0, correlation_time(residual) / self.stride)
             counted = residual[:: self.stride]
             loss += 0.5 * float(counted @ counted)
             for first, block in self._blocks(record, theta, passed):
@@ -156,7 +164,9 @@ class RecursionProvider(AbstractProvider):
             loss=loss,
             gradient=gradient,
             gauss_newton=matrix,
-            correlation_time=correlated / sum(len(record.target) for record in self._records),
+            correlation_time=correlated / sum(len(record.target) for record in self._records)
+            if correlation
+            else np.nan,
         )
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -207,7 +217,8 @@ class RecursionProvider(AbstractProvider):
             )
             place = first & int(room.mask[0])
             block, moves = room.J[place : place + rows], room.moves[place : place + rows]
-            block[~moves] = 0.0
+            if not moves.all():
+                block[~moves] = 0.0
             yield first, block
 
     def _residual(self, record: _Record, passed: _Pass) -> NDArray[np.float64]:

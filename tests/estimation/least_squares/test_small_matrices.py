@@ -1,0 +1,37 @@
+"""LAPACK straight against SciPy's ways to it: the same routines, and so the same numbers."""
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+from sysid.estimation.least_squares.small_matrices import add_to_diagonal, cholesky, inverse_of, solved
+
+
+@pytest.mark.parametrize("n", [1, 2, 65, 200])
+def test_factor_solution_and_inverse_are_those_of_scipy(n):
+    rng = np.random.default_rng(n)
+    root = rng.standard_normal((n + 5, n))
+    matrix, right = root.T @ root, rng.standard_normal(n)
+    factor = cholesky(matrix)
+    np.testing.assert_array_equal(factor, linalg.cholesky(matrix, lower=True))
+    np.testing.assert_array_equal(solved(factor, right), linalg.cho_solve(linalg.cho_factor(matrix, lower=True), right))
+    np.testing.assert_array_equal(inverse_of(factor), linalg.solve_triangular(factor, np.eye(n), lower=True))
+
+
+def test_the_lower_half_is_read_and_nothing_is_written():
+    matrix = np.array([[4.0, 77.0], [2.0, 5.0]])
+    before = matrix.copy()
+    np.testing.assert_allclose(cholesky(matrix), [[2.0, 0.0], [1.0, 2.0]])
+    np.testing.assert_array_equal(matrix, before)
+
+
+@pytest.mark.parametrize("wrong", [-1.0, 0.0, np.nan, np.inf])
+def test_what_has_no_factor_has_none(wrong):
+    assert cholesky(np.diag([1.0, wrong, 1.0])) is None
+
+
+def test_a_diagonal_is_added_to_in_place():
+    matrix = np.ones((2, 2))
+    add_to_diagonal(matrix, np.array([1.0, 2.0]))
+    add_to_diagonal(matrix, 0.5)
+    np.testing.assert_array_equal(matrix, [[2.5, 1.0], [1.0, 3.5]])
