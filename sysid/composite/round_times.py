@@ -13,6 +13,8 @@ from sysid.composite.plan import RoundPlan
 from sysid.composite.rehearsal import untaught
 from sysid.composite.round import JointRound
 from sysid.composite.stages import reading_more
+from sysid.estimation.networks.joint_options import AUTO
+from sysid.estimation.networks.leading_windows import possible_lengths
 from sysid.models import Cascade
 from sysid.traces import Trace
 
@@ -30,6 +32,9 @@ class RoundTime:
         iterations: At most so many.
         checkpoints: How often the traces that choose are run.
         limit_s: At most so many seconds of training.
+        windows: Lengths of windows on which a second start may be trained: in each as many iterations again, and then
+            as many over whole traces.
+        asked: Whether it is trained wherever the first begins; else only where that is far off.
     """
 
     iteration_s: float
@@ -37,11 +42,15 @@ class RoundTime:
     iterations: int
     checkpoints: int
     limit_s: float
+    windows: int = 0
+    asked: bool = False
 
     @property
     def seconds(self) -> float:
-        """At most so long: a round that converges ends early."""
-        return min(self.iterations * self.iteration_s + (self.checkpoints + 2) * self.choosing_s, self.limit_s)
+        """At most so long: a round that converges ends early. A second start counts where it was asked for."""
+        second = self.windows + 1 if self.windows and self.asked else 0
+        choosing = (self.checkpoints + 2) * self.choosing_s * (2 if second else 1)
+        return min((1 + second) * self.iterations * self.iteration_s + choosing, self.limit_s)
 
 
 def stand_in(composite: Composite, like: Trace) -> Cascade:
@@ -93,6 +102,8 @@ def time_round(
         iterations=ready.training.max_iterations,
         checkpoints=ready.training.checkpoints,
         limit_s=ready.training.max_time_s,
+        windows=len(possible_lengths(ready.training.windows, provider)),
+        asked=ready.training.windows != AUTO,
     )
     return found, started
 

@@ -21,6 +21,7 @@ from sysid.estimation.networks.cascade_fit import CascadeFit
 from sysid.estimation.networks.joint_layout import JointLayout
 from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.estimation.networks.leading_windows import ENOUGH, PATIENCE, SHARE, LeadingWindows
 from sysid.estimation.networks.multistart import INITIAL_ALPHA
 from sysid.estimation.networks.multistart_result import left_told
 from sysid.estimation.networks.training import FitProgress
@@ -108,22 +109,22 @@ class Joint:
     on_progress: Callable[[FitProgress], None] = lambda _: None
     scored: Callable[[Cascade, Trace], tuple[Dict[str, NDArray[np.float64]], int]] | None = None
 
-    def fit(
-        self, starts: Sequence[tuple[int | None, NDArray[np.float64]]], windows: Sequence[CascadeProvider] = ()
-    ) -> CascadeFit:
+    def fit(self, starts: Sequence[tuple[int | None, NDArray[np.float64]]]) -> CascadeFit:
         """Train from some starts, dropping half of them at each checkpoint.
+
+        What training on windows makes of the first of them, where there are such, is one start more.
 
         Args:
             starts: Seed, or ``None`` for the provider's own cascade, and parameters in the basis.
-            windows: The same residuals over windows of the traces, the shortest first: what training on one after the
-                other makes of the first start is one start more.
 
         Returns:
             The best state seen; a start that was given is one of them.
         """
         training, began = self.training, now() - checkpoints_of(self.on_progress).earlier_s
-        led, interrupted = self._through(windows, starts[0][1], began)
-        if windows:
+        begun, first = starts[0]
+        windows = LeadingWindows.of(training.windows, self.provider, self.layout.to_plain @ first, given=begun is None)
+        led, interrupted = self._through(windows.providers, first, began)
+        if windows.providers:
             starts = [*starts, (IN_WINDOWS, led)]
         numbers = {seed: number for number, (seed, _) in enumerate(starts, start=1)}
         seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
@@ -140,18 +141,28 @@ class Joint:
                 if interrupted:
                     break
             reached.sort(key=lambda entry: entry[1].at.loss)
-            alive = list(reached[: max(1, (len(reached) + 1) // 2)])
+            # What windows led to may fall fast and end worse than the start that they began from: none of the two goes.
+            stay = {begun, IN_WINDOWS} if windows.providers else set()
+            half = max(1, (len(reached) + 1) // 2)
+            alive = [*reached[:half], *(entry for entry in reached[half:] if entry[0] in stay)]
             late = now() - began > training.max_time_s
             if interrupted or late or not any(_unfinished(one) for _, one in reached):
                 break
-        return self._result(seen, interrupted=interrupted, seconds=now() - began)
+        return self._result(seen, windows.told, interrupted=interrupted, seconds=now() - began)
 
     def _through(
         self, windows: Sequence[CascadeProvider], where: NDArray[np.float64], began: float
     ) -> tuple[NDArray[np.float64], bool]:
         """Where a start is led by windows, on which nobody chooses, and whether it was interrupted there."""
+        training = self.training
+        enough = replace(
+            training,
+            tolerance=max(training.tolerance, ENOUGH),
+            patience=min(training.patience, PATIENCE),
+            max_time_s=training.max_time_s * SHARE,
+        )
         for inner in windows:
-            short = replace(self, provider=inner)
+            short = replace(self, provider=inner, training=enough)
             found = short._advance(where, self.training.checkpoints, began, "1/1", f"windows of {inner.window}")
             if found.status is Status.INTERRUPTED:
                 return where, True
@@ -227,7 +238,9 @@ class Joint:
         run = model.simulate_trace(trace, rest=self.provider.begins(trace))
         return {name: run[name] for name in self.provider.errors}, 0
 
-    def _result(self, seen: Sequence[_Candidate], *, interrupted: bool, seconds: float) -> CascadeFit:
+    def _result(
+        self, seen: Sequence[_Candidate], told: Sequence[str], *, interrupted: bool, seconds: float
+    ) -> CascadeFit:
         chosen = min(seen, key=lambda one: _last(one.score if self.selection else one.loss))
         curve = chosen.solution.curve if chosen.solution else ()
         uncertainty, warnings = self._known(chosen.solution)
@@ -247,6 +260,7 @@ class Joint:
             seed=chosen.drawn_by,
             evidence=chosen.solution.evidence if chosen.solution else None,
             notes=(
+                *told,
                 f"Chosen {how} among {len(seen)} states: {chosen.sentence}.",
                 *_others([one for one in seen if one is not chosen]),
             ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
+from typing import Literal
 
 from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment
@@ -14,6 +15,36 @@ from sysid.estimation.networks.training import check_choice
 from sysid.models import Cascade
 from sysid.models.typed_fields import TypedFields
 from sysid.traces import Trace
+
+AUTO: Literal["auto"] = "auto"
+"""In the place of windows: where the start is far off, of lengths by the records."""
+
+
+def check_windows(given: object) -> Literal["auto"] | tuple[int, ...]:
+    """What may be asked of windows.
+
+    Args:
+        given: Numbers of samples, or ``auto``.
+
+    Returns:
+        The same.
+
+    Raises:
+        ConfigError: If they are neither.
+    """
+    if given == AUTO:
+        return AUTO
+    if isinstance(given, list | tuple):
+        whole = [one for one in given if type(one) is int and one > 1]
+        if len(whole) == len(given) and whole == sorted(set(whole)):
+            return tuple(whole)
+    raise ConfigError(
+        "these are no windows to train on",
+        where="windows",
+        got=given,
+        expected=f"{AUTO}, or numbers of samples above 1, each larger than the one before, as in [200, 800, 2400]",
+        remedy="correct them, or leave them out; windows: [] is for none",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +67,9 @@ class JointTraining(TypedFields):
         robust_scale: Root mean squared residual of a trace, in the errors that count as one, from which on it counts by
             its logarithm (Cauchy loss): a few traces on which the free run is lost do not rule it (``robust_loss.py``).
         windows: Samples of the windows, the shortest first, on which a second start is trained before it is raced with
-            the members as they were: each window is begun with what is measured (``joint_record.py``).
+            the members as they were: each window is begun with what is measured (``joint_record.py``). ``auto`` takes
+            them by the records, and only where the free run of a start that was given is far off
+            (``leading_windows.py``); none for no second start.
         damping: How far a step may go, as in :class:`~sysid.estimation.Training`.
         workers: Records that are worked on at the same time.
     """
@@ -52,7 +85,7 @@ class JointTraining(TypedFields):
     moves: float = float("inf")
     leverage: float = float("inf")
     robust_scale: float = float("inf")
-    windows: tuple[int, ...] = ()
+    windows: Literal["auto"] | tuple[int, ...] = "auto"
     damping: str = "marquardt"
     workers: int = 2
 
@@ -61,21 +94,10 @@ class JointTraining(TypedFields):
         for name in ("max_iterations", "patience", "checkpoints", "starts", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        self._check_windows()
+        object.__setattr__(self, "windows", check_windows(self.windows))
         for name in ("moves", "leverage", "robust_scale"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
-
-    def _check_windows(self) -> None:
-        given = self.windows
-        whole = isinstance(given, list | tuple) and all(type(one) is int and one > 1 for one in given)
-        if not whole or list(given) != sorted(set(given)):
-            raise ConfigError(
-                "these are no windows to train on", where="windows", got=given,
-                expected="numbers of samples above 1, each larger than the one before, as in [200, 800, 2400]",
-                remedy="correct them, or leave them out",
-            )  # fmt: skip
-        object.__setattr__(self, "windows", tuple(given))
 
     def provider(
         self,
@@ -86,7 +108,6 @@ class JointTraining(TypedFields):
         *,
         begins: Callable[[Trace], Dict[str, float]] = lambda _: {},
         measured: Callable[[Trace], Experiment] | None = None,
-        window: int | None = None,
     ) -> CascadeProvider:
         """Residuals and Jacobians of a whole as these options have them count; every option that the provider has.
 
@@ -97,7 +118,6 @@ class JointTraining(TypedFields):
             trained: Outputs of the members that are trained; all by default.
             begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
             measured: From a trace its record, where it begins with measured samples.
-            window: Samples of the windows that traces are cut into; ``None`` for whole traces.
 
         Returns:
             The provider.
@@ -118,5 +138,4 @@ class JointTraining(TypedFields):
             workers=self.workers,
             begins=begins,
             measured=measured,
-            window=window,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from collections.abc import Mapping as Dict
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -157,18 +157,22 @@ class CascadeProvider(AbstractProvider):
         n = len(theta)
         gradient, matrix, loss, correlated, rows = np.zeros(n), np.zeros((n, n)), 0.0, 0.0, 0
 
-        def one(record: Record) -> tuple[float, NDArray[np.float64], NDArray[np.float64], int, float]:
-            own, part, square, residual = self._normal_equations(program, record, n)
-            news = np.mean([correlation_time(column) for column in residual.T]) if correlation else np.nan
-            return own, part, square, len(residual), float(news)
+        def one(record: Record) -> tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+            return self._normal_equations(program, record, n)
 
+        residuals: list[NDArray[np.float64]] = []
         with np.errstate(invalid="ignore"):  # infinities of two records may cancel
-            for own, part, square, length, news in self._each(one):
+            for own, part, square, residual in self._each(one):
                 loss += own
                 gradient += part
                 matrix += square
-                correlated += length * news
-                rows += length
+                residuals.append(residual)
+        # Windows follow one another: looked at one by one, each would take as long as its normal equations.
+        for residual in residuals if self.window is None else [np.concatenate(residuals)]:
+            with np.errstate(over="ignore", invalid="ignore"):
+                news = np.mean([correlation_time(column) for column in residual.T]) if correlation else np.nan
+            correlated += len(residual) * float(news)
+            rows += len(residual)
         return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix, correlation_time=correlated / rows)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -205,6 +209,36 @@ class CascadeProvider(AbstractProvider):
         return np.concatenate([self._away(record, values).T.ravel() for record, values in passed])
 
     @property
+    def variances(self) -> NDArray[np.float64]:
+        """Variance of each target where it counts, over the square of its error, shape ``(n_targets,)``."""
+        own = self._by_target([record.target for record in self._records])
+        found = [
+            np.var(one) / error**2 if len(one) else 0.0 for one, error in zip(own, self.errors.values(), strict=True)
+        ]
+        return np.array(found, dtype=np.float64)
+
+    def mean_squares(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mean squared error of each target's free run where it counts, over the square of its error.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            Shape ``(n_targets,)``.
+        """
+        program = self._trained.program_at(theta)
+        away = list(self._each(lambda one: self._away(one, self._pass(program, one, keep=False).values)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = [np.mean(one**2) if len(one) else 0.0 for one in self._by_target(away)]
+        return np.array(found, dtype=np.float64)
+
+    def _by_target(self, columns: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+        """What counts of each target, record after record."""
+        counts = [np.ones(r.target.shape) if r.root_weights is None else r.root_weights for r in self._records]
+        parts = list(zip(columns, counts, strict=True))
+        return [np.concatenate([own[some[:, j] > 0.0, j] for own, some in parts]) for j in range(len(self.errors))]
+
+    @property
     def _columns(self) -> list[int]:
         return [self.cascade.wiring.channels.index(name) for name in self.errors]
 
@@ -220,6 +254,8 @@ class CascadeProvider(AbstractProvider):
         if self.window is None:
             return [whole]
         known = whole.values.copy()
+        if self.measured is not None:  # it holds nothing else
+            return list(windows_of(whole, known, self.window, self._trained.depth))
         for column, name in enumerate(self.cascade.wiring.channels):
             if name in trace.channel_names:
                 seen, own = trace.usable_of([name]), known[self._trained.depth :, column]

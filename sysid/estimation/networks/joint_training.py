@@ -59,11 +59,10 @@ def fit_cascade(
     training = training or JointTraining()
     errors = unit_errors(cascade, traces, targets)
     provider = training.provider(cascade, traces, errors, trained)
-    windows = [training.provider(cascade, traces, errors, trained, window=samples) for samples in training.windows]
     records = [_channels(cascade, trace) for trace in traces]
     layout = JointLayout.of(provider.members, records, shared)
     joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)
-    return joint.fit([(None, layout.in_basis(provider.theta))], windows)
+    return joint.fit([(None, layout.in_basis(provider.theta))])
 
 
 def unit_errors(

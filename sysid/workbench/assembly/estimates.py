@@ -119,4 +119,6 @@ def _samples(traces: Sequence[Trace]) -> int:
 
 def _estimate(timed: RoundTime) -> Estimate:
     each = f"{timed.iterations} iterations of {1e3 * timed.iteration_s:.3g} ms"
-    return Estimate(seconds=timed.seconds, basis=f"at most: {each}, timed with untrained members")
+    lengths = f" on each of {timed.windows} lengths of windows and over whole traces" if timed.windows else ""
+    more = f", as many again{lengths}{'' if timed.asked else ' where the start is far off'}" if lengths else ""
+    return Estimate(seconds=timed.seconds, basis=f"at most: {each}{more}, timed with untrained members")

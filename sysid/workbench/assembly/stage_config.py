@@ -91,7 +91,7 @@ class RoundConfig(Words):
         moves: Of its training.
         leverage: Of its training.
         robust_scale: Of its training.
-        windows: Of its training; ``[]`` for none any more.
+        windows: Of its training; ``[]`` for none any more, ``auto`` for those that it needs.
     """
 
     OLD: ClassVar[Mapping[str, str]] = {"everywhere": "share_weights", **JOINT_TRAINING}
@@ -104,7 +104,7 @@ class RoundConfig(Words):
     moves: float | None = Field(default=None, gt=0)
     leverage: float | None = Field(default=None, gt=0)
     robust_scale: float | None = Field(default=None, gt=0)
-    windows: tuple[int, ...] | None = None
+    windows: Literal["auto"] | tuple[int, ...] | None = None
 
 
 class AgainConfig(RoundConfig):

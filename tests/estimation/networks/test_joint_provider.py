@@ -263,3 +263,28 @@ def test_a_start_that_runs_away_overflows_without_a_warning():
     with np.errstate(all="raise"):  # what one has asked for elsewhere does not matter either
         found = one.linearise(2.0 * one.theta)
     assert not np.isfinite(found.gauss_newton).any()
+
+
+@pytest.mark.parametrize("window", [None, 20])
+def test_mean_squares_and_variances_are_of_what_counts(window) -> None:
+    truth, usable = service(), np.arange(60) >= 25
+    record = trace(truth, usable=usable)
+    errors = {"BP": 0.5, "BC": 2.0}
+    one = provider(truth, traces=(record, trace(truth, seed=1)), errors=errors, window=window)
+    theta = one.theta + 0.05
+    away = {name: [] for name in errors}
+    for part, seen in ((record, usable), (trace(truth, seed=1), np.ones(60, dtype=bool))):
+        if window is None:
+            run = one.at(theta).simulate_trace(part)
+            for name, error in errors.items():
+                away[name].append((run[name] - part[name])[seen] / error)
+    if window is None:
+        assert_allclose(one.mean_squares(theta), [np.mean(np.concatenate(some) ** 2) for some in away.values()])
+    assert_allclose(
+        one.variances,
+        [
+            np.var(np.concatenate([record[name][usable], trace(truth, seed=1)[name]])) / e**2
+            for name, e in errors.items()
+        ],
+    )
+    assert_allclose(one.mean_squares(theta).sum() * one.n_samples, 2 * 2.0 * one.loss(theta), rtol=1e-12)

@@ -12,13 +12,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import CascadeFit, JointTraining, Status, fit_cascade, with_upstream_outputs
 from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.estimation.networks.leading_windows import lengths
 from sysid.estimation.networks.training import FitProgress
 from sysid.models import Cascade
 from sysid.traces import Role, TraceSet
 from tests.models.cascades import command, linear, network, service
 
 TRUTH = service()
-TRAINING = JointTraining(max_iterations=20, checkpoints=4)
+TRAINING = JointTraining(max_iterations=20, checkpoints=4, windows=())
 
 
 def measured(cascade: Cascade = TRUTH, n: int = 400, seed: int = 0):
@@ -135,6 +136,49 @@ def test_a_whole_that_goes_astray_is_led_back_by_windows(seed: int, by: float) -
     assert ours.seed is None, "neither start was drawn"
 
 
+@pytest.mark.parametrize(("seed", "by"), [(2, 0.2), (0, 0.4)])
+def test_a_start_that_is_far_off_is_led_back_unasked_and_that_is_told(seed: int, by: float) -> None:
+    start, traces, unseen = disturbed(seed=seed, by=by), [measured(), measured(seed=1)], measured(seed=3)
+    ours, plain = (
+        fit_cascade(start, traces, training=replace(TRAINING, windows=windows), selection=[measured(seed=2)])
+        for windows in ("auto", ())
+    )
+    errors = [max(mse(one.model, unseen, name) for name in TRUTH.outputs) for one in (ours, plain)]
+    assert errors[0] < 0.02
+    assert errors[0] < 0.1 * errors[1]
+    assert any("goes astray" in note and "windows: [] for none" in note for note in ours.notes)
+
+
+def test_a_start_that_runs_well_is_trained_as_without_windows() -> None:
+    start, traces = disturbed(by=0.001), [measured(), measured(seed=1)]
+    fits = [fit_cascade(start, traces, training=replace(TRAINING, windows=one)) for one in ("auto", ())]
+    assert_array_equal(*(one.model.simulate_trace(measured()).values for one in fits))
+    assert [len(one.attempts) for one in fits] == [len(fits[1].attempts)] * 2
+    assert not any("windows" in note for note in fits[0].notes)
+
+
+def test_the_start_that_was_given_stays_in_the_race_with_what_windows_led_to() -> None:
+    fit = fit_cascade(disturbed(), [measured()], training=replace(TRAINING, windows=(20, 80)), targets=["BC"])
+    assert [max(a.iterations for a in fit.attempts if a.start == start) for start in (1, 2)] == [20, 20]
+
+
+def test_records_too_short_to_be_cut_have_no_windows() -> None:
+    short = measured(n=15)
+    assert lengths([short], TRUTH.outputs) == ()
+    fit = fit_cascade(disturbed(by=0.4), [short], training=replace(TRAINING, windows="auto", max_iterations=2))
+    assert {one.start for one in fit.attempts} == {1}
+
+
+def test_windows_are_longer_where_targets_remember_longer() -> None:
+    quick, slow = measured(n=600), measured(n=600)
+    values = slow.values.copy()
+    column = slow.index("BC")
+    values[:, column] = np.repeat(np.random.default_rng(0).standard_normal(5), 120)
+    slow = replace(slow, values=values)
+    assert lengths([quick], ["BC"])[0] < lengths([slow], ["BC"])[0]
+    assert all(one <= 300 for some in (quick, slow) for one in lengths([some], ["BC"]))
+
+
 def test_an_interruption_on_windows_ends_the_fit() -> None:
     told = []
 
@@ -158,7 +202,15 @@ def test_windows_never_take_a_better_start_away() -> None:
 
 @pytest.mark.parametrize(
     "fields",
-    [{"starts": 0}, {"stride": 0}, {"moves": 0.0}, {"windows": (1,)}, {"windows": (80, 20)}, {"windows": (20, 20)}],
+    [
+        {"starts": 0},
+        {"stride": 0},
+        {"moves": 0.0},
+        {"windows": (1,)},
+        {"windows": (80, 20)},
+        {"windows": (20, 20)},
+        {"windows": "often"},
+    ],
     ids=str,
 )
 def test_training_that_cannot_be_is_refused(fields):

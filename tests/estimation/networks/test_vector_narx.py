@@ -223,3 +223,16 @@ def test_the_outputs_have_intervals_that_hold_what_is_measured():
 
 def of(trace: Trace) -> TraceSet:
     return TraceSet(name="unseen", traces=(trace,), roles={trace.name: Role.VALIDATION}, source="")
+
+
+def test_windows_lead_a_start_of_a_network_of_several_outputs() -> None:
+    options = JointTraining(max_iterations=5, windows=(40, 160))
+    for start in (None, Start(kind=StartKind.ESTIMATED)):
+        fit = fit_vector_narx([coupled(400)], MAPPING, NETWORK, options, start=start, selection=[coupled(400, 1)])
+        assert any("windows of 40, 160 samples" in note for note in fit.notes)
+        assert {one.start for one in fit.attempts} == {1, 2}
+
+
+def test_a_drawn_start_is_not_taken_for_one_that_is_lost() -> None:
+    fit = fit_vector_narx([coupled(400)], MAPPING, NETWORK, JointTraining(max_iterations=5))
+    assert not any("windows" in note for note in fit.notes)

@@ -72,3 +72,8 @@ def test_a_round_may_count_jumps_and_exploded_sensitivities_otherwise():
 def test_a_limit_of_a_round_that_is_none_is_refused(name, value):
     with pytest.raises(ValidationError, match=name):
         together(again=[{name: value}])
+
+
+def test_a_round_may_have_windows_of_its_own_and_by_default_those_that_it_needs():
+    rounds = together(again=[{"windows": [50, 200]}, {"windows": []}, {"windows": "auto"}]).rounds
+    assert [one.plan(seed=0).training.windows for one in rounds] == ["auto", (50, 200), (), "auto"]
