@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import sysid
 from sysid.traces import Channel, Trace
@@ -39,6 +40,28 @@ def test_what_is_alike_is_not_the_same() -> None:
     again = np.column_stack([VALUES[:, 0], OTHER[:, 1]])  # the same experiment, measured once more
     assert not repeated(("u", "y"), [trace("a", VALUES)], [trace("b", again), trace("short", VALUES[:5])])
     assert repeated(("u",), [trace("a", VALUES)], [trace("b", again)])
+
+
+def _coarse(seed: int, n: int, hold: int = 12) -> np.ndarray:
+    """Two levels and an output in coarse steps, without noise."""
+    u = np.repeat(np.random.default_rng(seed).choice([-1.0, 1.0], n // hold + 1), hold)[:n]
+    return np.column_stack([u, np.round(2.0 * lfilter([0.0, 0.2, 0.1], [1.0, -1.5, 0.7], u)) / 2.0])
+
+
+@pytest.mark.parametrize("n", [2_000, 20_000])
+def test_other_experiments_of_few_levels_are_not_the_same_and_copies_of_them_are(n: int) -> None:
+    """98 % of one were said to be in the other."""
+    fitted, other = _coarse(1, n), _coarse(2, 600)
+    assert not repeated(("u", "y"), [trace("a", fitted)], [trace("b", other), trace("c", _coarse(3, 500))])
+    assert repeated(("u", "y"), [trace("a", fitted)], [trace("b", fitted[100:500])])
+    assert repeated(("u", "y"), [trace("a", fitted)], [trace("b", np.concatenate([other, fitted[-450:]]))])
+    assert repeated(("u", "y"), [trace("a", fitted), trace("twice", fitted)], [trace("b", fitted)])
+
+
+def test_further_periods_without_noise_are_the_same() -> None:
+    u = np.sin(2.0 * np.pi * np.arange(2_000) / 50).round(6)
+    values = np.column_stack([np.tile(u[:50], 40), np.tile(np.cos(u[:50]), 40)])
+    assert repeated(("u", "y"), [trace("a", values[:1_200])], [trace("b", values[1_200:])])
 
 
 def test_a_comparison_says_so() -> None:
