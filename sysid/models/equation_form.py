@@ -435,10 +435,20 @@ class EquationForm(AbstractForm):
         Returns:
             Shape ``(n_states,)``.
         """
+        if not (~self.terms.fixed).any() or not known.any():
+            return rest
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            runs = np.isfinite(self.run(u, rest.copy())).all()
+        # From a state at which the run grows without bound no search begins: over few samples it has no time to.
+        for few in (1, 2, 4, 8) if not runs else ():
+            if few < len(u) and known[:few].any():
+                rest = self._shown(u[:few], output[:few], rest, known[:few])
+        return self._shown(u, output, rest, known)
+
+    def _shown(self, u: Array, output: Array, rest: Array, known: NDArray[np.bool_]) -> Array:
+        """The state that some samples show, by a search from the one expected."""
         terms = self.terms
         free = np.flatnonzero(~terms.fixed)
-        if not len(free) or not known.any():
-            return rest
 
         def misfit(xi: Array, derived: bool) -> tuple[Array, Array]:
             x = rest.copy()

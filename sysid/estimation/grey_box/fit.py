@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import replace
 from functools import partial
@@ -30,10 +30,10 @@ from sysid.estimation.networks.multistart_result import left_on, multistart_resu
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult
-from sysid.models import Mapping, Start
+from sysid.models import History, Mapping, Start, beginning
 from sysid.models.built_model import BuiltModel
 from sysid.models.grey_box import GreyBox, VectorGreyBox
-from sysid.models.grey_box_model import GreyBoxModel, VectorGreyBoxModel
+from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]
@@ -191,13 +191,21 @@ def fit_equations(
     done = finished(ready, choice.chosen, training, until=multistart.until, stopped=multistart.stop.is_set())
     candidates = [done.candidate if one is choice.chosen else one for one in candidates]
     choice = replace(choice, chosen=done.candidate)
-    left = left_on(done.candidate.model, [t.name for t in data[0]], [(e.inputs, e.history) for e in experiments])
+    left = left_on(done.candidate.model, [t.name for t in data[0]], _runs(done.model, data[0], data[2]))
     status = multistart_status(done.candidate, candidates, left, interrupted=multistart.stop.is_set())
     seconds = multistart.checkpoints.earlier_s + now() - began
     begun = with_starts_begun(training, multistart, candidates)
     found = with_note(multistart_result(choice, candidates, begun, status, seconds, left=left), windows)
     found = with_way(found, done.candidate, way_of(training, template, begins), begun, training)
     return told(found, done, data, ready.named)
+
+
+def _runs(model: EquationModel, traces: Sequence[Trace], start: Start) -> Iterator[tuple[Array, History | None]]:
+    """Inputs and history of each record as it is scored: from the state that is declared there may be no run."""
+    for trace in traces:
+        inputs, usable = trace.columns(model.mapping.inputs), trace.usable_of(model.mapping.channels)
+        begun = beginning(model, inputs, model.measured(trace), start, usable, case=trace.name)
+        yield inputs[begun.first :], begun.history
 
 
 def raced_equations(

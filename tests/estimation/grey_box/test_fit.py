@@ -15,6 +15,8 @@ from sysid.estimation.result import FitResult, Status
 from sysid.models import GreyBox, GreyBoxModel, Mapping, Start, StartKind, VectorGreyBox
 from sysid.traces import Channel, Trace
 from sysid.validation import predict_interval
+from tests.benchmarks.grey_box_starts import SYSTEMS, started
+from tests.benchmarks.grey_box_starts import record as simulated
 
 MAPPING = Mapping.parse("u -> y")
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
@@ -190,6 +192,18 @@ def test_masked_samples_do_not_count() -> None:
 def test_equations_without_a_run_are_refused() -> None:
     with pytest.raises(TraceError, match="no free run at their declared start"):
         fitted([first_order(3.0, 4.0)], "dx/dt = log(-gain) + u; y = x", parameters={"gain": 1.0})
+
+
+def test_a_declared_state_without_a_run_is_not_the_end() -> None:
+    """A tank in which the reaction would run away from the temperature that is declared, not from the one measured."""
+    tank, rng = SYSTEMS["stirred tank"], np.random.default_rng([3, len("stirred tank"), 10])
+    record, noise, spans = simulated(tank, rng)
+    hot = started(tank, 10.0, spans, rng)
+    assert [one.start for one in hot.initial][1] == pytest.approx(641.0, abs=1.0)
+    fit = fit_grey_box([record], MAPPING, hot, sysid.Training(), start=ESTIMATED)
+    assert fit.status.usable, fit.notes
+    assert fit.history["mse"][-1] < 1.1**2 * noise
+    assert fit.model.parameters == pytest.approx(tank.true, rel=0.05)  # type: ignore[attr-defined]
 
 
 def test_options_of_lagged_regressors_are_refused() -> None:
