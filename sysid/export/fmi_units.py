@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from typing import Any
 
 BASE = {
@@ -35,10 +36,18 @@ def unit_definitions(units: Iterable[str]) -> list[dict[str, Any]]:
     return [{"name": unit, "base": _base(unit)} for unit in dict.fromkeys(units) if unit != "1"]
 
 
+@cache
+def _registry() -> Any:
+    """Read once: that takes a sixth of a second."""
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None, autoconvert_offset_to_baseunit=True)
+
+
 def _base(unit: str) -> dict[str, str] | None:
     import pint
 
-    registry: Any = pint.UnitRegistry(cache_folder=None, autoconvert_offset_to_baseunit=True)
+    registry = _registry()
     try:
         zero, one = (registry.Quantity(value, unit).to_base_units() for value in (0.0, 1.0))
     except (pint.errors.PintError, AttributeError):

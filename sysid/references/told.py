@@ -24,7 +24,7 @@ def reasons_of(outcomes: Iterable[Outcome], most: int = 3) -> str:
         In words; empty where all gave one.
     """
     counts = Counter(one.reason for one in outcomes if one.reason is not None).most_common()
-    told = [f"{reason} ({n})" for reason, n in counts[:most]]
+    told = [reason if n == 1 else f"{reason} ({n} times)" for reason, n in counts[:most]]
     return "; ".join([*told, *([f"and {len(counts) - most} other reasons"] if len(counts) > most else [])])
 
 

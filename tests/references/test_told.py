@@ -11,7 +11,7 @@ from tests.references.test_runs import CASES, reference
 
 def test_reasons_are_counted() -> None:
     many = [Outcome(case=CASES[0], trace=None, reason=reason) for reason in "abbc"]
-    assert reasons_of(many, 2) == "b (2); a (1); and 1 other reasons"
+    assert reasons_of(many, 2) == "b (2 times); a; and 1 other reasons"
     assert not reasons_of([Outcome(case=CASES[0], trace=None)])
 
 

@@ -91,6 +91,36 @@ def found_resets(records: Sequence[tuple[Array, Array]], *, seed: int = 0) -> Re
     return None
 
 
+def derived_from(outputs: Array, *, near: float = NEAR[0]) -> dict[int, Array]:
+    """Outputs that are those before them, in another unit or added up: the rest is the state, and says all.
+
+    Args:
+        outputs: Of all records, shape ``(n_samples, n_outputs)``.
+        near: Share of its range that such an output may be off.
+
+    Returns:
+        By number of the output its factors of the outputs that are not among these, and of 1.
+
+    Example:
+        >>> h = np.random.default_rng(0).normal(size=(50, 2))
+        >>> {k: row.round(6).tolist() for k, row in derived_from(np.column_stack([h, 3.0 * h[:, 0] + 1.0])).items()}
+        {2: [3.0, 0.0, 1.0]}
+    """
+    own, found = list[int](), dict[int, Array]()
+    for k in range(outputs.shape[1]):
+        terms = np.column_stack([outputs[:, own], np.ones(len(outputs))])
+        row = np.asarray(np.linalg.lstsq(terms, outputs[:, k], rcond=None)[0], dtype=np.float64)
+        if own and np.abs(terms @ row - outputs[:, k]).max() <= near * np.ptp(outputs[:, k]):
+            found[k] = row
+        else:
+            own.append(k)
+    full = {}
+    for k, row in found.items():  # outputs that came to be own after it have no part in it
+        full[k] = np.concatenate([row[:-1], np.zeros(len(own) + 1 - len(row)), row[-1:]])
+        full[k] = np.where(np.abs(full[k]) < 1e-12 * np.abs(full[k]).max(), 0.0, full[k])
+    return full
+
+
 def _steps_of(records: Sequence[tuple[Array, Array]]) -> _Steps | None:
     parts = [(y[:-1], u[1:], y[1:]) for u, y in records if len(y) > 1]
     if not parts:
@@ -231,8 +261,8 @@ def simplest(low: float, high: float) -> float:
         The number.
 
     Example:
-        >>> simplest(-1e-5, 2e-4), simplest(0.0993, 0.1012), simplest(-2.4, -2.1)
-        (0.0, 0.1, -2.2)
+        >>> simplest(-1e-5, 2e-4), simplest(0.0993, 0.1012), simplest(-2.45, -2.35)
+        (0.0, 0.1, -2.4)
     """
     if low <= 0.0 < high:
         return 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as Dict
 
 import numpy as np
 
@@ -13,17 +14,20 @@ DIGITS = 13
 """Of a number: what is behind them is rounding."""
 
 
-def grey_box_of(found: ResetMap, mapping: Mapping) -> VectorGreyBox:
+def grey_box_of(found: ResetMap, mapping: Mapping, others: Dict[str, Array] | None = None) -> VectorGreyBox:
     """The equations, with the outputs of the sample before as states.
 
     Args:
         found: The map.
-        mapping: Names of inputs and outputs.
+        mapping: Names of inputs and outputs, those of the map in its order.
+        others: Outputs that the map does not have: what each is of its outputs and of 1, by name.
 
     Returns:
         The structure; nothing of it is left to estimate.
     """
-    names, inputs = _quoted(mapping.outputs), _quoted(mapping.inputs)
+    derived = others or {}
+    names = _quoted([name for name in mapping.outputs if name not in derived])
+    inputs = _quoted(mapping.inputs)
     before = [f"before_{k}" for k in range(len(names))]
     lines, now = list[str](), before
     for step in range(found.steps):
@@ -31,6 +35,7 @@ def grey_box_of(found: ResetMap, mapping: Mapping) -> VectorGreyBox:
         after = names if last else [f"at_{step}_{k}" for k in range(len(names))]
         lines += _step(found, now, after, inputs, step)
         now = after
+    lines += [f"{_quoted([name])[0]} = {_sum(row, [*names, ''])}" for name, row in derived.items()]
     lines += [f"{one}[k+1] = {name}" for one, name in zip(before, names, strict=True)]
     initial = {
         one: {"start": float(f"{value:.{DIGITS}g}"), "fixed": True}

@@ -17,7 +17,7 @@ PAGE_S = 2.0
 DRAWING_S, DRAWN_FOR_IT, SLOWEST_PACE = 0.04, 4, 20.0
 """Processor seconds of a picture that is drawn to measure a machine by, how many are, and how much slower it may be at
 most."""
-PAGE_SHARE, FEWEST = 0.15, 3
+PAGE_SHARE, FEWEST = 0.15, 1
 """Share of the time of a search that pictures of single cases may take, and cases that are drawn in any case."""
 SPILL = 0.05
 """Share of the time by which scores, export and report may end after it."""
@@ -39,7 +39,7 @@ def drawn_in(wall_s: float | None, outputs: int) -> int:
 
     Example:
         >>> drawn_in(30.0, 1), drawn_in(30.0, 5), drawn_in(300.0, 5)
-        (11, 3, 12)
+        (11, 2, 12)
     """
     if wall_s is None:
         return DRAWN
@@ -47,14 +47,16 @@ def drawn_in(wall_s: float | None, outputs: int) -> int:
 
 
 def finish_s(
-    records: int, outputs: int, wall_s: float | None = None, *, slowed: float | None = None, paced: float | None = None
-) -> float:
+    records: int, outputs: int, wall_s: float | None = None, *, drawn: int | None = None, slowed: float | None = None,
+    paced: float | None = None,
+) -> float:  # fmt: skip
     """About how long scores, export and report take.
 
     Args:
         records: Of the data; the report draws so many of them as :func:`drawn_in` says.
         outputs: Of each.
         wall_s: Seconds of the search; ``None`` where iterations are counted.
+        drawn: Cases of each output that are drawn, where that was said.
         slowed: How many times as long a second of work takes; measured now by default.
         paced: How many times as much work it is as where the constants were measured; measured by default.
 
@@ -65,7 +67,7 @@ def finish_s(
         >>> round(finish_s(20, 2, slowed=1.0, paced=1.0), 3)
         19.6
     """
-    work = FINISHING_S + outputs * OUTPUT_S + _pictures_s(records, outputs, wall_s)
+    work = FINISHING_S + outputs * OUTPUT_S + _pictures_s(records, outputs, drawn or drawn_in(wall_s, outputs))
     return (slowness() if slowed is None else slowed) * (pace() if paced is None else paced) * work
 
 
@@ -80,12 +82,12 @@ def page_s(records: int, outputs: int, wall_s: float | None = None) -> float:
     Returns:
         Seconds by the clock.
     """
-    return slowness() * pace() * (PAGE_S + _pictures_s(records, outputs, wall_s))
+    return slowness() * pace() * (PAGE_S + _pictures_s(records, outputs, drawn_in(wall_s, outputs)))
 
 
-def _pictures_s(records: int, outputs: int, wall_s: float | None) -> float:
+def _pictures_s(records: int, outputs: int, drawn: int) -> float:
     """Processor seconds of a gallery of all models, and of each model by itself."""
-    return PICTURE_S * 2.0 * min(records, drawn_in(wall_s, outputs)) * outputs
+    return PICTURE_S * 2.0 * min(records, drawn) * outputs
 
 
 @cache

@@ -12,7 +12,7 @@ from sysid.advice.dynamics import INTEGRATES
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
 from sysid.estimation.output_ends import found_ends
-from sysid.estimation.resets import found_resets, grey_box_of
+from sysid.estimation.resets import derived_from, found_resets, grey_box_of
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind, VectorGreyBox
 from sysid.reporting.advice_record import AdviceRecord
 from sysid.reporting.advice_words import lines
@@ -125,8 +125,11 @@ def resets_of(traces: Sequence[Trace], mapping: Mapping) -> VectorGreyBox | None
     """
     if not jumps_of(traces, mapping) or any(trace.usable is not None for trace in traces):
         return None
-    found = found_resets([(trace.columns(mapping.inputs), trace.columns(mapping.outputs)) for trace in traces])
-    return None if found is None else grey_box_of(found, mapping)
+    others = derived_from(np.concatenate([trace.columns(mapping.outputs) for trace in traces]))
+    own = [name for k, name in enumerate(mapping.outputs) if k not in others]
+    found = found_resets([(trace.columns(mapping.inputs), trace.columns(own)) for trace in traces])
+    derived = {mapping.outputs[k]: row for k, row in others.items()}
+    return None if found is None else grey_box_of(found, mapping, derived)
 
 
 def is_suggested(mapping: Mapping) -> bool:
@@ -195,14 +198,36 @@ def _set(data: Data, estimation: Sequence[Trace], selection: Sequence[Trace]) ->
 
 
 def _orders(data: Data, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
-    """The best ARX structures in free run over what chooses; of several outputs, those of the first."""
+    """The best ARX structures in free run over what chooses; of several outputs, what each of them needs in one."""
     fitted, chooses = (data.estimation, data.selection) if data.selection else ends_held_out(data.estimation)
+    traces = _set(data, fitted, chooses)
+    found = [some for one in mapping.each if (some := _orders_of(traces, one, start))]
+    most = max(map(len, found), default=0)
+    together = [_together([some[min(k, len(some) - 1)] for some in found]) for k in range(most)]
+    return tuple(dict.fromkeys(together))
+
+
+def _orders_of(traces: TraceSet, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
     try:
-        found = search_orders(_set(data, fitted, chooses), mapping.each[0], start=start, workers=1)
+        found = search_orders(traces, mapping, start=start, workers=1)
     except UserError:
         return ()  # too short for any: what is tried then says so itself
     structures = [one.fit.model.structure for one in found.finalists if np.isfinite(one.mean_fit)]
     return tuple(replace(one) for one in structures if isinstance(one, ARX))[:ARX_TRIED]
+
+
+def _together(some: Sequence[ARX]) -> ARX:
+    """One structure that has every lag of several: what acts at once on one output may act late on another.
+
+    Example:
+        >>> _together([ARX(na=1, nb=(1, 2), nk=(0, 1)), ARX(na=2, nb=(1, 1), nk=(1, 0))]).label
+        'ARX [2; 2 3; 0 0]'
+    """
+    first = [min(lags) for lags in zip(*(one.nk for one in some), strict=True)]
+    ends = [[n + k for n, k in zip(one.nb, one.nk, strict=True)] for one in some]
+    last = [max(lags) for lags in zip(*ends, strict=True)]
+    nb = tuple(end - begin for begin, end in zip(first, last, strict=True))
+    return replace(some[0], na=max(one.na for one in some), nb=nb, nk=tuple(first))
 
 
 def _cautions(advice: Sequence[Advice]) -> list[str]:

@@ -206,17 +206,22 @@ class Plan:
         yield from self._ensembles()
 
     def _whatever_the_time(self) -> Iterator[list[Try]]:
-        """Where nothing usable has come in the time, the least linear structures one by one, until one is.
+        """Where nothing usable has come in the time, the least structures one by one, until one is.
 
-        The second has no past outputs: it is stable whatever the record, and fitted in no time.
+        Equations of events are no work at all. In motion what begins at rest comes to nothing: one network that learns
+        where it begins is tried. Of linear structures the second has no past outputs: it is stable whatever the
+        record, and fitted in no time.
         """
         m, least = self.looked.n_inputs, self._least(linear=True)
         stable = Try(structure=ARX(na=0, nb=(TAPS,) * m, nk=(0,) * m))
-        for one in (*least[:1], stable, *least[1:]):
+        nonlinear = [family for family in self.families if not family.linear]
+        events = [one for family in nonlinear for one in family.at_events(self.looked)]
+        moving = [one for family in nonlinear for one in family.in_motion(self.looked) if self.looked.in_motion]
+        for one in (*events, *moving[:1], *least[:1], stable, *least[1:]):
             if math.isfinite(self.least()):
                 return
             if self._possible(one) and all(one.structure != tried.structure for tried in self._tries):
-                self.budget.forced, self.hurried = True, True
+                self.budget.forced, self.hurried = True, one not in events
                 yield [one]
 
     def _finals(self) -> Iterator[list[Try]]:

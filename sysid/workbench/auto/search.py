@@ -297,7 +297,9 @@ class Search:
     def _finishing_s(self) -> float:
         """Processor seconds of what follows; nobody asks for them where iterations are counted."""
         wall_s = self.config.wall_s
-        return 0.0 if wall_s is None else finish_s(len(self.data.traces), self._n_outputs, wall_s, slowed=1.0)
+        if wall_s is None:
+            return 0.0
+        return finish_s(len(self.data.traces), self._n_outputs, wall_s, drawn=self.config.report.drawn, slowed=1.0)
 
     @property
     def _n_outputs(self) -> int:

@@ -92,7 +92,7 @@ def make_surrogate(
     seconds_left = work.seconds_left(plan)
     proving = Proving(
         reference=work.reference, design=work.config.experiment, taught=found.traces, count=count,
-        workers=work.config.workers, ends=inf if proof or iterations else began + plan.whole, search_s=seconds_left,
+        workers=work.config.workers, ends=inf if proof or iterations else began + plan.whole, whole_s=60.0 * minutes,
         watch=watch,
     )  # fmt: skip
     place, said = work.modelled(found, seconds_left / 60.0, proving, whole=minutes)

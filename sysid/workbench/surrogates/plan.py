@@ -48,6 +48,8 @@ PROOF = 1000
 FEWEST, ENOUGH, MOST = 8, 12, 60
 """Experiments that are fitted: at least, where they are long, and at most. More samples than trials fit in the time
 would make look, scores and report slow, and leave none for the search; rounds of growth add what is missing."""
+RECORDS = 1.0
+"""Of them for each second of the whole: ninety short records took half a minute to be loaded, looked at and scored."""
 
 
 def written(
@@ -141,7 +143,8 @@ def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, wo
         )  # fmt: skip
     one = next(one for one in (one, *more) if one.trace is not None)
     each = one.wall_s if np.isfinite(one.wall_s) else reference.time_limit
-    most = int(np.clip(searched_in(60.0 * minutes) * reference.sample_time / design.duration, ENOUGH, MOST))
+    seen = min(searched_in(60.0 * minutes) * reference.sample_time / design.duration, RECORDS * 60.0 * minutes)
+    most = int(np.clip(seen, ENOUGH, MOST))
     count = int(np.clip(RUNNING * 60.0 * minutes * workers / max(each, 1e-3) / 1.5, FEWEST, most))
     return Counts(estimation=count, selection=max(3, count // 4), test=max(3, count // 4))
 

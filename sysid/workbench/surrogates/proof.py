@@ -16,7 +16,8 @@ from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
 from sysid.extras import has
 from sysid.references.config import InputPort, ReferenceConfig
-from sysid.references.design import Design, drawn
+from sysid.references.design import Design
+from sysid.references.design import drawn as drawn_cases
 from sysid.references.runs import Case, Outcome, Progress, ReferenceRuns
 from sysid.references.told import reasons_of
 from sysid.reporting.judging.results import CurveRecord, JudgementRecord, QuantityRecord, SceneRecord
@@ -50,6 +51,7 @@ class Proof:
             ``None`` where it was not run so.
         dropped_s: Processor seconds of that run.
         dropped_reference_s: Of the reference on the same experiment.
+        drawn: How many of the worst are drawn, at most.
     """
 
     errors: NDArray[np.float64]
@@ -65,6 +67,7 @@ class Proof:
     dropped: float | None = None
     dropped_s: float = float("nan")
     dropped_reference_s: float = float("nan")
+    drawn: int = DRAWN[1]
 
     @property
     def share(self) -> float:
@@ -154,13 +157,13 @@ class Proof:
     @property
     def worst(self) -> list[int]:
         """The experiments with the largest errors that are drawn, the worst first."""
-        count = int(np.clip(len(self.errors) // 10, *DRAWN))
+        count = int(np.clip(len(self.errors) // 10, DRAWN[0], max(self.drawn, DRAWN[0])))
         return [int(k) for k in np.argsort(-self.errors.max(axis=1), kind="stable")[:count]]
 
 
 def prove(
     bundle: Bundle, config: ReferenceConfig, design: Design, taught: TraceSet, *, count: int, workers: int,
-    tolerance: float = 0.01, until: float = inf, progress: Progress | None = None,
+    tolerance: float = 0.01, until: float = inf, drawn: int = DRAWN[1], progress: Progress | None = None,
 ) -> tuple[Proof, JudgementRecord]:  # fmt: skip
     """Run reference and surrogate on new random experiments.
 
@@ -174,6 +177,7 @@ def prove(
         tolerance: Share of the range.
         until: The time of ``time.monotonic`` by which reference and surrogate have been run; the first
             :data:`FEWEST` are whatever the time.
+        drawn: How many of the worst are drawn, at most.
         progress: Told of each run.
 
     Returns:
@@ -182,7 +186,7 @@ def prove(
     Raises:
         ConfigError: If none of the experiments gave a record.
     """
-    cases = drawn(config, design, count, seed=(design.seed, SEED), prefix="N")
+    cases = drawn_cases(config, design, count, seed=(design.seed, SEED), prefix="N")
     with ReferenceRuns(config=config, workers=workers) as runs:
         done = runs.run(cases, progress, until=_begun_until(until, bundle, runs, cases[0]), fewest=FEWEST)
     there = [one for one in done if one.trace is not None]
@@ -206,7 +210,7 @@ def prove(
     proof = Proof(
         errors=np.array(errors), largest=np.array(largest), outcomes=there, failed=len(done) - len(there),
         why=reasons_of(done), tolerance=tolerance, outputs=outputs, spans=spans, surrogate_s=max(spent, 1e-7),
-        reference_s=float(np.nanmean([one.cpu_s for one in there])), **dropped,
+        reference_s=float(np.nanmean([one.cpu_s for one in there])), drawn=min(drawn, DRAWN[1]), **dropped,
     )  # fmt: skip
     return proof, proof.record([runs_of[k] for k in proof.worst])
 

@@ -29,7 +29,7 @@ from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import finish_s, page_s, span
+from sysid.workbench.auto.finish import drawn_in, finish_s, page_s, span
 from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import resets_of, span_of
 from sysid.workbench.auto.run import Searched, auto_of
@@ -172,7 +172,7 @@ class Work:
         if self.config.fits:
             self.fitted(found, minutes)
             return place, []
-        searched = self.searched(found, minutes, partial(proving, place) if self.growth is None else None)
+        searched = self.searched(found, minutes, partial(proving, place) if self.growth is None else None, whole=whole)
         said = [searched.hurried] if searched.hurried else []
         if self.growth is not None:
             place, brought = self.grown(found, searched, seconds=None if self.iterations else GROWING * 60.0 * whole)
@@ -214,14 +214,16 @@ class Work:
         begun = beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if moving else []
         return [*begun, *without_effect(bundle, found.traces.with_role(Role.ESTIMATION))]
 
-    def searched(self, found: Experimented, minutes: float, before_page: Callable[[], object] | None) -> Searched:
-        """A model that is looked for."""
+    def searched(
+        self, found: Experimented, minutes: float, before_page: Callable[[], object] | None, *, whole: float
+    ) -> Searched:
+        """A model that is looked for in some minutes, of the whole."""
         fields: dict[str, Any] = {
             **{"kind": "auto", "name": "model", "data": str((self.place / DATASET).resolve())},
             **{"mapping": self.mapping, "start": Start(), "rest": dict(found.before), "seed": self.seed},
             **({"iterations": self.iterations} if self.iterations else {"minutes": minutes}),
             **{"workers": self.config.workers, "tolerance": TOLERANCE},
-            **{"export": EXPORT},
+            **{"export": EXPORT, "report": {"drawn": drawn_in(60.0 * whole, len(self.mapping.outputs))}},
         }
         search = check(AutoConfig, fields, where=self.pipeline)
         auto = replace(auto_of(search, load=lambda: data_of(found.traces, self.mapping)), before_page=before_page)
@@ -253,7 +255,7 @@ class Proving:
     count: int
     workers: int
     ends: float
-    search_s: float
+    whole_s: float
     watch: Watcher
     done: dict[Path, Proof] = field(default_factory=dict)
 
@@ -261,11 +263,12 @@ class Proving:
         """Prove the bundle in a folder; what time the page takes, which comes after it, is seen now."""
         until = inf
         if np.isfinite(self.ends):
-            until = self.ends - page_s(len(self.taught), len(self.reference.outputs), self.search_s)
+            until = self.ends - page_s(len(self.taught), len(self.reference.outputs), self.whole_s)
         self.watch(StepStarted(step=PROVING))
         proof, section = prove(
             read_bundle(place / "bundle"), self.reference, self.design, self.taught, count=self.count,
             workers=self.workers, tolerance=TOLERANCE, until=until, progress=self._progress,
+            drawn=drawn_in(self.whole_s, len(self.reference.outputs)),
         )  # fmt: skip
         (place / FOLDER).mkdir(exist_ok=True)
         write_record(place / FOLDER / "proof.json", section)

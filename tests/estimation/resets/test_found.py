@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import sysid
-from sysid.estimation.resets import ResetMap, found_resets, grey_box_of
+from sysid.estimation.resets import ResetMap, derived_from, found_resets, grey_box_of
 from sysid.estimation.resets.found import simplest
 from sysid.models import Mapping, Start
 
@@ -113,6 +113,27 @@ def test_the_events_are_those_of_the_reference() -> None:
     assert walls is not None
     assert sorted((one.output, one.level) for one in walls.guards) == [(0, -1.0), (0, 2.0)]
     assert walls.rest is None
+
+
+def test_an_output_in_another_unit_is_written_beside_the_others() -> None:
+    """As the height in feet of the ball of FMI 3.0; it stands between the two that are the state."""
+    rng = np.random.default_rng(0)
+    own = [(u, ball(10)(u)) for u in (held(rng, 0.6, 0.9, 300) for _ in range(12))]
+    outputs = [np.column_stack([y[:, 0], 3.28084 * y[:, 0] + 2.0, y[:, 1]]) for _, y in own]
+    derived = derived_from(np.concatenate(outputs))
+    assert list(derived) == [1]
+    np.testing.assert_allclose(derived[1], [3.28084, 0.0, 2.0], atol=1e-9)
+    found, mapping = found_resets(own), Mapping.parse("e -> h+feet+v")
+    assert found is not None
+    record = sysid.data(
+        {"r": (own[0][0][:, 0], outputs[0])}, inputs="e", outputs=mapping.outputs, sample_time=0.01,
+        split=["estimation"],
+    )  # fmt: skip
+    grey = grey_box_of(found, mapping, {"feet": derived[1]})
+    fit = sysid.fit(record, mapping, grey, start=Start(), rest_output={"h": 1.0, "feet": 5.28084, "v": 0.0})
+    run = found.run(own[0][0])
+    expected = np.column_stack([run[:, 0], 3.28084 * run[:, 0] + 2.0, run[:, 1]])
+    np.testing.assert_allclose(fit.simulate(own[0][0][:, 0]), expected, atol=1e-9)
 
 
 def smooth(inputs: Array) -> Array:

@@ -8,7 +8,7 @@ from sysid.field_checks import check
 from sysid.models import ARX
 from sysid.reporting.fit_tables import DRAWN
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import DRAWING_S, FEWEST, PICTURE_S, SLOWEST_PACE, finish_s, pace, time_told
+from sysid.workbench.auto.finish import DRAWING_S, PICTURE_S, SLOWEST_PACE, drawn_in, finish_s, pace, time_told
 
 SEARCH = {"kind": "auto", "name": "a", "data": "rig", "mapping": "u -> a+b+c+d+e"}
 STRUCTURE = ARX(na=1, nb=(1,), nk=(1,))
@@ -17,7 +17,8 @@ STRUCTURE = ARX(na=1, nb=(1,), nk=(1,))
 @pytest.mark.parametrize(
     ("given", "drawn"),
     [
-        ({"minutes": 0.5}, FEWEST),
+        ({"minutes": 0.5}, 2),
+        ({"minutes": 0.1}, 1),
         ({"minutes": 10.0}, DRAWN),
         ({"iterations": 100}, DRAWN),
         ({"minutes": 0.5, "report": {"drawn": 7}}, 7),
@@ -30,7 +31,7 @@ def test_how_many_cases_are_drawn_is_decided_by_the_time_or_said(given: dict[str
 
 def test_pictures_that_are_not_drawn_take_no_time() -> None:
     long, short = finish_s(40, 5, slowed=1.0, paced=1.0), finish_s(40, 5, 30.0, slowed=1.0, paced=1.0)
-    assert long - short == pytest.approx(2.0 * PICTURE_S * 5 * (DRAWN - FEWEST))
+    assert long - short == pytest.approx(2.0 * PICTURE_S * 5 * (DRAWN - drawn_in(30.0, 5)))
 
 
 def test_what_follows_is_planned_by_what_this_machine_takes_for_a_picture() -> None:

@@ -115,6 +115,20 @@ def test_the_least_linear_structures_are_tried_whatever_the_time_until_one_can_b
     assert plan.hurried
 
 
+def test_in_motion_one_network_is_tried_whatever_the_time_and_equations_of_events_before_it() -> None:
+    """On a busy machine a ball, whose equations were found, had a linear model that begins at rest."""
+    events = VectorGreyBox(equations="y = where(before >= 1, 0, before + u)\nbefore[k+1] = y", initial={"before": 0})
+    for resets, first, hurried in ((None, "NSS", True), (events, "VectorGreyBox", False)):
+        budget = Budget(wall_s=1.0, iterations=None, clock=lambda: 1000.0, is_stored=lambda _: False)
+        looked = replace(LOOKED, in_motion=True, resets=resets)
+        plan = Plan(looked=looked, budget=budget, error=error)
+        (point,) = plan.ask()
+        assert point.structure.kind.endswith(first)
+        plan.tell([trial(point, 1.0)])
+        assert plan.ask() == []
+        assert plan.hurried is hurried
+
+
 def test_curves_and_polynomials_are_tried_beside_networks() -> None:
     _, rounds = searched(lambda _: 1.0)
     # The least of each kind tells what the others of it cost; what takes several times as long waits.
