@@ -28,7 +28,7 @@ from sysid.reporting.fit_tables import (
     told_of_drawn,
 )
 from sysid.reporting.growth import growth_section
-from sysid.reporting.judging.document import judgement_sections
+from sysid.reporting.judging.document import judgement_points, judgement_sections
 from sysid.reporting.numbers import quantity
 from sysid.reporting.orders_view import orders_section
 from sysid.reporting.overview import overview_section
@@ -95,7 +95,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
     sections += [_data(results), *_others(results, signals, columns)]
     comparability = "" if published is None else published.comparability
     found = verdict(results, instants, comparability)
-    points = (*sweep_points(folder, published), *warning_points(results), *found.points)
+    points = (*judgement_points(folder), *sweep_points(folder, published), *warning_points(results), *found.points)
     found = replace(found, points=points)
     return Document(results=results, verdict=found, sections=tuple(sections))
 

@@ -70,6 +70,19 @@ def judgement_sections(folder: Path) -> list[Section]:
     return [_section_of(document, file, index) for index, (file, document) in enumerate(documents)]
 
 
+def judgement_points(folder: Path) -> list[tuple[str, str]]:
+    """What of these stands at the head of the report.
+
+    Args:
+        folder: The run's folder.
+
+    Returns:
+        Title and sentence of each that has one.
+    """
+    found = [(str(one.get("title", "")), one.get("told")) for one in judgement_documents(folder).values()]
+    return [(title, told) for title, told in found if isinstance(told, str) and told]
+
+
 def _section_of(document: Dict[str, Any], where: Path, index: int) -> Section:
     if "tables" in document or "headline" in document:  # version 1, which carries no number
         return ready_section(parse_record(ReadyRecord, document, where=where), index)

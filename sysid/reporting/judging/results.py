@@ -93,6 +93,7 @@ class JudgementRecord(Record):
     reference: dict[str, SceneRecord] = Field(default={}, description="By scene.")
     subjects: dict[str, dict[str, SceneRecord]] = Field(min_length=1, description="By subject and scene.")
     sensitivity: list[SensitivityRecord] = Field(default=[])
+    told: str = Field(default="", description="What stands at the head of a report with other sections, in a sentence.")
 
     @model_validator(mode="after")
     def _named(self) -> JudgementRecord:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,15 @@ def surrogate_command(
         UserError: If the reference cannot be used, or does not say enough.
     """
     listeners = Listeners.of(tracking=tracking)
-    target, command = listeners.target, f"sysid surrogate {shlex.quote(source)} --minutes {minutes:g}"
+    target = listeners.target
+    asked = {
+        "--minutes": f"{minutes:g}",
+        "--proof": proof,
+        "--rounds": rounds,
+        "--workers": workers,
+        "--seed": seed or None,
+    }
+    command = _command(source, wish, {**asked, "--out": out})
 
     def perform(program: Program[Any], place: Path) -> Any:
         return carry_out(program, place, command=command, watchers=listeners.watchers)
@@ -61,3 +70,21 @@ def surrogate_command(
         if path is not None:
             target.print(f"{name + ':':<9}{path}", soft_wrap=True, markup=False)
     return 0
+
+
+def _command(source: str, wish: Wish, asked: Mapping[str, object]) -> str:
+    """The command as it was typed, for who makes it again."""
+
+    def named(name: str) -> str:
+        unit = wish.units.get(name, {})
+        return f"{name} [{' '.join(unit.values())}]" if unit else name
+
+    said = [
+        (flag, f"{named(name)}={low:.12g}:{high:.12g}")
+        for flag, ranges in (("--range", wish.ranges), ("--parameter", wish.parameters))
+        for name, (low, high) in ranges.items()
+    ]
+    said += [("--output", named(name)) for name in wish.outputs]
+    times = {"--sample-time": wish.sample_time, "--duration": wish.duration}
+    said += [(flag, str(value)) for flag, value in {**times, **asked}.items() if value is not None]
+    return shlex.join(["sysid", "surrogate", source, *(word for pair in said for word in pair)])

@@ -142,7 +142,8 @@ class Proof:
             percents |= {f"max {n}": 100.0 * float(self.largest[k, j]) for j, n in enumerate(self.outputs)}
             subject[name] = self._scene(one.trace.time[::step], found[::step], percents)
         return JudgementRecord(
-            title="Proof", method=". ".join(self.sentences()) + f". The {len(subject)} worst are drawn.",
+            title="Proof", told=f"{self.sentences()[0]}.",
+            method=". ".join(self.sentences()) + f". The {len(subject)} worst are drawn.",
             scenes=list(subject), headline_scenes=list(subject)[:1], quantities=quantities, reference=reference,
             subjects={"surrogate": subject},
         )  # fmt: skip

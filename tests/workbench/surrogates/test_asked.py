@@ -14,7 +14,9 @@ from sysid.errors import ConfigError
 from sysid.references.sources import Source
 from sysid.workbench.cli import run_cli
 from sysid.workbench.command_line.surrogates import surrogate as command
+from sysid.workbench.commands.surrogate import _command
 from sysid.workbench.surrogates import asked
+from sysid.workbench.surrogates.asked import wish_of
 
 PROGRAM = "solver --in {inputs} --out {outputs}"
 SAID: tuple[list[str], dict[str, Any]] = (
@@ -136,3 +138,13 @@ def test_a_range_from_python_that_is_none_is_refused(span: Any) -> None:
 def test_a_range_as_typed_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(ConfigError, match="is not a range"):
         asked.wish_of(asked.pairs([text], "--range"), [], [], sample_time=None, duration=None)
+
+
+def test_a_report_has_the_whole_command_that_makes_it_again() -> None:
+    """It left out ranges, parameters and outputs, and was refused as it stood."""
+    wish = wish_of([("u [V]", (0.0, 2.5))], [("tau", (1, 3))], ["y [mm]"], sample_time=0.5, duration=60.0)
+    told = _command("lag.py:lag", wish, {"--minutes": "5", "--proof": 1000, "--rounds": None, "--out": Path("a b")})
+    assert told == (
+        "sysid surrogate lag.py:lag --range 'u [V]=0:2.5' --parameter tau=1:3 --output 'y [mm]' --sample-time 0.5 "
+        "--duration 60.0 --minutes 5 --proof 1000 --out 'a b'"
+    )

@@ -24,7 +24,9 @@ from sysid.references.design import Design, designed
 from sysid.references.proposal import proposed
 from sysid.references.sources import source_of
 from sysid.reporting import report
-from sysid.reporting.judging.results import JudgementRecord
+from sysid.reporting.judging.document import judgement_points
+from sysid.reporting.judging.results import FOLDER, JudgementRecord
+from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.workbench.auto.families import Family, Try
 from sysid.workbench.cli import run_cli
@@ -72,6 +74,16 @@ def test_every_new_experiment_is_within_the_tolerance_of_a_model_that_is_exact(
     assert (proof.share, proof.share_everywhere, proof.diverged, proof.failed) == (1.0, 1.0, 0, 0)
     assert len(section.scenes) == 3, "a tenth of them, but three at least"
     assert "Of 12 new random experiments" in section.method
+
+
+def test_what_a_report_says_first_is_the_share_that_is_within(
+    proven: tuple[Bundle, Proof, JudgementRecord], tmp_path: Path
+) -> None:
+    _, proof, record = proven
+    (tmp_path / FOLDER).mkdir()
+    write_record(tmp_path / FOLDER / "proof.json", record)
+    assert judgement_points(tmp_path) == [("Proof", f"{proof.sentences()[0]}.")]
+    assert f"{100.0 * proof.share:.1f} % are within" in record.told
 
 
 def test_no_experiment_of_the_proof_has_taught(proven: tuple[Bundle, Proof, JudgementRecord]) -> None:
@@ -142,7 +154,7 @@ def test_a_reference_that_never_gives_a_record_is_refused_before_anything_is_wri
     wish = Wish(ranges={"u": (0.0, 2.0)}, parameters={}, outputs=("y",), sample_time=0.5, duration=20.0)
     with pytest.raises(ConfigError, match="gave no record of 3 experiments") as caught:
         written(source_of(f"{tmp_path / 'bug.py'}:bug"), wish, tmp_path / "out", minutes=1.0, workers=1, seed=0)
-    assert "out of bounds for axis 1 with size 1 (bug.py, line 2) (3)" in str(caught.value.got)
+    assert "out of bounds for axis 1 with size 1 (bug.py, line 2) (3 times)" in str(caught.value.got)
     assert not (tmp_path / "out").exists()
 
 
