@@ -60,7 +60,7 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "late": [{**asdict(late), "name": surrogate.channels[late.column].name} for late in surrogate.late],
         "levels": [level_text(surrogate, port.level) for port in surrogate.channels],
         "levels_in_words": [_words(port.level) for port in surrogate.outputs],
-        "places": {port.name: place for place, port in enumerate(surrogate.outputs)},
+        "places": _places(surrogate),
     }
     return {f"{surrogate.identifier}.{end}": render(f"surrogate.{end}.j2", **values) for end in ("h", "c")}
 
@@ -80,6 +80,12 @@ def level_text(surrogate: Surrogate, level: Level) -> str:
     if isinstance(level, str):
         return f"inputs[{[port.name for port in surrogate.inputs].index(level)}]"
     return f"R({c_real(level)})"
+
+
+def _places(surrogate: Surrogate) -> dict[str, int]:
+    """By channel the output that says where it begins: itself, or the one that it follows."""
+    own = {port.name: place for place, port in enumerate(surrogate.outputs)}
+    return own | {name: own[led] for name, led in surrogate.following(own).items()}
 
 
 def _words(level: Level) -> str:

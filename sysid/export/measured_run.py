@@ -143,6 +143,8 @@ def run_measured(
     known: dict[str, NDArray[np.float64]] = {
         port.name: column for port, column in zip(surrogate.inputs, inputs.T, strict=True)
     }
+    # Members of a committee are the same quantity as what follows from them, and begin as it was measured.
+    measured = {**measured, **{name: measured[led] for name, led in surrogate.following(measured).items()}}
     first: dict[str, int] = {}
     for model in surrogate.source.models:
         names, u = model.outputs, _matrix(known, model.inputs, len(inputs))

@@ -9,9 +9,10 @@ whatever can be written as stages runs in every format. How models are wired is 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection, Sequence
 from collections.abc import Mapping as Dict
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
 from sysid.models import AbstractModel, Cascade
 from sysid.models.form import unheeded
 from sysid.models.history import known_inputs
+from sysid.models.rest_levels import leaders, resting
 from sysid.models.wiring import Wiring
 from sysid.names import c_identifier, distinct, written_side
 from sysid.traces import Trace
@@ -133,6 +135,28 @@ class Surrogate:
     def columns(self) -> tuple[int, ...]:
         """Where each output stands among :attr:`channels`."""
         return tuple(len(self.inputs) + self.computed.index(port) for port in self.outputs)
+
+    @cached_property
+    def followers(self) -> dict[int, int]:
+        """What begins where an output does that comes out: its column among :attr:`channels`, and that output's."""
+        columns = {port.name: len(self.inputs) + at for at, port in enumerate(self.computed)}
+        return {columns[name]: columns[led] for name, led in self.following([p.name for p in self.outputs]).items()}
+
+    def following(self, names: Collection[str]) -> dict[str, str]:
+        """What has the level at rest of one of some outputs, whoever says what that is.
+
+        Args:
+            names: The outputs.
+
+        Returns:
+            Of each other one that follows one of them, the nearest.
+        """
+        computed, rest, found = [port.name for port in self.computed], self.source.rest, {}
+        for name in computed:
+            led = [one for one in leaders(name, rest, computed) if one in names]
+            if led and name not in names:
+                found[name] = led[0]
+        return found
 
     @property
     def selects(self) -> bool:
@@ -257,6 +281,7 @@ class Surrogate:
         levels = self.levels(first)
         if outputs is not None:
             levels[list(self.columns)] = outputs
+            levels[list(self.followers)] = levels[list(self.followers.values())]
         return levels[len(self.inputs) :]
 
     def chosen(self, computed: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -343,6 +368,8 @@ def _known_names(names: Sequence[str], computed: Dict[str, Port]) -> tuple[str, 
 def _levels(source: AbstractModel | Cascade, wiring: Wiring) -> dict[str, Level]:
     """Every channel's level; an input without a declared one stands at its own first sample."""
     levels: dict[str, Level] = {name: name for name in wiring.inputs}
+    own: dict[str, float] = {}
     for ends in (lowered_form(model).ends for model in source.models):
-        levels |= dict(zip(ends.outputs, ends.rest_outputs, strict=True))
-    return levels | dict(source.rest)
+        own |= dict(zip(ends.outputs, ends.rest_outputs, strict=True))
+    declared = {name: resting(name, source.rest, own, wiring.outputs) for name in wiring.outputs}
+    return levels | dict(source.rest) | declared

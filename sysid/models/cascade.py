@@ -19,6 +19,7 @@ from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends
 from sysid.models.history import known_inputs
+from sysid.models.rest_levels import leaders, resting
 from sysid.models.to_control import of_wired
 from sysid.models.wiring import Member, Wiring
 from sysid.traces import Trace
@@ -34,8 +35,9 @@ class Cascade:
 
     Args:
         models: The members, in any order; kept in the order in which they run.
-        rest: Level of channels at rest: a value in the channel's unit, or the name of an input whose first sample it is
-            (a reservoir charged at the running pressure). By default an output's is its model's ``rest_output``.
+        rest: Level of channels at rest: a value in the channel's unit, the name of an input whose first sample it is
+            (a reservoir charged at the running pressure), or of an output whose level it is, whoever sets that. By
+            default an output's is its model's ``rest_output``.
         limits: Limits of outputs, by channel; those of a member are its own where nothing is declared here.
 
     Raises:
@@ -71,7 +73,8 @@ class Cascade:
         _check_names("limits", self.limits, wiring.outputs)
         for name, level in self.rest.items():
             if isinstance(level, str):
-                _check_names(f"rest of {name}", [level], wiring.inputs)
+                _check_names(f"rest of {name}", [level], wiring.channels if name in wiring.outputs else wiring.inputs)
+            leaders(name, self.rest, wiring.outputs)  # which end
         for i, name in enumerate(wiring.outputs):
             _check_names(
                 f"limits of {name}",
@@ -185,6 +188,10 @@ class Cascade:
         limits = {name: limit for name, limit in self.limits.items() if name in wanted}
         # A given channel begins where its record does if the channel that it would rest at is no longer there.
         there = {name: level for name, level in self.rest.items() if name in channels}
+        # What followed an output that is no longer there has that output's level.
+        there = {
+            name: level if level in channels or name in given else self.level(name) for name, level in there.items()
+        }
         rest = {name: level for name, level in there.items() if not isinstance(level, str) or level in channels}
         return Cascade(models=models, rest=rest, limits=limits)
 
@@ -226,21 +233,33 @@ class Cascade:
             ChannelError: If a level names a channel that it cannot.
         """
         start = dict(zip(self.inputs, map(float, first), strict=True))
-        own = {
-            name: level
-            for end in map(Ends.of, self.models)
-            for name, level in zip(end.outputs, end.rest_outputs, strict=True)
-        }
+        own = start | self._own_levels
         declared = {**self.rest, **(rest or {})}
         _check_names("rest", declared, self.wiring.channels)
         levels = []
         for name in self.wiring.channels:
-            level = declared.get(name, start.get(name, own.get(name, 0.0)))
+            level = resting(name, declared, own, self.outputs)
             if isinstance(level, str):
                 _check_names(f"rest of {name}", [level], self.inputs)
                 level = start[level]
             levels.append(float(level))
         return np.array(levels)
+
+    @cached_property
+    def _own_levels(self) -> dict[str, float]:
+        ends = map(Ends.of, self.models)
+        return {name: level for end in ends for name, level in zip(end.outputs, end.rest_outputs, strict=True)}
+
+    def level(self, output: str) -> Level:
+        """Where an output is declared to be at rest.
+
+        Args:
+            output: The output.
+
+        Returns:
+            A value in its unit, or the input whose first sample it is.
+        """
+        return resting(output, self.rest, self._own_levels, self.outputs)
 
     def simulate(self, inputs: NDArray[np.float64], *, rest: Dict[str, Level] | None = None) -> CascadeRun:
         """Free run of the whole from its inputs alone.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.composite import committee, doubt_figures, doubt_threshold
-from sysid.errors import ConfigError
+from sysid.errors import ChannelError, ConfigError
 from sysid.export import Flag, Surrogate, expected_flags
 from sysid.models import Cascade, Limit
 from sysid.models.store import cascade_from_dict
@@ -59,6 +59,76 @@ def test_it_answers_as_its_first_member_does() -> None:
     np.testing.assert_allclose(
         run["AR_apart"], np.clip(run["AR"] - 0.5 * (run["AR_2"] + run["AR_3"]), -0.5, 0.5), atol=1e-12
     )
+
+
+@pytest.mark.parametrize("mean", [(), ("AR", "BP")], ids=["the first answers", "the mean"])
+def test_where_an_output_is_said_to_begin_all_its_wholes_begin(mean: tuple[str, ...]) -> None:
+    handle = measured(0, WHOLES[0])["STP"][:, None]
+    begun = {"AR": 60.0, "BP": 65.0}
+    both = committee(WHOLES, {"AR": 0.5}, mean=mean)
+    alone = [one.simulate(handle, rest=begun)["AR"] for one in WHOLES]
+    assert not np.allclose(alone[1], WHOLES[1].simulate(handle)["AR"], atol=0.1)
+    expected = np.mean(alone, axis=0) if mean else alone[0]
+    run = both.simulate(handle, rest=begun)
+    np.testing.assert_allclose(run["AR"], expected, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(run["AR_3"], alone[2])
+    surrogate = Surrogate.of(both, outputs=["BP", "AR"])
+    np.testing.assert_array_equal(surrogate.simulate(handle, np.array([65.0, 60.0]))[:, 1], run["AR"])
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_a_mean_answers_as_all_do_and_its_spread_is_how_far_they_are_apart(count: int) -> None:
+    wholes = [whole(seed) for seed in range(count)]
+    handle = measured(0, wholes[0])["STP"][:, None]
+    both = committee(wholes, {"AR": 0.5}, mean=["BP", "AR"])
+    run, twin = both.simulate(handle), simulate_cascade(both, handle)
+    for name in ("BP", "AR"):
+        alone = np.stack([one.simulate(handle)[name] for one in wholes])
+        np.testing.assert_allclose(run[name], alone.mean(axis=0), rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(run[f"{name}_spread"], np.ptp(alone, axis=0), rtol=0.0, atol=1e-12)
+        np.testing.assert_array_equal(run[f"{name}_1"], alone[0])
+    np.testing.assert_allclose(twin["AR_spread"], run["AR_spread"], rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(run["AR_apart"], np.minimum(run["AR_spread"], 0.5))
+    assert (run["AR"] <= run["BP"]).all()  # a limit that is an averaged channel is kept
+    surrogate = Surrogate.of(both, outputs=["AR"])
+    flags = expected_flags(surrogate, handle, surrogate.compute(handle))
+    np.testing.assert_array_equal((flags & Flag.IN_DOUBT) > 0, run["AR_spread"] >= 0.5)
+    assert cascade_from_dict(both.to_dict()).to_dict() == both.to_dict()
+
+
+def test_a_mean_of_plain_models_may_be_one_of_a_committee_itself() -> None:
+    models = [network("STP -> BP", seed=seed) for seed in (1, 2, 3)]
+    handle = measured(0, WHOLES[0])["STP"][:, None]
+    inner = committee(models[:2], mean=["BP"])
+    outer = committee([models[2], inner], {"BP": 1.0})
+    run, alone = outer.simulate(handle), [one.simulate(handle) for one in models]
+    np.testing.assert_allclose(run["BP_2"], 0.5 * (alone[0] + alone[1]), rtol=0.0, atol=1e-12)
+    begun = outer.simulate(handle, rest={"BP": 50.0})
+    np.testing.assert_array_equal(begun["BP_2_2"], inner.simulate(handle, rest={"BP": 50.0})["BP_2"])
+
+
+def test_one_system_is_at_rest_at_one_level() -> None:
+    other = Cascade(models=WHOLES[1].models, rest={"BP": "STP", "AR": 12.0}, limits=WHOLES[1].limits)
+    with pytest.raises(ConfigError, match="AR at rest at different levels"):
+        committee([WHOLES[0], other], mean=["AR"])
+    both = committee([WHOLES[0], other], mean=["AR"], rest={"AR": 30.0})
+    assert both.level("AR") == both.level("AR_1") == both.level("AR_2") == 30.0
+    with pytest.raises(ChannelError, match="BP"):
+        committee(WHOLES, mean=["AR"], rest={"BP": 30.0})
+
+
+def test_the_figures_of_a_mean_are_those_of_its_spread() -> None:
+    traces = [measured(seed, WHOLES[0], apart=5.0) for seed in range(4)]
+    found = doubt_threshold(WHOLES, traces, "AR", error=1.0, false=0.25, mean=True)
+    both = committee(WHOLES, {"AR": found}, mean=["AR"])
+    figures = doubt_figures(both, traces, "AR", error=1.0)
+    runs = [both.simulate_trace(trace) for trace in traces]
+    spread = np.concatenate([run["AR_spread"] for run in runs])
+    wrong = np.abs(np.concatenate([run["AR"] - trace["AR"] for run, trace in zip(runs, traces, strict=True)])) > 1.0
+    assert 0.0 < wrong.mean() < 1.0
+    assert figures.wrong == wrong.mean()
+    assert figures.flagged == np.mean(spread[wrong] >= found)
+    assert figures.false == pytest.approx(0.25, abs=0.02)
 
 
 def test_the_slow_twin_agrees() -> None:
@@ -120,6 +190,12 @@ def test_the_figures_are_shares_of_wrong_and_of_right_answers() -> None:
 def test_what_is_no_committee_is_refused(wholes: list, thresholds: dict, said: str) -> None:
     with pytest.raises(ConfigError, match=said):
         committee(wholes, thresholds)
+
+
+@pytest.mark.parametrize("asked", [{"each": True}, {"thresholds": {"BP": 1.0}}, {"mean": ["AR", "AR"]}])
+def test_a_mean_is_doubted_by_its_spread_alone(asked: dict) -> None:
+    with pytest.raises(ConfigError, match="doubted by the spread"):
+        committee(WHOLES, **{"mean": ["AR"], **asked})
 
 
 def test_figures_of_what_is_not_judged_and_thresholds_without_a_right_answer_are_refused() -> None:

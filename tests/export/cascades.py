@@ -173,8 +173,8 @@ def build_equations() -> Cascade:
     )  # fmt: skip
 
 
-def build_committee(count: int = 3, threshold: float = 1.0) -> Cascade:
-    """Pairs of models of the same outputs: a channel limits an output in each, and one judges the first."""
+def build_committee(count: int = 3, threshold: float = 1.0, *, mean: bool = False) -> Cascade:
+    """Pairs of models of the same outputs: a channel limits an output in each, and one judges the first, or all."""
     structure = NARX(input_delays="0:1", output_delays=1, neurons=4)
     wholes = [
         Cascade(
@@ -187,7 +187,7 @@ def build_committee(count: int = 3, threshold: float = 1.0) -> Cascade:
         )
         for seed in range(1, count + 1)
     ]
-    return committee(wholes, {"BC": threshold})
+    return committee(wholes, {"BC": threshold}, mean=["BP", "BC"] if mean else ())
 
 
 CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
@@ -197,7 +197,7 @@ CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
     "some outputs, in another order": (build_limited, ("BC", "AR")),
     "one output of a circle": (build_circle, ("ER",)),
     "equations in a circle": (build_equations, None),
-    "a committee": (build_committee, ("BC",)),
+    "a mean of three": (partial(build_committee, 3, 1.0, mean=True), ("BC_spread", "BP", "BC")),
     "a committee of four": (partial(build_committee, 4, 0.5), ("BC",)),
 }
 """Models wired, and which outputs leave them."""

@@ -135,7 +135,8 @@ def test_an_output_may_limit_the_next_one_of_its_model_and_not_the_one_before():
     ("fields", "match"),
     [
         pytest.param({"rest": {"XX": 1.0}}, "missing channel XX", id="rest of a stranger"),
-        pytest.param({"rest": {"AR": "BP"}}, "missing channel BP", id="rest at the level of an output"),
+        pytest.param({"rest": {"AR": "XX"}}, "missing channel XX", id="rest at the level of a stranger"),
+        pytest.param({"rest": {"STP": "BP"}}, "missing channel BP", id="an input at the level of an output"),
         pytest.param({"limits": {"STP": Limit(low=0.0)}}, "missing channel STP", id="limits of an input"),
         pytest.param({"limits": {"BP": Limit(high="XX")}}, "missing channel XX", id="limit that is a stranger"),
     ],
@@ -159,6 +160,21 @@ class TestRest:
         assert_array_equal(elsewhere.values, declared.simulate(u).values)
         # The reservoir is charged at the handle's first position, not at where it stood before.
         assert declared.levels(u[0]).tolist() == [80.0, u[0, 0], 70.0, 0.0]
+
+    def test_an_output_may_have_the_level_of_another_wherever_that_begins(self):
+        follows = replace(service(), rest={"BP": "STP", "AR": "BP", "BC": "AR"})
+        u = command()
+        assert follows.levels(u[0]).tolist() == [u[0, 0]] * 4
+        assert follows.levels(u[0], {"BP": 70.0}).tolist() == [u[0, 0], 70.0, 70.0, 70.0]
+        assert follows.levels(u[0], {"BP": 70.0, "AR": 60.0}).tolist() == [u[0, 0], 70.0, 60.0, 60.0]
+        part = follows.upstream_of(["AR"], given=["BP"])
+        assert part.rest == {"AR": "BP"} and part.levels(np.array([65.0])).tolist() == [65.0, 65.0]
+        with pytest.raises(ConfigError, match="follow each other in a circle"):
+            replace(service(), rest={"BP": "AR", "AR": "BC", "BC": "BP"})
+
+    def test_a_part_without_the_output_that_one_follows_begins_at_the_same_level(self):
+        beside = Cascade(models=(linear("STP -> BP"), linear("STP -> AR")), rest={"BP": 12.0, "AR": "BP"})
+        assert beside.upstream_of(["AR"]).rest == {"AR": 12.0}
 
     def test_nothing_is_taken_from_a_measured_output(self):
         cascade, u = service(), command()

@@ -166,7 +166,7 @@ class Table:
         first = {
             channel["name"]: value for channel, value in zip(about["inputs"], inputs[0] + 0.0 * inputs[0], strict=True)
         }
-        rest = {name: first.get(level, level) for name, level in start["levels"].items()} | moved
+        rest = {name: first.get(level, level) for name, level in start["levels"].items()} | self._followed(moved)
         heeded = set()
         state = np.zeros(about["state"]["size"])
         for line in about["state"]["lines"]:
@@ -193,6 +193,17 @@ class Table:
         if strangers := set(moved) - heeded:
             raise ValueError(f"{', '.join(strangers)} at rest: this surrogate does not remember it; leave it out")
         return state
+
+    def _followed(self, moved: dict[str, float]) -> dict[str, float]:
+        """The same with what is declared to begin where one of them does, as the members of a committee."""
+        declared, found = self.about["model"].get("rest") or {}, dict(moved)
+        for name in declared:
+            walk = [name]
+            while walk[-1] not in moved and isinstance(level := declared.get(walk[-1]), str) and level not in walk:
+                walk.append(level)
+            if walk[-1] in moved:
+                found[name] = moved[walk[-1]]
+        return found
 
 
 def _load_pyfunc(path: str) -> Table:

@@ -16,7 +16,7 @@ from sysid.models import NARX, AbstractModel, Cascade, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.units import Reference
 from sysid.workbench.tracking.served_table import Table
-from tests.export.cascades import build_limited
+from tests.export.cascades import build_committee, build_limited
 from tests.export.grey_boxes import GREY_BOXES
 from tests.export.single_models import build_arx, build_narx
 
@@ -97,6 +97,16 @@ def test_an_output_may_stand_elsewhere_before_the_first_row(tmp_path: Path) -> N
     found = table.predict(frame, {"BC_at_rest": 30.0, "state": []})
     expected = surrogate.simulate(frame.to_numpy(), np.array([30.0]))
     np.testing.assert_allclose(found.to_numpy()[:, :1], expected, rtol=0.0, atol=1e-9)
+
+
+def test_all_members_of_a_mean_stand_where_it_is_said_to_stand(tmp_path: Path) -> None:
+    whole = build_committee(2, mean=True)
+    surrogate, table, frame = opened(whole, tmp_path)
+    found = table.predict(frame, {"BC_at_rest": 41.0})
+    expected = whole.simulate(frame.to_numpy(), rest={"BC": 41.0})
+    names = [port.name for port in surrogate.outputs]
+    assert expected["BC_2"][0] != whole.simulate(frame.to_numpy())["BC_2"][0]
+    np.testing.assert_allclose(found.to_numpy()[:, names.index("BC_2")], expected["BC_2"], rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,59 @@
+"""Levels at rest that are another output's: the same quantity twice, as the members of a committee have it.
+
+Whoever says where an output begins says it of all that follow it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from collections.abc import Mapping as Dict
+
+from sysid.errors import ConfigError
+
+
+def leaders(name: str, rest: Dict[str, float | str], outputs: Collection[str]) -> list[str]:
+    """The outputs whose level a channel has, the nearest first.
+
+    Args:
+        name: The channel.
+        rest: Levels by channel: a value, or the name of the channel whose level it is.
+        outputs: The outputs.
+
+    Returns:
+        Their names; none of a channel with a level of its own, or an input's.
+
+    Raises:
+        ConfigError: If channels follow each other in a circle.
+
+    Example:
+        >>> leaders("y_2", {"y_2": "y", "y": "u"}, ["y", "y_2"]), leaders("y", {"y": "u"}, ["y"])
+        (['y'], [])
+    """
+    walk = [name]
+    while isinstance(level := rest.get(walk[-1]), str) and level in outputs:
+        walk.append(level)
+        if level in walk[:-1]:
+            raise ConfigError(
+                "levels at rest follow each other in a circle",
+                where=f"rest of {name}",
+                expected="a value, an input, or an output with a level of its own",
+                got=" -> ".join(walk),
+                remedy="give one of them a value",
+            )
+    return walk[1:]
+
+
+def resting(name: str, rest: Dict[str, float | str], own: Dict[str, float], outputs: Collection[str]) -> float | str:
+    """An output's level, through all whose level it has.
+
+    Args:
+        name: The output.
+        rest: As in :func:`leaders`.
+        own: Levels of outputs of which nothing is declared.
+        outputs: The outputs.
+
+    Returns:
+        A value, or the input whose first sample it is.
+    """
+    last = [name, *leaders(name, rest, outputs)][-1]
+    return rest.get(last, own.get(last, 0.0))
