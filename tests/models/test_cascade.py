@@ -23,7 +23,7 @@ from sysid.models import (
     cascade_from_dict,
     simulate_family,
 )
-from sysid.models.cascade_batch import MIN_LANES
+from sysid.models.cascade_batch import MIN_LANES, MOST_NEURONS
 from sysid.models.orthonormal_basis import basis_of, numerators
 from sysid.testing import simulate_cascade
 from sysid.traces import Channel, Trace
@@ -292,6 +292,15 @@ def test_records_in_lockstep_are_the_records_one_by_one(name):
 @pytest.mark.parametrize("n", [1, 5, MIN_LANES])
 def test_few_records_are_the_records_one_by_one(n):
     check_records(CASCADES["limits"], np.stack([command(seed=seed) for seed in range(n)]), workers=1)
+
+
+@pytest.mark.parametrize("neurons", [0, MOST_NEURONS + 1])
+def test_many_records_of_networks_for_which_lockstep_does_not_pay_are_run_one_by_one(neurons):
+    cascade = Cascade(models=(network("STP -> BP", neurons=neurons), network("BP -> BC", seed=3, neurons=neurons)))
+    inputs = np.stack([command(seed=seed) for seed in range(MANY)])
+    batch = cascade.simulate_batch(inputs)
+    for i in (0, MANY - 1):
+        assert_array_equal(batch.values[i], cascade.simulate(inputs[i]).values)
 
 
 def test_many_records_of_a_model_with_a_state_of_its_own():
