@@ -15,8 +15,8 @@
   are doubted there; then per unseen kind the share of samples with an error over ``--error=`` psi, how many of these
   are in doubt, and how many of the others.
 * With ``--perturb=`` psi each of them with itself, what its relay reads of the pipe moved up and down by so much.
-* With ``--mean=1`` each of them, and the mean of what all of them answer: of all samples the share with an error over
-  ``--error=`` psi, on the calibration and the unseen sequences.
+* With ``--mean=1`` each of them, and the committee that answers with the mean of all: of all samples the share with an
+  error over ``--error=`` psi, on the calibration and the unseen sequences, and how many of these its spread doubts.
 * With ``--cost=1`` what a doubt costs: size and run time of the files of each whole, alone and as a committee's first.
 
 Making the traces takes some 2 s of processor time each, once.
@@ -27,6 +27,7 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -88,7 +89,7 @@ def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: f
         for kind, one in found.by_kind.items():
             print(f"  {kind:<10} {100 * one.within:5.1f} %  median {one.quantiles[0.5]:.2f} psi, {one.lost} diverge")
     if option("mean", 0.0):
-        mean(wholes, {**{f"({kind})": traces for kind, traces in known.items()}, **unseen}, error)
+        mean(wholes, known, unseen, error)
     calibration = [trace for traces in known.values() for trace in traces]
     for name in named() if by or len(wholes) > 1 else ():
         others = [whole for other, whole in wholes.items() if other != name]
@@ -104,23 +105,37 @@ def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: f
         of = {
             kind: doubt_figures(both, traces, OUTPUT, error=error) for kind, traces in {**known_kinds, **unseen}.items()
         }
-        for kind, figures in {**of, "all unseen": together([of[kind] for kind in unseen])}.items():
-            print(f"  {kind:<12} {100 * figures.wrong:5.1f} {100 * figures.flagged:5.1f} {100 * figures.false:5.1f}")
+        report(of, tuple(unseen))
 
 
-def mean(wholes: dict[str, Cascade], sequences: dict[str, list[Trace]], error: float) -> None:
-    """Print how many samples are wrong of each whole, and of the mean of all of them."""
-    wrong: dict[str, dict[str, list[float]]] = {name: {} for name in (*wholes, "their mean")}
-    for kind, traces in sequences.items():
-        for trace in traces:
-            runs = {name: whole.simulate_trace(trace)[OUTPUT] for name, whole in wholes.items()}
-            runs["their mean"] = np.mean(list(runs.values()), axis=0)
-            for name, run in runs.items():
-                wrong[name].setdefault(kind, []).append(100.0 * float(np.mean(np.abs(run - trace[OUTPUT]) > error)))
-    for name, of in wrong.items():
-        unseen = np.mean([share for kind, shares in of.items() if not kind.startswith("(") for share in shares])
-        told = ", ".join(f"{kind} {np.mean(shares):.2f}" for kind, shares in of.items())
-        print(f"{name}: samples off by more than {error:g} psi, %: all unseen {unseen:.2f}; {told}")
+def mean(
+    wholes: dict[str, Cascade], known: dict[str, list[Trace]], unseen: dict[str, list[Trace]], error: float
+) -> None:
+    """Print how many samples are wrong of each whole and of the mean of all, and how many its spread doubts."""
+    calibration = [trace for traces in known.values() for trace in traces]
+    threshold = doubt_threshold(list(wholes.values()), calibration, OUTPUT, error=error, mean=True)
+    both = committee(list(wholes.values()), {OUTPUT: threshold}, mean=[OUTPUT])
+    sequences = {**{f"({kind})": traces for kind, traces in known.items()}, **unseen}
+    print(f"samples with an error over {error:g} psi, %")
+    for name, whole in {**wholes, "their mean": both}.items():
+        wrong = {
+            kind: [
+                100.0 * float(np.mean(np.abs(whole.simulate_trace(one)[OUTPUT] - one[OUTPUT]) > error)) for one in some
+            ]
+            for kind, some in sequences.items()
+        }
+        told = ", ".join(f"{kind} {np.mean(shares):.2f}" for kind, shares in wrong.items())
+        print(f"  {name}: all unseen {np.mean([share for kind in unseen for share in wrong[kind]]):.2f}; {told}")
+    print(f"their mean, in doubt from a spread of {threshold:.2f} psi: wrong, of these in doubt, of the others, %")
+    report(
+        {kind: doubt_figures(both, traces, OUTPUT, error=error) for kind, traces in sequences.items()}, tuple(unseen)
+    )
+
+
+def report(of: dict[str, DoubtFigures], unseen: Sequence[str]) -> None:
+    """Print how much is wrong, and in doubt, by kind."""
+    for kind, figures in {**of, "all unseen": together([of[kind] for kind in unseen])}.items():
+        print(f"  {kind:<12} {100 * figures.wrong:5.1f} {100 * figures.flagged:5.1f} {100 * figures.false:5.1f}")
 
 
 def cost(alone: Cascade, both: Cascade) -> None:
