@@ -106,7 +106,21 @@ def _asked(
     without, with_them = float(z[columns - q :].sum()), float(z[columns:].sum())
     # What is exact but for rounding has no curve.
     share = 1.0 - with_them / without if without > ROUNDING * rows else 0.0
-    return StateCurve(share=beyond_chance(share, free + q, free), p=by_chance(share, q, free), samples=samples)
+    found = StateCurve(share=beyond_chance(share, free + q, free), p=by_chance(share, q, free), samples=samples)
+    if not found.sure:
+        return found
+    # What is slow beside the record is explained by any other slow thing: not in its other half.
+    return replace(found, share=min(found.share, _in_other_half(np.concatenate(blocks), columns - q)))
+
+
+def _in_other_half(block: NDArray[np.float64], linear: int) -> float:
+    """Share that curves, weighed in one half, explain of what a linear equation leaves in the other; of both halves."""
+    half, left = len(block) // 2, np.zeros(2)
+    for known, asked in ((block[:half], block[half:]), (block[half:], block[:half])):
+        for k, width in enumerate((linear, block.shape[1] - 1)):
+            weights = np.linalg.lstsq(known[:, :width], known[:, -1], rcond=None)[0]
+            left[k] += float(np.sum((asked[:, -1] - asked[:, :width] @ weights) ** 2))
+    return 1.0 - float(left[1] / max(left[0], 1e-300))
 
 
 def _curves(past: NDArray[np.float64], acting: list[NDArray[np.float64]]) -> NDArray[np.float64]:

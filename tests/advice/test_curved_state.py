@@ -111,3 +111,13 @@ def test_nor_has_one_that_drifts_and_is_disturbed() -> None:
     v = lfilter([1.0], [1.0, -0.99], rng.standard_normal(N))
     found = looked(u, np.asarray(lfilter([0.0, 0.2, 0.1], [1.0, -1.5, 0.7], u)) + 0.1 * v, 0.1, 0.05)
     assert found.find("linearity.curved_state") is None
+
+
+@pytest.mark.parametrize("seed", range(3, 9))
+def test_nor_has_one_that_adds_up_twice_and_is_slow_beside_its_record(seed: int) -> None:
+    """Its velocity goes with anything slow, cubes of its own output too, but not so in the other half."""
+    rng = np.random.default_rng([7, seed])
+    u = np.repeat(np.random.default_rng(seed).choice([-1.0, 1.0], 160), 25)
+    y = np.cumsum(np.cumsum(u - u.mean())) * 1e-6 + 1e-4 * rng.standard_normal(4_000)
+    found = sysid.advise(sysid.data((u, y), sample_time=1e-3), "u -> y")
+    assert found.find("linearity.curved_state") is None
