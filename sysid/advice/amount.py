@@ -39,10 +39,10 @@ def check_amount(record: Record) -> Iterator[Finding]:
         figures = {"seen": SEEN}
         yield Finding(topic=Topic.AMOUNT, code="amount.part", verdict=Verdict.FINE, figures=figures)
     if usable < total:
-        share = 1.0 - usable / total
+        share, known = 1.0 - usable / total, sum(map(len, record.runs))
         yield Finding(
             topic=Topic.AMOUNT,
-            code="amount.masked",
+            code="amount.masked_output" if known == total else "amount.masked",
             verdict=Verdict.LOOK if share > MANY_MASKED or longest < FEW else Verdict.NOTE,
             figures={"share": share, "stretches": len(lengths), "longest": longest},
         )

@@ -37,6 +37,12 @@ SAID: Final[dict[str, Words]] = {
         "{share:.1%} of the samples do not count; what is left is {stretches:.0f} stretches of at most {longest:.0f}.",
         "Nothing, as long as the stretches are longer than the response. Each costs its first lags.",
     ),
+    "amount.masked_output": Words(
+        "{share:.1%} of the samples lack the output; what is left is {stretches:.0f} stretches of at most"
+        " {longest:.0f}, and the inputs are known throughout.",
+        "A transfer function, OE or a neural state space needs no measured past and loses these samples alone; ARX and"
+        " what is fitted one step ahead lose all whose lags reach there.",
+    ),
     "amount.no_input": Words(
         "There is no input: only the output's own past can be modelled.",
         "Fit an AR or NAR model, or name the inputs in the mapping.",

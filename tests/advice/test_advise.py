@@ -268,6 +268,7 @@ def test_a_response_is_seen_through_an_output_of_which_samples_are_missing(share
     y = y / y.std() + noise(2400, 1, 0.05)
     seen = np.column_stack([np.ones(2400, dtype=np.bool_), rng.random(2400) >= share])
     whole, found = look(trace(u, y, sample_time=0.1)), look(trace(u, np.where(seen[:, 1], y, 99.0), usable=seen))
+    assert finding(found, "amount.masked_output").figures["share"] == pytest.approx(share, abs=0.03)
     assert finding(found, "dead_time").figures["best"] == 1.0
     gains = [finding(one, "settling").figures for one in (whole, found)]
     assert gains[1]["gain"] == pytest.approx(gains[0]["gain"], abs=4.0 * gains[1]["gain_deviation"])
