@@ -10,7 +10,6 @@ from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.numbers import number, quantity
 from sysid.reporting.sweep_record import Trial
 from sysid.validation.resolution import tied
-from sysid.workbench.auto.parts import ENSEMBLE
 from sysid.workbench.auto.plan import ALIKE, RIVAL, ranked_by
 from sysid.workbench.sweep.trial import FAILED
 
@@ -61,9 +60,6 @@ def choose(
 ) -> Choice:
     """The smallest of those whose error is as good as the least.
 
-    A single network is not, where the mean of several starts of its structure was tried, and is worse: that it came
-    close is owed to its start.
-
     Args:
         trials: All of them; at least one can be used.
         error: What chooses, as a mean square.
@@ -87,7 +83,7 @@ def choose(
 
     def no_worse(trial: Trial) -> bool:
         return (
-            (error(trial) <= limit and not _owed_to_luck(trial, usable, error, limit))
+            error(trial) <= limit
             or (trial in linear and cannot_be_told(chosen, trial, error))
             or both_exact(chosen, trial)
         )
@@ -109,12 +105,6 @@ def choose(
         return found
     first = usable[ahead[0]]
     return replace(found, chosen=first, least=first, refused=ahead[0], more_within="", stable=smallest)
-
-
-def _owed_to_luck(trial: Trial, others: Sequence[Trial], error: Error, limit: float) -> bool:
-    """Whether the mean of several starts of one's structure, which luck decides less of, is worse than it may be."""
-    own = [t for t in others if t.structure == trial.structure and t.values == {**trial.values, **ENSEMBLE}]
-    return "ensemble" not in trial.values and bool(own) and min(map(error, own)) > limit
 
 
 def cannot_be_told(best: Trial, other: Trial, error: Error) -> bool:

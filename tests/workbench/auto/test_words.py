@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pytest
 
 from sysid.models import ARX, NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.parts import ENSEMBLE
 from sysid.workbench.auto.search import error
 from sysid.workbench.auto.words import choose, sentence
 from sysid.workbench.sweep.search_space import Point
@@ -51,17 +49,6 @@ def test_an_ensemble_is_chosen_where_it_gains_and_says_its_price() -> None:
     assert found.chosen.number == 9
     said = sentence(found, 2, unit="V", ended="", error=error)
     assert "20% less than one start of it, for 5 times the multiplications a step" in said
-
-
-@pytest.mark.parametrize(("of_eight", "chosen"), [(1.02, 2), (1.3, 3)])
-def test_a_smaller_network_whose_mean_of_several_starts_is_worse_came_close_by_luck(
-    of_eight: float, chosen: int
-) -> None:
-    small, large = network(2, 1.01, 20), network(3, 1.0, 200)
-    mean = network(9, of_eight, 100).model_copy(
-        update={"structure": small.structure, "values": {**small.values, **ENSEMBLE}}
-    )
-    assert choose([small, large, mean], error, stable).chosen.number == chosen
 
 
 def test_a_linear_model_that_is_as_good_is_chosen() -> None:
