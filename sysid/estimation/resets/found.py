@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.resets.reset_map import Array, Guard, ResetMap, Rest, features
@@ -87,7 +88,7 @@ def found_resets(records: Sequence[tuple[Array, Array]], *, seed: int = 0) -> Re
         )
         if best is not None and best[0] >= RESETS:
             begin = _begin(records, best[1])
-            return None if begin is None else _named(best[1], begin)
+            return None if begin is None else replace(best[1], begin=begin)
     return None
 
 
@@ -222,16 +223,9 @@ def _root(flow: Array, n: int) -> Array | None:
     whole[:p] = flow
     if n == 1:
         return flow
-    part = whole
-    with np.errstate(all="ignore"):
-        part = np.eye(len(whole)) + (whole - np.eye(len(whole))) / n
-        for _ in range(60):  # Newton's method: all of these commute
-            step = np.linalg.lstsq(np.linalg.matrix_power(part, n - 1), np.linalg.matrix_power(part, n) - whole)[0] / n
-            part = part - step
-            if not np.isfinite(part).all():
-                return None
-            if np.abs(step).max() <= 1e-15 * np.abs(part).max():
-                break
+    part = np.real(scipy.linalg.fractional_matrix_power(whole, 1.0 / n))
+    if not np.isfinite(part).all():
+        return None
     near = np.allclose(np.linalg.matrix_power(part, n), whole, rtol=1e-11, atol=1e-13)
     return np.where(np.abs(part[:p]) < 1e-14 * np.abs(part[:p]).max(), 0.0, part[:p]) if near else None
 
@@ -353,9 +347,7 @@ def _begin(records: Sequence[tuple[Array, Array]], found: ResetMap) -> Array | N
     far = np.linalg.matrix_power(whole, found.steps)
     begins = np.array([np.linalg.solve(far, np.concatenate([y[0], u[0], [1.0]]))[:p] for u, y in records])
     span = np.ptp(np.concatenate([y for _, y in records]), axis=0)
-    return np.median(begins, axis=0) if (np.ptp(begins, axis=0) <= 1e-6 * span).all() else None
-
-
-def _named(found: ResetMap, begin: Array) -> ResetMap:
-    begin = np.where(np.abs(begin) < 1e-12 * max(1.0, float(np.abs(begin).max())), 0.0, begin)
-    return ResetMap(flow=found.flow, steps=found.steps, guards=found.guards, rest=found.rest, begin=begin)
+    if not (np.ptp(begins, axis=0) <= 1e-6 * span).all():
+        return None
+    begin = np.median(begins, axis=0)
+    return np.where(np.abs(begin) < 1e-12 * max(1.0, float(np.abs(begin).max())), 0.0, begin)
