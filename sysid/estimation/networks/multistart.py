@@ -255,10 +255,16 @@ def _rung(
     Workers leave what they reach in a table: an interruption loses none of it.
     """
     share, seconds = limits
+    begun: list[threading.Event] = []
 
     def work(number: int) -> None:
-        if not multistart.stop.is_set() and (latest or _in_time(multistart, reached, share, seconds)):
-            reached[number] = _advance(multistart, number, latest.get(number), share, seconds)
+        ended = threading.Event()
+        begun.append(ended)
+        try:
+            if not multistart.stop.is_set() and (latest or _in_time(multistart, reached, share, seconds)):
+                reached[number] = _advance(multistart, number, latest.get(number), share, seconds)
+        finally:
+            ended.set()
 
     with ThreadPoolExecutor(
         min(multistart.training.workers, len(numbers))
@@ -271,6 +277,8 @@ def _rung(
         except BaseException:
             multistart.stop.set()  # nobody waits for the others
             raise
+    for ended in begun:  # the pool does not know of a thread during whose start it was interrupted
+        ended.wait()
     if not reached and not latest:  # interrupted before anything had begun: the start as it is
         reached[numbers[0]] = _advance(multistart, numbers[0], None, share, seconds)
 

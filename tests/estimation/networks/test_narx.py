@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -188,6 +189,24 @@ def test_an_interruption_keeps_the_best_model_so_far():
     fit = fit_narx([tank(1)], TANK, SMALL, training, on_progress=interrupt_once)
     assert fit.status is Status.INTERRUPTED
     assert np.isfinite(fit.model.theta).all()
+    assert len(fit.history["mse"]) >= 10
+
+
+def test_a_start_is_waited_for_of_which_an_interrupted_pool_does_not_know(monkeypatch):
+    """Ctrl-C while a thread of the pool starts leaves it running, and unknown to the pool."""
+    tenth = threading.Event()
+
+    def submit(_, work, number: int) -> None:
+        threading.Thread(target=work, args=(number,)).start()
+        assert tenth.wait(60.0)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", submit)
+    training = Training(max_iterations=100_000, starts=1, patience=100_000)
+    fit = fit_narx(
+        [tank(1)], TANK, SMALL, training, on_progress=lambda one: tenth.set() if one.iteration >= 10 else None
+    )
+    assert fit.status is Status.INTERRUPTED
     assert len(fit.history["mse"]) >= 10
 
 
