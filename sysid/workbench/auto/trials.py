@@ -63,6 +63,10 @@ class Trials:
         found: dict[int, list[Trial]] = {point.number: [] for point in points}
         alive = list(points)
         for done, driver in enumerate(self.drivers, start=1):
+            if done % SEEN == 1:
+                # Part by part, one worker would wait for the other at the end of each.
+                ahead = self.drivers[done - 1 : done - 1 + SEEN]
+                driver.do_ahead([(one, alive) for one in ahead])
             for point, trial in zip(alive, driver.run(alive) if alive else (), strict=True):
                 found[point.number].append(trial)
             limit = HOPELESS**2 * _mean(self.best[:done]) if self.best and done >= SEEN else math.inf

@@ -139,13 +139,9 @@ class Driver:
         found: dict[int, Trial] = {}
         alive = list(points)
         for number, rung in enumerate(rungs, start=1):
-            begun: dict[int, Job] = {}
-            for point in alive:
-                begun[point.number] = self._job(point, rung, jobs.get(point.number), begun)
-            jobs = begun
-            self.last.update(begun)
-            shared = [self._linear(point, rung) for point in alive] if number == 1 else []
-            trials = self._do([*(job for job in shared if job is not None), *jobs.values()])
+            shared, jobs = self._jobs(alive, rung, jobs if number > 1 else None)
+            self.last.update(jobs)
+            trials = self._do([*shared, *jobs.values()])
             for point in alive:
                 trial = trials[jobs[point.number].key]
                 found[point.number] = as_trial_of(trial, point, before=found.get(point.number))
@@ -154,6 +150,27 @@ class Driver:
                 found[point.number] = found[point.number].model_copy(update={"dropped_at": number})
             self._progress.dropped(len(alive), rungs[number:])
         return [found[point.number] for point in points]
+
+    def do_ahead(self, wanted: Sequence[tuple[Driver, Sequence[Point]]]) -> None:
+        """Do what several drivers of one bench begin with, side by side: none waits for the last of another's.
+
+        Each then finds its own results stored when it runs.
+
+        Args:
+            wanted: Drivers, one a fold, and what each will try.
+        """
+        begun = [driver._jobs(points, driver.rungs()[0], None) for driver, points in wanted]
+        self._do([job for shared, jobs in begun for job in (*shared, *jobs.values())])
+
+    def _jobs(
+        self, points: Sequence[Point], rung: Rung, before: Mapping[int, Job] | None
+    ) -> tuple[list[Job], dict[int, Job]]:
+        """The jobs of points at a rung, by number, and on the first one the linear fits that they begin from."""
+        begun: dict[int, Job] = {}
+        for point in points:
+            begun[point.number] = self._job(point, rung, (before or {}).get(point.number), begun)
+        shared = [self._linear(point, rung) for point in points] if before is None else []
+        return [job for job in shared if job is not None], begun
 
     def run_on(
         self, points: Sequence[Point], before: Mapping[int, Trial], options: Callable[[Point], Mapping[str, Any]]

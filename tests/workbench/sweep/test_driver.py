@@ -136,6 +136,40 @@ def test_what_is_not_done_in_time_is_given_up_and_found_so_again(tmp_path: Path)
     assert {one.reason for one in trials if one.status == FAILED} == {gave_up(driver.last[1])["reason"]}
 
 
+class Fullest(Crew):
+    """Keeps of how many points it had jobs whenever it was asked for results."""
+
+    def __init__(self) -> None:
+        super().__init__(9, 0)
+        self.most = 0
+
+    def finished(self) -> list[tuple[Job, dict[str, Any]]]:
+        self.most = max(self.most, len(self.held))
+        return super().finished()
+
+
+def test_folds_that_are_done_ahead_wait_for_none_of_each_other_and_change_nothing(tmp_path: Path) -> None:
+    """The slowest fit of each part had kept all other workers idle."""
+    config, traces = check(SweepConfig, SWEEP, where="s.yaml"), bench().traces
+    other = dataclasses.replace(traces, traces=(dataclasses.replace(traces.traces[0], sample_time=2.0),))
+    folds = dataclasses.replace(bench(), folds=((traces, ()), (other, ())))
+    points, found, most = config.space().points()[:3], list[list[dict[str, Any]]](), list[int]()
+    for ahead in (False, True):
+        store, crew = TrialStore(path=tmp_path / str(ahead)), Fullest()
+        with store.clock() as clock:
+            first = Driver(
+                config=config, bench=folds, store=store, workers=crew, clock=clock, step="s", tell=lambda _: None
+            )
+            drivers = [first, dataclasses.replace(first, fold=1, last={})]
+            if ahead:
+                first.do_ahead([(one, points) for one in drivers])
+            found.append([trial.model_dump() for one in drivers for trial in one.run(points)])
+        assert len(crew.done) == 2 * len(points)
+        most.append(crew.most)
+    assert found[0] == found[1]
+    assert most == [len(points), 2 * len(points)]
+
+
 WAYS = {
     "in full": {},
     "with looks": PRUNED,
