@@ -26,8 +26,8 @@ def equilibrium_notes(model: AbstractModel, traces: Sequence[Trace], start: Star
 
     The free run from the declared start is compared with the record over the window that a start would be estimated on,
     and that with the errors of the free run from the estimated one, after it. A model that was fitted to what the start
-    said may have bent to it: a small ARX model that takes nothing for granted is asked as well, unless the model has
-    learnt where its records begin.
+    said may have bent to it: a small ARX model that takes nothing for granted is asked as well, unless the model
+    says itself where its records begin.
 
     Args:
         model: A model fitted to the records.
@@ -78,14 +78,15 @@ def _of(model: AbstractModel, trace: Trace, start: Start) -> list[str]:
     later = after[usable[n:]].reshape(-1, len(model.mapping.outputs))
     if not len(off) or not len(later) or not np.isfinite(off).all() or not np.isfinite(later).all():
         return []
-    found = []
+    found, said = [], f"start: {start.kind.value}"
+    so = f"where the model does with {said}" if model.structure.learns_start else f"in equilibrium, as {said} declares"
     ranges = np.ptp(output[usable].reshape(len(output[usable]), -1), axis=0)
     for j, unit in enumerate(model.ends.output_units):
         level, most = float(np.sqrt(np.mean(later[:, j] ** 2))), float(off[:, j].max())
         if most > max(BEYOND * level, LEAST * float(ranges[j])):
             found.append(
-                f"{trace.name} does not begin in equilibrium, as start: {start.kind.value} declares: over its first "
-                f"{n} samples the free run is up to {most:.3g} {unit} off, and afterwards, from an estimated state, "
+                f"{trace.name} does not begin {so}: over its first {n} samples the free run is up to {most:.3g} {unit} "
+                f"off, and afterwards, from an estimated state, "
                 f"{level:.3g} {unit}. For such a record write start: estimated."
             )
     return found

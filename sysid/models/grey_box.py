@@ -164,6 +164,11 @@ class GreyBox(AbstractStructure):
         return bool(self.by_case)
 
     @property
+    def learns_start(self) -> bool:
+        """Whether ``initial`` says of a state where it begins."""
+        return bool(self.initial)
+
+    @property
     def begins(self) -> dict[str, InitialState]:
         """By state what is known of it before the first sample."""
         return {one.name: one for one in self._states_given}

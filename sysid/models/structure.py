@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.models.history import Start
 from sysid.models.lags import Lagged
 from sysid.models.mapping import Mapping
 from sysid.models.typed_fields import Switches
-
-if TYPE_CHECKING:
-    pass
 
 
 class AbstractStructure(Switches):
@@ -37,14 +34,16 @@ class AbstractStructure(Switches):
     acts_at_once: bool = False
     """Whether inputs may act within their sample without being asked to: no field of it says so."""
 
-    learns_start: bool = False
-    """Whether where a record begins is fitted with the parameters, so that a run from its start need not be at rest."""
-
     learns_curves: bool = False
     """Whether what an input does at each of its levels is learnt from records alone, and no equation says it."""
 
     per_input: tuple[str, ...] = ()
     """Fields that hold one number per input."""
+
+    @property
+    def learns_start(self) -> bool:
+        """Whether it says itself where a record begins, fitted or given, so that its start need not be at rest."""
+        return False
 
     @property
     def names_records(self) -> bool:

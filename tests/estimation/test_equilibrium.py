@@ -13,6 +13,7 @@ from sysid.models import (
     NARX,
     AbstractModel,
     AbstractStructure,
+    GreyBox,
     Mapping,
     NeuralStateSpace,
     Start,
@@ -42,6 +43,22 @@ def test_a_record_in_motion_is_told_where_it_was_declared_at_rest(structure: Abs
     found = fit(bursts(0.9), MAPPING, structure, start=start, rest_output=0.0, stability=None)
     told = [note for note in found.notes if "does not begin in equilibrium" in note]
     assert {note.split()[0] for note in told} >= {"burst0", "burst2"}
+
+
+@pytest.mark.parametrize(("begins", "told"), [(3.0, 0), (1.0, 1)], ids=["there", "elsewhere"])
+def test_a_grey_box_that_declares_its_state_is_asked_and_not_a_model_at_rest(begins: float, told: int) -> None:
+    """A vessel that is emptied begins at 3 and not in equilibrium, which is what its equations say."""
+    rng = np.random.default_rng(0)
+    u, y = np.repeat(rng.uniform(size=40), 5), np.zeros(200)
+    y[0] = begins
+    for k in range(1, 200):
+        y[k] = 0.9 * y[k - 1] + 0.1 * u[k - 1]
+    trace = trace_of(u[:, None], y + 1e-3 * rng.standard_normal(200))
+    grey = GreyBox(equations="y[k+1] = a*y + b*u1", parameters={"a": 0.8, "b": 0.2}, initial={"y": 3})
+    found = fit([trace], MAPPING, grey, start=Start(), rest_output=0.0, stability=None)
+    assert grey.learns_start
+    assert len([note for note in found.notes if "does not begin where the model does" in note]) == told
+    assert not any("in equilibrium" in note for note in found.notes)
 
 
 def test_nothing_is_told_of_records_that_do_begin_so() -> None:

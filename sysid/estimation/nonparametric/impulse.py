@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +30,6 @@ from sysid.estimation.nonparametric.prior import DeadTime, Prior, dead_times, tu
 from sysid.estimation.nonparametric.segments import Segment, segments_of
 from sysid.models import Mapping
 from sysid.traces import Trace
-
-if TYPE_CHECKING:
-    pass
 
 FIRST_LENGTH, LONGEST, MOST_COLUMNS = 32, 512, 512
 """Lags that are tried first and at most, and columns at most that all inputs may have together."""

@@ -156,9 +156,16 @@ def young_told(trials: Sequence[Trial], rank: Rank, n_outputs: int, folds: int =
     young = sorted((one for one in trials if is_young(one, n_outputs, folds)), key=rank)
     if not young:
         return ""
-    named = [f"{one.label} ({iterations_each(one, n_outputs) / folds:.2g})" for one in young[:NAMED]]
+    named = [f"{one.label} ({_count(iterations_each(one, n_outputs) / folds)})" for one in young[:NAMED]]
     more = f" and {len(young) - NAMED} more" if len(young) > NAMED else ""
     return (
         f"In the time that there was, {', '.join(named)}{more} came to fewer than {RIPE} iterations, too few to tell "
         "what they are worth: allow more minutes, or fit fewer samples."
     )
+
+
+def _count(iterations: float) -> str:
+    """Iterations of each training, as a reader counts; the starts of some structures take what time there is."""
+    if iterations < 1.0:
+        return "less than one" if iterations else "none"
+    return f"{iterations:.2g}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from sysid.estimation import FitResult
 from sysid.workbench.fits import steps
@@ -14,9 +13,6 @@ from sysid.workbench.fits.outputs import FitModel, FitOutput
 from sysid.workbench.runner import events
 from sysid.workbench.runner.steps import Done
 from sysid.workbench.runner.store import digest
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

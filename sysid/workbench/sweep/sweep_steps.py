@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.reporting.numbers import quantity
@@ -32,10 +32,6 @@ from sysid.workbench.sweep.search_space import Space, parse_space, trained_rows
 from sysid.workbench.sweep.store import TRIALS, Clock, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, NoWorkers
-
-if TYPE_CHECKING:
-    pass
-
 
 Hire = Callable[[Bench, SweepConfig], AbstractWorkers]
 """Finds workers for a sweep."""

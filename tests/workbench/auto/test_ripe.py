@@ -105,3 +105,9 @@ def test_what_says_little_is_named() -> None:
     assert young_told([tried(1, RIPE)], RANK, 1) == ""
     # Twenty iterations of one of four parts are five of each.
     assert "NSS 1/1 (5)" in young_told([tried(1, RIPE)], RANK, 1, folds=4)
+
+
+@pytest.mark.parametrize(("iterations", "said"), [(0, "(none)"), (1, "(less than one)"), (9, "(2.2)")])
+def test_what_came_to_no_iteration_is_told_in_words(iterations: int, said: str) -> None:
+    """The starts of block-oriented models alone can take the time of a trial."""
+    assert f"NSS 1/1 {said} came to fewer" in young_told([tried(1, iterations)], RANK, 1, folds=4)
