@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from statistics import median_high
 from typing import Any
 
+import numpy as np
+
 from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
@@ -34,6 +36,9 @@ FINALISTS, AGAIN = 5, 2
 owes something to luck, and the chosen one is trained from other starts too."""
 ENSEMBLES = 3
 """Of them those whose starts are united, too, where that can be."""
+SCATTER = 0.1
+"""Standard deviation of the logarithm of a network's error over its starts, on the same held-out parts, beyond which it
+says as much of the start as of the structure: what is fitted in the end is then the mean of several starts."""
 ALIKE = 0.03
 """Part of the least error within which another one counts as no worse; of those the smallest is chosen."""
 
@@ -111,6 +116,8 @@ class Plan:
     _told_again: list[int] = field(default_factory=list)
     _late: set[int] = field(default_factory=set)
     """Places of trials that were to be repeated, for which the time was up."""
+    scattered: dict[int, float] = field(default_factory=dict)
+    """By the number of a trial that was repeated, how far its starts are apart, as :func:`scatter` has it."""
     _united: set[int] = field(default_factory=set)
     """Numbers of points that are ensembles of those."""
     _no_time: list[Try] = field(default_factory=list)
@@ -146,6 +153,7 @@ class Plan:
         self.trials += [trial for trial in trials if trial.number not in self._repeats]
         for place in dict.fromkeys(self._repeats[trial.number] for trial in repeated):
             own = [trial for trial in repeated if self._repeats[trial.number] == place]
+            self.scattered[self.trials[place].number] = scatter([self.trials[place], *own])
             self.trials[place] = with_repeats(self.trials[place], own)
             self._told_again.append(place)
 
@@ -413,6 +421,23 @@ class Plan:
             training["max_time_s"] = round(training["max_time_s"] / n, 3)  # a model an output, one after the other
         values = {"structure": one.structure.label, **one.training}
         return Point(number=self._asked, structure=one.structure, training=training, values=values)
+
+
+def scatter(trials: Sequence[Trial]) -> float:
+    """How far the errors of one point from several starts are apart, on the same parts.
+
+    Args:
+        trials: From each of the starts.
+
+    Returns:
+        Standard deviation of the errors' logarithm over the starts, as a root of a mean square over the parts; 0 where
+        fewer than two have come to errors on all of them.
+    """
+    some = [one.selection_rms_shares for one in trials if one.in_full]
+    errors = np.array([one for one in some if one and len(one) == len(max(some, key=len))])
+    if len(errors) < 2 or not (np.isfinite(errors) & (errors > 0.0)).all():
+        return 0.0
+    return float(np.sqrt(np.mean(np.var(np.log(errors), axis=0, ddof=1))))
 
 
 def with_repeats(trial: Trial, repeats: Sequence[Trial]) -> Trial:

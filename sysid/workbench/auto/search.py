@@ -12,12 +12,12 @@ from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, AbstractStructure
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget
+from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget, price
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.finish import MOST_KEPT, finish_s, span
 from sysid.workbench.auto.look import Looked, look
-from sysid.workbench.auto.parts import Parts, part
-from sysid.workbench.auto.plan import AGAIN, Plan, Rank, ranked_by
+from sysid.workbench.auto.parts import ENSEMBLE, Parts, part
+from sysid.workbench.auto.plan import AGAIN, SCATTER, Plan, Rank, ranked_by
 from sysid.workbench.auto.race import Race, trains_on
 from sysid.workbench.auto.ripe import Ripening, young_told
 from sysid.workbench.auto.trials import Trials
@@ -38,6 +38,11 @@ FOUND, LINEAR = "best found", "best linear"
 TITLE = "Searching for a model"
 BUSY = 1.5
 """Seconds by the clock that a second of training takes from which on it is said."""
+UNITED = (
+    " From other starts its errors on the same parts are {apart:.0%} apart: what is fitted to all of the record in the "
+    "end is the mean of several starts."
+)
+"""What is said where that is so."""
 LAST_FITS, LINEAR_LAST, RIPENING = 0.9, 0.25, 3
 """Share of the time that is left which the last fits may train, as they do more than that; of it, that of the best
 linear model; and iterations of a network below which it is not begun."""
@@ -266,13 +271,17 @@ class Search:
             goes_on=lambda trial: self.parts.trained_on and trains_on(structure_from_dict(trial.structure)),
         )  # fmt: skip
         shown, hurried = {FOUND: choice.chosen}, _hurried(plan, choice.chosen, clock.total)
+        united = self._is_united(plan, choice.chosen, clock.total)
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear
         return Found(
-            record=self._record(plan, choice, clock.total, raced),
+            record=self._record(plan, choice, clock.total, raced, united=united),
             shown=shown,
             fits={name: checks.given(trial) for name, trial in shown.items()},
-            training={name: first.last[trial.number].training for name, trial in shown.items()},
+            training={
+                name: {**first.last[trial.number].training, **(ENSEMBLE if united and name == FOUND else {})}
+                for name, trial in shown.items()
+            },
             parts=self.parts,
             kept=kept,
             ends_s=plan.budget.ends_s,
@@ -288,6 +297,18 @@ class Search:
             hurried=hurried,
             done_now=trials.done_now,
         )
+
+    def _is_united(self, plan: Plan, chosen: Trial, spent_s: float) -> bool:
+        """Whether the last fit is the mean of several starts: of one alone it would say little, and there is time."""
+        row = estimator_of(structure_from_dict(chosen.structure))
+        if self.parts.trained_on or not row.unites or plan.scattered.get(chosen.number, 0.0) <= SCATTER:
+            return False
+        point = plan.points[chosen.number]
+        longer = replace(point, training={**point.training, **ENSEMBLE})
+        more = sum(map(len, self.data.estimation)) / sum(map(len, self.parts.folds[0].fitted))
+        slowed = 1.0 if self.config.wall_s is None else plan.budget.slowed
+        need = slowed * chosen.iteration_s * price(longer) * more
+        return "ensemble" not in chosen.values and need <= LAST_FITS * (plan.budget.ends_s - spent_s)
 
     @property
     def _rank(self) -> Rank:
@@ -305,13 +326,16 @@ class Search:
     def _n_outputs(self) -> int:
         return len(self.config.mapping.outputs)
 
-    def _record(self, plan: Plan, choice: Choice, wall_s: float, raced: int) -> SweepRecord:
+    def _record(self, plan: Plan, choice: Choice, wall_s: float, raced: int, *, united: bool) -> SweepRecord:
         outputs = self.config.mapping.outputs
         # Errors of several outputs count over their variances: in standard deviations.
         unit = self.bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
         said = sentence(
             choice, len(plan.trials), again=plan.n_again, raced=raced, unit=unit, ended=plan.ended, error=error
         )
+        if united:
+            apart = math.expm1(plan.scattered[choice.chosen.number])
+            said += UNITED.format(apart=apart)
         young = young_told(plan.trials, self._rank, self._n_outputs, len(self.parts.folds))
         return SweepRecord(
             name=self.config.name,

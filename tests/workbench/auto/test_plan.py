@@ -14,7 +14,7 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import FINAL, Budget, price
 from sysid.workbench.auto.look import Looked
 from sysid.workbench.auto.parts import ENSEMBLE
-from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, MET, PATIENCE, Plan, with_repeats
+from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, MET, PATIENCE, Plan, scatter, with_repeats
 from sysid.workbench.auto.search import error
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import NOT_DONE
@@ -273,6 +273,21 @@ def test_the_median_of_its_errors_is_what_a_point_is_worth() -> None:
     assert error(with_repeats(lucky, [good, lost])) == 1.0
     assert error(with_repeats(lucky, [good])) == 1.0
     assert error(with_repeats(lucky, [lost, lost])) == math.inf
+
+
+def test_how_far_its_starts_are_apart_is_judged_on_the_same_parts() -> None:
+    """An easy part and a hard one are no scatter; errors of one start that are twice those of another are."""
+    point = Point(number=1, structure=NeuralStateSpace(states=2, neurons=3), training={}, values={})
+
+    def start(*shares: float) -> Trial:
+        return trial(point, 1.0).model_copy(update={"selection_rms_shares": list(shares)})
+
+    assert scatter([start(0.1, 1.0), start(0.1, 1.0)]) == 0.0
+    assert scatter([start(0.1, 1.0), start(0.2, 2.0)]) == pytest.approx(math.log(2.0) / math.sqrt(2.0))
+    assert scatter([start(0.1, 1.0), start(0.2, 1.0)]) == pytest.approx(math.log(2.0) / 2.0)
+    assert scatter([start(0.1, 1.0)]) == 0.0
+    assert scatter([start(0.1, 1.0), start(0.2, 2.0), start(9.0)]) == scatter([start(0.1, 1.0), start(0.2, 2.0)])
+    assert scatter([start(0.1, 1.0), trial(point, math.inf)]) == 0.0
 
 
 def test_what_stands_at_ends_has_first_what_is_held_there() -> None:
