@@ -12,10 +12,9 @@ from sysid.api.given import TracesLike, check_order, path_of, traces_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
-from sysid.ingest import load_dataset, read_trace
-from sysid.ingest.in_python import remedies_of_a_file
-from sysid.ingest.readers.text_source import bare_stem
+from sysid.ingest import load_dataset
 from sysid.ingest.reading import is_file_of_traces
+from sysid.ingest.undescribed import load_file
 from sysid.models import AbstractStructure, Mapping, Start, StartLike
 from sysid.traces import Role, TraceSet
 
@@ -24,14 +23,18 @@ def load(source: str | Path) -> TraceSet:
     """Load a data set by name or path, or a single file with traces.
 
     Args:
-        source: A data set's name, its folder or ``dataset.yaml``; or a file (CSV, Parquet, MATLAB, HDF5, MDF4, TDMS)
-            whose columns name their units, which becomes a set of one trace for estimation.
+        source: A data set's name, its folder or ``dataset.yaml``; or a file (CSV, Parquet, MATLAB, HDF5, MDF4, TDMS),
+            which becomes a set of one trace for estimation, or of the records that it holds. What it does not say, such
+            as a unit, is guessed as ``sysid ingest --propose`` would write it down.
 
     Returns:
         The traces with their roles.
 
     Raises:
         UserError: If it cannot be read: what, where, and what to do.
+
+    Warns:
+        GuessedWarning: If a file leaves out what had to be guessed.
 
     Example:
         >>> from sysid.testing import first_order_record
@@ -42,9 +45,7 @@ def load(source: str | Path) -> TraceSet:
     path = path_of(source, word="load")
     if not is_file_of_traces(path):
         return load_dataset(source)
-    with remedies_of_a_file(path):
-        trace = read_trace(path)
-    return TraceSet(name=bare_stem(path), traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
+    return load_file(path)
 
 
 def fit(

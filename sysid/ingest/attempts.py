@@ -17,7 +17,7 @@ from sysid.ingest.columns import RawColumn
 from sysid.ingest.numbers import spaced, usually_missing
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.reading import read_table
-from sysid.ingest.table import RawTable
+from sysid.ingest.table import RawTable, RepeatedNamesError
 from sysid.ingest.words import PAIRS, TRUTH, known_states
 
 _OF_TEXT = frozenset({"csv", "excel"})
@@ -77,11 +77,16 @@ def read_somehow(path: Path, files: FileOptions) -> Attempt:
 
 
 def _first(path: Path, files: FileOptions) -> Attempt:
-    """The file as it stands, or without its ragged rows."""
+    """The file as it stands, or without its ragged rows, or with numbers behind names that stand twice."""
     error: UserError | None = None
     for repairs in (RepairOptions(), RepairOptions(ragged="drop")):
         try:
             return Attempt(table=read_table(path, files=files, repairs=repairs), files=files, repairs=repairs)
+        except RepeatedNamesError as twice:
+            if files.names is not None:
+                raise
+            numbered = _first(path, files.model_copy(update={"names": twice.numbered}))
+            return replace(numbered, guessed=frozenset({"names"}))
         except ReaderError as problem:
             error = error or problem
     raise error or ReaderError("the file cannot be read", where=path)

@@ -121,11 +121,26 @@ class FileFinding:
         return found
 
     @property
+    def guesses(self) -> list[str]:
+        """How the file is taken to be written, one phrase for each guess."""
+        return [told for _, told in self._guessed_options]
+
+    @property
+    def _guessed_options(self) -> list[tuple[str, str]]:
+        given = self.files.model_dump(exclude_none=True)
+        names = sorted(self.guessed - {"zone", "format"})
+        return [(name, _guess(name, given[name])) for name in names if name in given]
+
+    @property
     def problems(self) -> tuple[str, ...]:
         """What a data set of this file has to deal with, one phrase each."""
-        found = list(self.notes)
-        given = self.files.model_dump(exclude_none=True)
-        found += [_guess(name, given[name]) for name in sorted(self.guessed - {"zone", "format"}) if name in given]
+        found = [
+            *self.notes,
+            *(
+                f"{told}, which is a guess: source.files.{name} in dataset.yaml says it"
+                for name, told in self._guessed_options
+            ),
+        ]
         found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
         if self.timing is None:
             found += [self.time_told if self.table.time else "no time stamps"] if self.time_guessed else []
@@ -145,16 +160,16 @@ class FileFinding:
 
 
 def _guess(name: str, value: object) -> str:
-    """What was guessed of how a file is written, and where to say otherwise."""
+    """What was guessed of how a file is written."""
     shown = ", ".join(map(repr, value)) if isinstance(value, list | tuple) else repr(value)
-    said = {
+    return {
         "decimal": f"{shown} is taken for the decimal mark",
         "thousands": f"{shown} is taken for the mark between thousands",
         "missing": f"{shown} is taken for a missing value",
         "states": "words are taken for states",
         "transpose": "rows are taken for columns",
+        "names": f"a name stands twice, so columns are called {shown}",
     }.get(name, f"{name} is taken to be {shown}")
-    return f"{said}, which is a guess: source.files.{name} in dataset.yaml says it"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

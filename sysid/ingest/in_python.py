@@ -49,10 +49,23 @@ def remedies_of_a_file(path: Path) -> Iterator[None]:
     try:
         yield
     except UserError as error:
-        place = Path("datasets", bare_stem(path), "dataset.yaml")
-        command = shlex.join(("sysid", "ingest", str(path), "--propose", str(place)))
-        described = f"describe the file once ({command}), which proposes these options, and load({bare_stem(path)!r})"
+        described = (
+            f"describe the file once ({proposal_of(path)}), which proposes these options, and load({bare_stem(path)!r})"
+        )
         raise _with(error, f"{error.remedy}. A file alone takes no options: {described}") from None
+
+
+def proposal_of(path: Path) -> str:
+    """The command that describes a file as a data set.
+
+    Args:
+        path: The file.
+
+    Returns:
+        It, for a shell.
+    """
+    place = Path("datasets", bare_stem(path), "dataset.yaml")
+    return shlex.join(("sysid", "ingest", str(path), "--propose", str(place)))
 
 
 def _with(error: UserError, remedy: str) -> UserError:

@@ -95,6 +95,7 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
                 time, told = TimeOptions(step=step), f"guessed: {finer[1]}"
     others = tuple(replace(_column(column), problem=_other(column, len(table))) for column in table.others)
     told_apart = without_second_clocks(table, clock).columns
+    told_apart = _without_copies(told_apart) if "names" in attempt.guessed else told_apart
     said = step_beside(table.columns) if files.time.step is None and time.step is not None else None
     notes = table.notes
     if said is not None:
@@ -263,6 +264,16 @@ def _time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     first = f"{by_rising}; " if by_rising else ""
     why += "; it rises by 1, as a number of samples does" if len(steps) and bool((steps == 1.0).all()) else ""
     return TimeOptions(column=column.name, unit=guess), f"guessed: {first}{name} in {guess}; {why}"
+
+
+def _without_copies(columns: Sequence[RawColumn]) -> tuple[RawColumn, ...]:
+    """The columns of a file in which a name stood twice; what was written twice, numbers and all, is aside."""
+    found: list[RawColumn] = []
+    for column in columns:
+        first = next((c for c in found if np.array_equal(c.values, column.values, equal_nan=True)), None)
+        again = first is not None and not column.aside and column.name.startswith(f"{first.name} ")
+        found.append(replace(column, aside=f"the same numbers as {first.name}") if first and again else column)
+    return tuple(found)
 
 
 def step_beside(columns: Sequence[RawColumn]) -> tuple[str, float] | None:

@@ -101,7 +101,8 @@ def _said(column: RawColumn, first: RawColumn | None) -> str:
     ahead = factor * mine - theirs
     step = float(np.median(np.diff(theirs)))
     if float(np.ptp(ahead)) > _TOGETHER * step:
-        return f"a clock of another pace than {first.name}"
+        # A ramp of pulse widths, or of delays, is in a unit of time too, and is no clock.
+        return f"a clock of another pace than {first.name}" if called else ""
     offset = float(np.median(ahead))
     if abs(offset) <= 1e-3 * step or abs(offset) > _ORIGIN or factor != 1.0:
         return f"the time again, as in {first.name}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,39 @@ from sysid.errors import ChannelError, ReaderError
 from sysid.ingest.columns import RawColumn
 from sysid.ingest.headers import parse_header
 from sysid.ingest.time_columns import recognise_time
+
+
+class RepeatedNamesError(ReaderError):
+    """A file of which two columns have the same name.
+
+    Args:
+        columns: All columns, in file order.
+        where: The file.
+    """
+
+    def __init__(self, columns: Sequence[RawColumn], *, where: Path) -> None:
+        names = [column.name for column in columns]
+        repeated = sorted(name for name, count in Counter(names).items() if count > 1)
+        super().__init__(
+            f"two columns are named {', '.join(repeated)}",
+            where=where,
+            expected="a different name for each column",
+            got=", ".join(names),
+            remedy="rename one in the file, or give names: [...] for all columns",
+        )
+        self.numbered = tuple(_numbered(columns))
+
+
+def _numbered(columns: Sequence[RawColumn]) -> Iterator[str]:
+    """The headers of columns with a number behind each name that stood before: p [bar], p 2 [psi]."""
+    taken = {column.name for column in columns}
+    seen = set[str]()
+    for column in columns:
+        name, number = column.name, 2
+        while name in seen or (number > 2 and name in taken):
+            name, number = f"{column.name} {number}", number + 1
+        seen.add(name)
+        yield f"{name} [{column.unit}]" if column.unit else name
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,16 +110,9 @@ class RawTable:
         unusable = [column.problem for column in (*self.columns, *self.others) if column.problem is not None]
         if len(unusable) == len(self.columns) + len(self.others):
             raise unusable[0]
-        names = (*self.names, *(column.name for column in self.others))
-        repeated = sorted(name for name, count in Counter(names).items() if count > 1)
-        if repeated:
-            raise ReaderError(
-                f"two columns are named {', '.join(repeated)}",
-                where=self.source,
-                expected="a different name for each column",
-                got=", ".join(names),
-                remedy="rename one in the file, or give names: [...] for all columns",
-            )
+        columns = (*self.columns, *self.others)
+        if len({column.name for column in columns}) < len(columns):
+            raise RepeatedNamesError(columns, where=self.source)
 
     def __len__(self) -> int:
         return len(self.columns[0].values)

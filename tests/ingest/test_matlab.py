@@ -214,3 +214,18 @@ def test_numbers_without_an_imaginary_part_are_real_and_others_are_named(tmp_pat
     np.testing.assert_array_equal(table.find("u").values, VOLT)
     with pytest.raises(ReaderError, match="complex numbers"):
         table.find("y")
+
+
+def test_objects_that_hold_one_another_are_refused_not_walked_through(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A digital filter holds a converter that holds the filter; reading it ended in a RecursionError."""
+    import matio
+    from matio.utils.matclass import MatlabOpaque
+
+    one = MatlabOpaque({"Fs": np.array([[1.0]])}, "dfilt.df2sos")
+    one.properties["owner"] = MatlabOpaque({"filter": one}, "dfilt.basefilter")
+    mat("5", y=Y)(tmp_path / "filter.mat")
+    monkeypatch.setattr(matio, "load_from_mat", lambda *_, **__: {"Hd": one})
+    with pytest.raises(ReaderError, match=r"(?s)Hd is a MATLAB object.*class dfilt\.df2sos"):
+        read_table(tmp_path / "filter.mat")

@@ -30,6 +30,7 @@ SECOND = {
     "a counter": (("frame", np.arange(20.0), None), "counts the rows"),
     "of another pace": (("t_y", 2.5 * T, None), "a clock of another pace than t"),
     "a ramp": (("u", 2.5 * T, None), ""),
+    "a ramp of pulse widths": (("Servo 3", 1400.0 + 58.3 * T, "µs"), ""),
     "a temperature": (("t_oil", 20.0 + Y, None), ""),
 }
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import struct
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from pathlib import Path
 from typing import Any
 
@@ -159,19 +159,23 @@ def _array(value: Any, name: str, path: Path) -> Any:
     return value
 
 
+def _is_known(kind: object, fields: Set[str]) -> bool:
+    """Whether an object is of a form that is read: a time series, an ``iddata``, or what holds the samples of one."""
+    forms: tuple[Set[str], ...] = ({"Data", "TimeInfo"}, {"Data", "Time"}, {"OutputData"})
+    return str(kind).startswith("tsdata.") or any(form <= fields for form in forms)
+
+
 def _object(value: Any, name: str, path: Path) -> Any:
     """An object of a class: one of the forms that are known by their fields, else refused."""
     properties = value.properties
     if isinstance(properties, np.ndarray) and properties.size == 1:
         properties = properties.reshape(-1)[0]
-    if isinstance(properties, Mapping):
+    # Objects of other classes may hold one another, round and round: they are not walked through.
+    if isinstance(properties, Mapping) and _is_known(value.classname, {str(key).strip("_") for key in properties}):
         fields = {str(key).strip("_"): _node(item, str(key), path) for key, item in properties.items()}
         if "Data" in fields and isinstance(fields.get("TimeInfo"), Mapping):
             fields.setdefault("Time", _clock(fields["TimeInfo"], fields["Data"]))
-        if {"Time", "Data"} <= fields.keys() or "OutputData" in fields:
-            return fields
-        if str(value.classname).startswith("tsdata."):
-            return fields
+        return fields
     return refused(_only_matlab(name, str(value.classname), path))
 
 

@@ -1,0 +1,105 @@
+"""A file of traces without a description: read as what would be proposed for it, with what was guessed told."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import yaml
+
+from sysid.errors import TraceError, UserError
+from sysid.field_checks import check
+from sysid.ingest.dataset import load_described
+from sysid.ingest.description import DatasetDescription
+from sysid.ingest.findings import FileFinding
+from sysid.ingest.in_python import proposal_of, remedies_of_a_file
+from sysid.ingest.inspection import inspect_file
+from sysid.ingest.options import RepairOptions
+from sysid.ingest.proposal import propose_dataset
+from sysid.ingest.readers.text_source import bare_stem
+from sysid.ingest.reading import read_trace
+from sysid.traces import Role, TraceSet
+
+
+class GuessedWarning(UserWarning):
+    """A file does not say all that a record needs, and what it leaves out was guessed."""
+
+
+def load_file(path: Path) -> TraceSet:
+    """Read one file of traces.
+
+    What the file says is taken as it stands. What it leaves out (units, the column of time, its unit, how numbers are
+    written, which rows are a record) is read as ``sysid ingest --propose`` would describe it, and told. Samples are
+    never repaired: a gap or a missing value is refused, with the command that describes the file.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its record for estimation; or its records, where the file holds several.
+
+    Raises:
+        UserError: If it cannot be read, or its samples need repairs.
+
+    Warns:
+        GuessedWarning: If something was guessed.
+    """
+    with remedies_of_a_file(path):
+        try:
+            trace = read_trace(path)
+        except UserError as error:
+            return _as_proposed(path, error)
+    return TraceSet(name=bare_stem(path), traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
+
+
+def _as_proposed(path: Path, error: UserError) -> TraceSet:
+    """The traces of the description that would be proposed, but for its repairs."""
+    try:
+        found = inspect_file(path)
+        # A channel that never changes is no fault of the samples: those that use it say what it is worth.
+        left = replace(found, needed=RepairOptions(constant=found.needed.constant))
+        proposed = yaml.safe_load(propose_dataset(left))
+    except UserError:
+        raise error from None
+    described = check(DatasetDescription, {**proposed, "name": bare_stem(path), "provenance": str(path)}, where=path)
+    try:
+        traces = load_described(described, path, cache=False)
+    except UserError as also:
+        raise error if isinstance(error, TraceError) else also from None
+    guesses = list(_guesses(found))
+    if guesses:
+        told = f"{path}: guessed, as the file does not say it: {'; '.join(guesses)}"
+        warnings.warn(f"{told}. {proposal_of(path)} writes this down, to be corrected", GuessedWarning, stacklevel=4)
+    return traces
+
+
+def _guesses(found: FileFinding) -> Iterator[str]:
+    """What is taken to be so and what is left out, one phrase each."""
+    if found.time_told:
+        yield found.time_told.removeprefix("guessed: ")
+    without = [column.name for column in found.channels if column.unit_guessed and column.unit == "1"]
+    if without:
+        yield f"no unit for {_listed(without)}"
+    named = [
+        f"{column.name} in {column.unit}" for column in found.channels if column.unit_guessed and column.unit != "1"
+    ]
+    if named:
+        yield ", ".join(named)
+    yield from (f"{c.name} is {c.reference.value} pressure" for c in found.channels if c.reference_guessed)
+    yield from found.guesses
+    if found.cases:
+        yield from found.notes
+        yield "roles " + _listed([f"{case.name}: {case.role}" for case in found.cases])
+    aside = [
+        f"{column.name} ({column.problem or column.aside})" for column in found.columns if column not in found.channels
+    ]
+    if aside:
+        yield f"left out: {_listed(aside)}"
+
+
+def _listed(names: list[str], most: int = 6) -> str:
+    """The first of some names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
