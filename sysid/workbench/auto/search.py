@@ -16,7 +16,7 @@ from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRI
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.finish import MOST_KEPT, finish_s, span
 from sysid.workbench.auto.look import Looked, look
-from sysid.workbench.auto.parts import ENSEMBLE, Parts, part
+from sysid.workbench.auto.parts import ENSEMBLE, UNITED, Parts, part
 from sysid.workbench.auto.plan import AGAIN, SCATTER, Plan, Rank, ranked_by
 from sysid.workbench.auto.race import Race, trains_on
 from sysid.workbench.auto.ripe import Ripening, young_told
@@ -38,7 +38,7 @@ FOUND, LINEAR = "best found", "best linear"
 TITLE = "Searching for a model"
 BUSY = 1.5
 """Seconds by the clock that a second of training takes from which on it is said."""
-UNITED = (
+APART = (
     " From other starts its errors on the same parts are {apart:.0%} apart: what is fitted to all of the record in the "
     "end is the mean of several starts."
 )
@@ -271,15 +271,15 @@ class Search:
             goes_on=lambda trial: self.parts.trained_on and trains_on(structure_from_dict(trial.structure)),
         )  # fmt: skip
         shown, hurried = {FOUND: choice.chosen}, _hurried(plan, choice.chosen, clock.total)
-        united = self._is_united(plan, choice.chosen, clock.total)
+        united = self._united(plan, choice.chosen, clock.total)
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear
         return Found(
-            record=self._record(plan, choice, clock.total, raced, united=united),
+            record=self._record(plan, choice, clock.total, raced, united=bool(united)),
             shown=shown,
             fits={name: checks.given(trial) for name, trial in shown.items()},
             training={
-                name: {**first.last[trial.number].training, **(ENSEMBLE if united and name == FOUND else {})}
+                name: {**first.last[trial.number].training, **(united if name == FOUND else {})}
                 for name, trial in shown.items()
             },
             parts=self.parts,
@@ -298,17 +298,21 @@ class Search:
             done_now=trials.done_now,
         )
 
-    def _is_united(self, plan: Plan, chosen: Trial, spent_s: float) -> bool:
-        """Whether the last fit is the mean of several starts: of one alone it would say little, and there is time."""
+    def _united(self, plan: Plan, chosen: Trial, spent_s: float) -> Mapping[str, Any]:
+        """How the last fit is trained where it is the mean of several starts, as of one alone it would say little."""
         row = estimator_of(structure_from_dict(chosen.structure))
-        if self.parts.trained_on or not row.unites or plan.scattered.get(chosen.number, 0.0) <= SCATTER:
-            return False
+        apart = "ensemble" in chosen.values or plan.scattered.get(chosen.number, 0.0) > SCATTER
+        if self.parts.trained_on or not row.unites or not apart:
+            return {}
         point = plan.points[chosen.number]
-        longer = replace(point, training={**point.training, **ENSEMBLE})
         more = sum(map(len, self.data.estimation)) / sum(map(len, self.parts.folds[0].fitted))
         slowed = 1.0 if self.config.wall_s is None else plan.budget.slowed
-        need = slowed * chosen.iteration_s * price(longer) * more
-        return "ensemble" not in chosen.values and need <= LAST_FITS * (plan.budget.ends_s - spent_s)
+        # As many starts as there is time for: halfway trained, none of them says anything.
+        for way in (UNITED, ENSEMBLE):
+            longer = replace(point, training={**point.training, **way})
+            if slowed * chosen.iteration_s * price(longer) * more <= LAST_FITS * (plan.budget.ends_s - spent_s):
+                return way
+        return {}
 
     @property
     def _rank(self) -> Rank:
@@ -333,9 +337,9 @@ class Search:
         said = sentence(
             choice, len(plan.trials), again=plan.n_again, raced=raced, unit=unit, ended=plan.ended, error=error
         )
-        if united:
+        if united and choice.chosen.number in plan.scattered:
             apart = math.expm1(plan.scattered[choice.chosen.number])
-            said += UNITED.format(apart=apart)
+            said += APART.format(apart=apart)
         young = young_told(plan.trials, self._rank, self._n_outputs, len(self.parts.folds))
         return SweepRecord(
             name=self.config.name,

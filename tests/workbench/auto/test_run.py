@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,21 +15,26 @@ import sysid
 from sysid.errors import ConfigError
 from sysid.estimation import estimators
 from sysid.ingest import write_csv
+from sysid.models import NeuralStateSpace
 from sysid.reporting.results import read_results
 from sysid.traces import Role
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.parts import ENSEMBLE, UNITED
+from sysid.workbench.auto.plan import SCATTER
 from sysid.workbench.auto.refit import ENOUGH, GONE_ON, _error
 from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto
-from sysid.workbench.auto.search import FOUND, LINEAR
+from sysid.workbench.auto.search import FOUND, LINEAR, Search
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.events import Event, StepProgress
+from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.store import Clock, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
 from tests.workbench.auto.conftest import data, record, traces
+from tests.workbench.auto.test_plan import trial
 
 pytestmark = pytest.mark.usefixtures("small")
 
@@ -113,6 +119,24 @@ def test_where_its_starts_are_apart_the_last_fit_is_the_mean_of_several(
         assert "ensemble" not in found.record.winning.values
         assert ("mean of" in found.results.fits[0].label) is mean
         assert ("the mean of several starts" in found.record.chosen_by) is mean
+
+
+@pytest.mark.parametrize(("left_s", "way"), [(1e9, UNITED), (50.0, ENSEMBLE), (5.0, {})])
+def test_as_many_starts_are_united_as_there_is_time_for(known: Data, left_s: float, way: dict[str, int]) -> None:
+    """Starts that are halfway trained say nothing."""
+    network = NeuralStateSpace(states=2, neurons=3)
+    point = Point(number=7, structure=network, training={"max_iterations": 100, "choose_by": "evidence"}, values={})
+    one = trial(point, 1.0).model_copy(update={"iteration_s": 0.03})
+    fold = SimpleNamespace(fitted=known.estimation)
+    search: Any = SimpleNamespace(
+        parts=SimpleNamespace(trained_on=False, folds=[fold]), data=known, config=SimpleNamespace(wall_s=600.0)
+    )
+    plan: Any = SimpleNamespace(
+        scattered={7: 2.0 * SCATTER}, points={7: point}, budget=SimpleNamespace(slowed=1.0, ends_s=100.0 + left_s)
+    )
+    assert Search._united(search, plan, one, 100.0) == way
+    plan.scattered[7] = 0.5 * SCATTER
+    assert Search._united(search, plan, one, 100.0) == {}
 
 
 def test_where_selection_traces_chose_it_is_trained_on_and_they_say_whether_for_the_better(tmp_path: Path) -> None:
