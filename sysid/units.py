@@ -57,19 +57,32 @@ _WRITTEN = {
         "ohm": "ohm|ohms",
         "Hz": "hertz|hz|cps",
         "K": "kelvin|kelvins|degk|°k",
-        "degC": "celsius|centigrade|degc|deg_c|deg c|deg. c|degrees c|degree c|°c|º c|ºc|° c|℃",
-        "degF": "fahrenheit|degf|deg_f|deg f|deg. f|degrees f|degree f|°f|ºf|° f|℉",
+        "degC": "celsius|celcius|centigrade|deg celsius|degrees celsius|grad c|grad celsius|°с|"
+        "degc|deg_c|deg c|deg. c|degrees c|degree c|°c|º c|ºc|° c|℃",
+        "degF": "fahrenheit|degrees fahrenheit|degf|deg_f|deg f|deg. f|degrees f|degree f|°f|ºf|° f|℉",
         "m": "meter|meters|metre|metres",
-        "deg": "°|º|degs|degrees|degree",
+        "deg": "°|º|degs|degrees|degree|grad|altgrad|degr",
         "rad": "radian|radians|rads",
-        "s": "sec|secs|second|seconds|sek|sek.|sec.|sekunden",
-        "ms": "msec|msecs|millisecond|milliseconds",
+        "s": "sec|secs|second|seconds|sek|sek.|sec.|sekunden|с|сек",
+        "ms": "msec|msecs|millisecond|milliseconds|мс",
         "us": "usec|µsec|microsecond|microseconds",
-        "min": "minute|minutes|mins",
-        "hour": "hours|hrs|hr",
+        "min": "min|min.|minute|minutes|mins|minuten|мин",
+        "hour": "hours|hrs|hr|std|std.|stunde|stunden|ч",
         "1": "-|–|--|none|dimensionless|unitless|n/a|na|ratio|bool",
         "percent": "%|pct|%rh|% rh|%r.h.|prozent",
-        "rpm": "rpm|u/min|rev/min|r/min|revs/min|revolutions/min|tr/min",
+        "rpm": "rpm|u/min|rev/min|r/min|revs/min|revolutions/min|tr/min|umin|upm|об/мин",
+        "kN*m": "knm|kn-m|kn·m",
+        "N*mm": "nmm|n-mm|n·mm",
+        "Pa*s": "pas|pa.s|pa·s",
+        "mPa*s": "mpas|mpa.s|mpa·s",
+        "ft^3/min": "cfm",
+        "hp": "hp",
+        "g_0": "g's|g-force",
+        "N/mm^2": "n/mm2",
+        "kgf/cm^2": "kp/cm2|kp/cm²",
+        "mmH2O": "mmws|mm ws|mm h2o|mmwc|mm wc",
+        "mH2O": "mws",
+        "kg": "kgs|кг",
         "N*m": "nm|n-m|n·m|n m|n.m|newton-meter|newtonmeter|newton meters",
         "lbf*ft": "lb-ft|ft-lb|ft-lbs|lbf-ft|ft-lbf|lbft|ft lb",
         "km/hour": "kph|kmh|km/hr",
@@ -78,12 +91,22 @@ _WRITTEN = {
         "gallon/min": "gpm|gal/min",
         "psi": "psi|lb/in2|lbf/in2",
         **{unit: unit.casefold() for unit in ("bar", "mbar", "kPa", "hPa", "kHz", "mmHg", "inHg", "mmH2O", "inH2O")},
-        **{unit: unit.casefold() for unit in ("kWh", "kW", "kN")},
+        **{unit: unit.casefold() for unit in ("kWh", "kW", "kN", "kohm", "MPa")},
     }.items()
     for word in words.split("|")
 }
-_EXACT = {"nm": "nm", "MPA": "MPa", "kn": "knot", "mS": "mS", "MS": "MS"}
-"""Texts whose capitals matter: a nanometre is no newton metre."""
+_EXACT = {
+    **{"nm": "nm", "kn": "knot", "mS": "mS", "MS": "MS", "mPa": "mPa", "mpa": "mPa", "KG": "kg", "Kg": "kg"},
+    **{"C": "degC", "F": "degF", "PS": "metric_horsepower", "mb": "mbar", "mNm": "mN*m", "MNm": "MN*m"},
+    **{"В": "V", "А": "A", "Вт": "W", "кВт": "kW", "Па": "Pa", "кПа": "kPa", "МПа": "MPa", "бар": "bar", "Гц": "Hz"},
+    **{"м": "m", "мм": "mm", "см": "cm", "Н": "N", "Нм": "N*m", "Н·м": "N*m", "л/мин": "liter/min", "м³/ч": "m^3/hour"},
+}
+"""Texts whose capitals matter: a nanometre is no newton metre. C is of degrees, not coulombs."""
+_UNPREFIXED = frozenset(
+    {"inch", "foot", "yard", "mile", "fermi", "barn", "pint", "day", "hour", "minute", "year", "week", "month"}
+    | {"number_meter", "technical_atmosphere", "degree", "pound", "point", "ounce", "grain"}
+)
+"""Units that nobody writes with a prefix: Min are no mega-inches, and cfm no centi-fermi."""
 
 # pint evaluates the exponents of a unit: 9**9**9**9 in a header would keep it busy for ever.
 _TOWER = re.compile(r"(?:\*\*|\^)[^*/^]*(?:\*\*|\^)|\d{5,}")
@@ -92,6 +115,7 @@ _LONGEST_UNIT = 40
 _NORMAL_VOLUME = re.compile(r"[NS](?:m\s*(?:\^|\*\*)?\s*[3³]|[lL](?![A-Za-z])|cm)")
 _POWER = re.compile(r"\b([kcdmµu]?m|s|min|h|hr|in|ft|kg|K|V|A|N|mol)(-?[1-6])\b")
 _WORD = re.compile(r"[A-Za-z°µΩ%]+")
+_LETTERS = re.compile(r"[^\W\d_]+")
 
 
 @cache
@@ -123,9 +147,10 @@ def plain_unit(unit: str) -> str | None:
 def _is_pint(text: str) -> bool:
     try:
         _registry().parse_units(text)
+        found = [_registry().parse_unit_name(word) for word in _LETTERS.findall(text)]
     except Exception:  # noqa: BLE001 - pint raises many unrelated classes (tokenizer errors among them)
         return False
-    return True
+    return not any(names and names[0][0] and names[0][1] in _UNPREFIXED for names in found)
 
 
 _IN_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}

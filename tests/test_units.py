@@ -48,3 +48,19 @@ def test_stamps_become_seconds_without_pint_and_to_its_last_digit(unit: str, mon
     monkeypatch.setattr(units, "_registry", lambda: pytest.fail("asked pint"))
     expected = REGISTRY.Quantity(stamps, REGISTRY.parse_units(unit)).to("s").magnitude
     assert np.array_equal(convert(stamps, unit, "s"), expected)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        *(("Grad", "deg"), ("Min", "min"), ("C", "degC"), ("cfm", "ft^3/min"), ("kNm", "kN*m"), ("mPas", "mPa*s")),
+        *(("Std", "hour"), ("PS", "metric_horsepower"), ("МПа", "MPa"), ("об/мин", "rpm"), ("mPa", "mPa")),
+    ],
+)
+def test_a_unit_is_what_people_mean_by_it(written: str, meant: str) -> None:
+    assert units.plain_unit(written) == meant
+
+
+@pytest.mark.parametrize("text", ["Mft", "kin", "cfermi", "mday"])
+def test_no_prefix_stands_before_what_has_none(text: str) -> None:
+    assert units.plain_unit(text) is None

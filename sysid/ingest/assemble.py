@@ -89,7 +89,8 @@ def assemble(
             where=source,
             expected=f"at least {grid.fewest_samples}",
             got=len(record.stamps),
-            remedy="record longer, widen start and stop, or lower grid: {fewest_samples: ...}",
+            remedy="record longer, or widen start and stop"
+            + (", or lower grid: {fewest_samples: ...}" if len(record.stamps) > 1 else ": one sample is no record"),
         )
     record = repair.missing_values(record, repairs)
     record = repair.drifts(repair.repeated_values(record, repairs), repairs)

@@ -24,6 +24,12 @@ _OF_TEXT = frozenset({"csv", "excel"})
 _LONG_SHARE = 0.6
 _CHANGE_SHARE = 0.5
 _FEW_TEXTS = 3
+_CALLED_NAMES = re.compile(
+    r"(?:signal|tag|variable|var|channel|sensor|parameter|measurement|metric|point|item|kanal|messstelle|größe|grandeur)s?"
+    r"(?:[ _]?(?:name|id|tag))?|name|_field|(?:tag|point)name",
+    re.IGNORECASE,
+)
+"""What the column is called that says which signal a row of a long table is of."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -201,6 +207,8 @@ def _names_rows(names: RawColumn, time: RawColumn) -> bool:
     pairs = np.unique(np.column_stack([time.values[known], codes[known]]), axis=0)
     if len(pairs) < max(0.9 * known.sum(), 2):
         return False
+    if _CALLED_NAMES.fullmatch(names.name.strip()):
+        return True
     again = len(np.unique(pairs[:, 0])) <= _LONG_SHARE * len(pairs)
     # One signal after the other: time steps back where the next begins, and nowhere else.
     changes, back = np.flatnonzero(np.diff(codes)), np.flatnonzero(np.diff(time.values) < 0.0)

@@ -41,8 +41,19 @@ _CLOCK = re.compile(
     r"(?:[\sT,;_]\s*|(?<=^)|(?<=[0-9]))"
     r"(?:(?P<h>[0-9]{1,4}):(?P<m>[0-9]{1,2})(?::(?P<s>[0-9]{1,2}))?"
     r"|(?P<th>[0-2][0-9])(?P<tm>[0-5][0-9])(?P<ts>[0-5][0-9]))"
-    r"(?:[.,:](?P<f>[0-9]+))?\s?(?P<half>[AaPp]\.?[Mm]\.?)?\s?(?P<zone>Z|UTC|GMT|[+-][0-9]{2}(?::?[0-9]{2})?)?"
+    r"(?:[.,:](?P<f>[0-9]+))?\s?(?P<half>[AaPp]\.?[Mm]\.?)?\s?(?P<zone>Z|[A-Z]{3,4}(?![A-Za-z])|[+-][0-9]{2}(?::?[0-9]{2})?)?"
+    r"(?:\[[\w/+-]+\])?"
 )
+_HOURS_AHEAD = {
+    word: hours
+    for hours, words in {
+        0: "UTC GMT WET", 1: "CET MEZ BST WEST", 2: "EET CEST MESZ", 3: "EEST MSK", 8: "AWST SGT HKT", 9: "JST KST",
+        10: "AEST", 11: "AEDT", 12: "NZST", 13: "NZDT", -3: "ADT BRT", -4: "AST EDT", -5: "EST CDT", -6: "CST MDT",
+        -7: "MST PDT", -8: "PST AKDT", -9: "AKST",
+    }.items()
+    for word in words.split()
+}  # fmt: skip
+"""What zones are called behind a time of day. IST is left out: it is a zone of three countries."""
 _LONGEST = 40
 _FEW = 32
 _ZERO = 48
@@ -79,7 +90,7 @@ def _taken_apart(text: str) -> _Stamp | None:
     if code is None or (found is not None and at == len(text)):
         return None if code is None else _Stamp(date=code, micros=0, clock=False)
     clock = _CLOCK.fullmatch(text, at)
-    if clock is None or (found is None and clock["h"] is None):
+    if clock is None or (found is None and clock["h"] is None) or not _is_zone(clock["zone"]):
         return None
     return _with_clock(code, clock)
 
@@ -120,7 +131,9 @@ def _all_alike(cells: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[np.int6
     found = _DATE.match(cells[0])
     start = 0 if found is None else found.end()
     clock = _CLOCK.fullmatch(cells[0], start)
-    if clock is None or clock["h"] is None or clock["s"] is None or (found and _date_code(found) is None):
+    if clock is None or clock["h"] is None or clock["s"] is None or not _is_zone(clock["zone"]):
+        return None
+    if found and _date_code(found) is None:
         return None
     spans = [match.span(name) for match, names in ((found, "abc"), (clock, "hmsf")) if match for name in names]
     spans += [found.span(name) for name in ("day", "year", "packed")] if found else []
@@ -164,11 +177,15 @@ def _codes(
     return number(found, "a") * 100_000_000 + number(found, "b") * 10_000 + number(found, "c")
 
 
+def _is_zone(zone: str | None) -> bool:
+    return not zone or zone[0] in "Z+-" or zone in _HOURS_AHEAD
+
+
 def _minutes(zone: str | None) -> int:
     if not zone:
         return _ZONELESS
     if zone[0] not in "+-":
-        return 0
+        return 60 * _HOURS_AHEAD.get(zone, 0)
     digits = zone[1:].replace(":", "")
     return (-1 if zone[0] == "-" else 1) * (int(digits[:2]) * 60 + int(digits[2:] or 0))
 

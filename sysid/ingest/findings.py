@@ -68,6 +68,8 @@ class FileFinding:
         sample_time: Seconds between samples as proposed.
         samples: How many rows the file has.
         unstamped: How many of them have no time stamp.
+        tolerance: How far off the grid stamps may lie that were rounded when they were written, as a fraction of the
+            sample time; ``None`` where the usual will do.
         distinct: How many different time stamps there are; rows without stamps are all different.
         needed: The repairs that the file needs, with the gentlest choice of each.
         files: The reader options that the file was read with, where they are not recognised by itself.
@@ -90,6 +92,7 @@ class FileFinding:
     needed: RepairOptions
     files: FileOptions
     table: RawTable = field(repr=False)
+    tolerance: float | None = None
     guessed: frozenset[str] = frozenset()
     notes: tuple[str, ...] = field(default=())
     cases: tuple[CaseFinding, ...] = field(default=())
@@ -115,6 +118,7 @@ class FileFinding:
         found += [counted(len(timing.duplicates), "duplicate time stamp") + after] if len(timing.duplicates) else []
         gaps = counted(len(timing.gaps), "gap")
         found += [f"{counted(timing.missing, 'sample')} missing in {gaps}"] if timing.missing else []
+        found += [f"time stamps are rounded, up to {timing.jitter:.2g} s off an even clock"] if self.tolerance else []
         found += [f"uneven time stamps, up to {timing.jitter:.3g} s off"] if self.needed.jitter else []
         if timing.missing > self.samples:
             found.append("a gap is longer than what was recorded: a clock that was set anew, or records of their own")

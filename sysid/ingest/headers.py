@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sysid.units import Reference, plain_unit
@@ -14,6 +16,7 @@ _ARGUMENT = re.compile(r"^(?:.*\S[\[(]\s*[kn]\s*(?:[+-]\s*\d+\s*)?[\])]|[^\W\d]\
 _BRACKETS = re.compile(r"^(?P<name>.*?\S)\s*\[(?P<unit>[^\[\]]*)\]\s*$", re.DOTALL)
 _PARENTHESES = re.compile(r"^(?P<name>.*?\S)\s*\((?P<unit>[^()]*(?:\([ag]\))?)\)\s*$", re.DOTALL)
 _SPOKEN = re.compile(r"^(?P<name>.*?\S)(?:\s+(?P<mark>/|in)|,)\s+(?P<unit>\S+)$", re.DOTALL)
+_NODE = re.compile(r"[vViI]\w{0,2}\([^()]*\)")  # a voltage or a current of a circuit: V(out), Id(M1)
 _REFERENCE_WORD = re.compile(r"^(?P<unit>.*?\S)\s*(?:\b|\()(?P<word>gauge|absolute|abs|[ga](?=\)$))\)?$", re.IGNORECASE)
 _FUSED = {
     "barg": ("bar", Reference.GAUGE),
@@ -136,6 +139,41 @@ def parse_header(text: str) -> Header:
         unit, reference = split_reference(match["unit"])
         return Header(name=match["name"].strip(), unit=unit, reference=reference)
     return Header(name=text.strip())
+
+
+def parse_headers(texts: Sequence[str]) -> list[Header]:
+    """Take the headers of a table apart, each in the light of the others.
+
+    Brackets that tell columns of one name apart belong to the names, as those of circuits do: ``V(in)`` is no voltage
+    in inches beside ``V(out)`` or ``I(R1)``.
+
+    Args:
+        texts: The header of each column.
+
+    Returns:
+        Name, unit and reference of each.
+
+    Example:
+        >>> [header.name for header in parse_headers(["time", "V(in)", "I(R1)"])]
+        ['time', 'V(in)', 'I(R1)']
+        >>> [header.unit for header in parse_headers(["t (s)", "U (V)", "U2 (mV)"])]
+        ['s', 'V', 'mV']
+    """
+    headers = [parse_header(text) for text in texts]
+    found = [_PARENTHESES.match(text.strip()) for text in texts]
+    nodes = [
+        match is not None and _NODE.fullmatch(text.strip()) is not None
+        for match, text in zip(found, texts, strict=True)
+    ]
+    circuit = any(node and header.unit is None for node, header in zip(nodes, headers, strict=True))
+    heads = Counter(match["name"] for match in found if match is not None)
+    taken = {match["name"] for match, header in zip(found, headers, strict=True) if match and header.unit is None}
+    return [
+        Header(name=text.strip())
+        if match is not None and ((circuit and node) or (heads[match["name"]] > 1 and match["name"] in taken))
+        else header
+        for text, header, match, node in zip(texts, headers, found, nodes, strict=True)
+    ]
 
 
 def _is_spoken(unit: str, mark: str | None) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import ReaderError
 from sysid.ingest.attempts import Attempt, read_somehow
 from sysid.ingest.blanks import blanks_mean, marks_in
 from sysid.ingest.clocks import clock_of
@@ -25,13 +26,14 @@ from sysid.ingest.restarts import finer_than_clock, records_by_clock
 from sysid.ingest.second_clocks import counts_rows, is_counter, without_second_clocks
 from sysid.ingest.table import RawTable
 from sysid.ingest.time_columns import is_time_unit
-from sysid.ingest.timing import Timing, even_step, round_step, survey
+from sysid.ingest.timing import Timing, even_step, round_step, rounded_step, survey
 from sysid.traces.converter import coarse_step
 from sysid.units import Reference, atmosphere_in, is_pressure
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
 _EMPTY_SHARE = 0.8  # of a column, above which its missing values are no reason to leave samples out
+_FEW_STATES = 6
 _FAR, _FEW = 20.0, 0.2  # spans of all other values, and the share of samples that a mark of missing ones may have
 
 
@@ -75,10 +77,10 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
     time, told = _time(table, files)
     clock = time.column
     if "zone" in attempt.guessed:
-        told = f"guessed: the clock on the wall of {time.zone}, as it jumps by an hour"
+        told = f"guessed: the clock on the wall of {time.zone}, as it is put forward or back there"
     if "format" in attempt.guessed:
         told = f"guessed: {time.column} is the digits of dates, {time.format}"
-    timing, unstamped, step = None, 0, time.step or 1.0
+    timing, unstamped, step, tolerance = None, 0, time.step or 1.0, None
     needs: dict[str, object] = {}
     if time.step is None:
         stamps = stamps_in_seconds(table, files.model_copy(update={"time": time}))
@@ -86,7 +88,7 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         unstamped = len(stamps) - len(known)
         timing = survey(known) if len(known) else None
         if timing is not None:
-            step, needs = _needs(known, timing)
+            step, needs, tolerance = _needs(known, timing)
             if needs.get("duplicates") and are_events(stamps, [c for c in table.columns if c.name != clock]):
                 needs["duplicates"] = "last"
             finer = None if unstamped else finer_than_clock(known, timing)
@@ -128,6 +130,7 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         sample_time=step,
         samples=len(table),
         unstamped=unstamped,
+        tolerance=tolerance,
         distinct=len(table) if timing is None else _distinct(known, timing),
         needed=RepairOptions.model_validate(needed),
         files=files,
@@ -306,28 +309,32 @@ def _rising(columns: Sequence[RawColumn]) -> str | None:
     return None
 
 
-def _needs(known: NDArray[np.float64], timing: Timing) -> tuple[float, dict[str, object]]:
-    """Sample time, and the repairs of time that the stamps need."""
+def _needs(known: NDArray[np.float64], timing: Timing) -> tuple[float, dict[str, object], float | None]:
+    """Sample time, the repairs of time that the stamps need, and how far they are rounded where only that is uneven."""
     known = known if timing.in_order else np.sort(known)
     clean = timing if timing.in_order else survey(known)
     if not clean.step > 0.0:
-        return 1.0, {"duplicates": "drop" if len(clean.duplicates) else None}
+        return 1.0, {"duplicates": "drop" if len(clean.duplicates) else None}, None
     rising = np.delete(known, clean.duplicates) if len(clean.duplicates) else known
-    even = even_step(rising, clean if rising is known else survey(rising), tolerance=GridOptions().tolerance)
+    surveyed = clean if rising is known else survey(rising)
+    even = even_step(rising, surveyed, tolerance=GridOptions().tolerance)
+    rounded = rounded_step(rising, surveyed) if even is None else None
     usual = float(np.mean(np.abs(np.diff(rising) - clean.median_step) <= 0.01 * clean.median_step))
     # A stamp or two that are wrong say nothing of the others' distance.
-    step = even or round_step(clean.median_step if usual >= _EVEN_SHARE else clean.step)
-    return step, {
+    uneven = round_step(clean.median_step if usual >= _EVEN_SHARE else clean.step)
+    step, tolerance = (even or uneven, None) if rounded is None else rounded
+    needs: dict[str, object] = {
         "backward": "sort" if len(timing.backward) else None,
         "duplicates": "drop" if len(clean.duplicates) else None,
         "gaps": "mask" if len(clean.gaps) else None,
-        "jitter": "resample" if even is None else None,
+        "jitter": "resample" if even is None and rounded is None else None,
     }
+    return step, needs, tolerance
 
 
 def _column(column: RawColumn) -> ColumnFinding:
     finite = _finite(column.values)
-    problem = "" if column.problem is None else column.problem.what
+    problem = "" if column.problem is None else _told(column, column.problem)
     if not problem and len(finite) < min(2, len(column.values)):
         problem = f"one value only, {finite[0]:g}" if len(finite) else "no values at all"
     if column.counted_from and not problem:
@@ -353,6 +360,15 @@ def _column(column: RawColumn) -> ColumnFinding:
         far=_far(finite),
         step=coarse_step(finite) or 0.0,
     )
+
+
+def _told(column: RawColumn, problem: ReaderError) -> str:
+    """Why a column cannot be used; words that might be states are quoted."""
+    words = column.words
+    if words is None or not words.complete or not 1 < len(words.texts) <= _FEW_STATES:
+        return problem.what
+    quoted = ", ".join(f"{text[:20]!r}" for text in words.texts)
+    return f"{problem.what} ({quoted}): source.files.states says which number each is"
 
 
 def _far(values: NDArray[np.float64]) -> str:

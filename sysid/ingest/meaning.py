@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError, ConfigError, ReaderError, UnitError
 from sysid.ingest.clocks import clock_of
 from sysid.ingest.columns import RawColumn
+from sysid.ingest.joining import Signal, joined
 from sysid.ingest.options import FileOptions, LongOptions
 from sysid.ingest.table import RawTable
 from sysid.ingest.time_columns import time_unit
@@ -18,6 +20,10 @@ from sysid.units import convert
 
 _RATED = ("s", "ms", "us", "ns", "min", "h")
 """Units in which a time beside a rate may count."""
+_FEWEST, _EVEN, _TOGETHER = 8, 0.9, 0.5
+"""A long table is of signals with clocks of their own where the fastest of so many samples is as even, and another
+shares fewer of its stamps."""
+_WHOLE = 2.0**53
 _NEAR = 0.02
 """Share of a sample time by which the steps of a clock may be off it."""
 
@@ -133,18 +139,43 @@ def _wide(table: RawTable, long: LongOptions) -> RawTable:
     if source.problem is not None:
         raise source.problem
     columns: list[RawColumn] = [replace(time, values=stamps)]
+    signals: list[Signal] = []
     twice = 0
     for code, text in enumerate(texts):
         mine = (codes == code) & np.isfinite(time.values)
         values = np.full(len(stamps), np.nan)
         values[places[mine]] = source.values[mine]
         twice += int(mine.sum()) - len(np.unique(places[mine]))
-        unit = _unit_of(by_name.get(long.units or ""), mine)
-        columns.append(RawColumn(name=text, values=values, unit=unit or source.unit))
+        unit = _unit_of(by_name.get(long.units or ""), mine) or source.unit
+        columns.append(RawColumn(name=text, values=values, unit=unit))
+        signals += [_signal(columns[-1], stamps)] if np.isfinite(values).any() else []
     notes = [*table.notes, f"a long table of {len(texts)} signals made wide"]
     notes += [f"{twice} values stand twice at one time: the last one counts"] if twice else []
     lines = None if table.lines is None else table.lines[rows]
+    if _have_own_clocks(signals):
+        at, told = joined(signals, table.source)
+        columns = [replace(time, values=at[0].stamps)]
+        columns += [RawColumn(name=one.name, values=one.values.astype(np.float64), unit=one.unit) for one in at]
+        return replace(table, columns=tuple(columns), lines=None, notes=(*notes, *told))
     return replace(table, columns=tuple(columns), lines=lines, notes=tuple(notes))
+
+
+def _signal(column: RawColumn, stamps: NDArray[np.float64]) -> Signal:
+    """What stands in a column of a long table, at its own stamps."""
+    known = np.isfinite(column.values)
+    values = column.values[known]
+    whole = values.astype(np.int64) if (np.abs(values) < _WHOLE).all() and (values == np.rint(values)).all() else values
+    return Signal(name=column.name, group="", values=whole, stamps=stamps[known], unit=column.unit)
+
+
+def _have_own_clocks(signals: Sequence[Signal]) -> bool:
+    """Whether signals were stamped one by one, the fastest of them evenly, not at common times with some left out."""
+    fastest = min(signals, key=lambda signal: (signal.step, -len(signal.stamps)), default=None)
+    if fastest is None or len(fastest.stamps) < _FEWEST:
+        return False
+    steps = np.diff(fastest.stamps)
+    even = float(np.mean(np.abs(steps - fastest.step) <= 0.25 * fastest.step))
+    return even >= _EVEN and any(np.mean(np.isin(one.stamps, fastest.stamps)) < _TOGETHER for one in signals)
 
 
 def _names(column: RawColumn, table: RawTable) -> tuple[list[str], NDArray[np.integer]]:

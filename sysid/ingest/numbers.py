@@ -21,6 +21,7 @@ USUAL_MISSING = frozenset(
     {"na", "n/a", "#n/a", "n.a.", "null", "none", "nil", "nodata", "no data", "-", "--", "---", "----", "?", "???", "*"}
     | {"err", "error", "bad", "bad input", "i/o timeout", "invalid", "overrange", "ovf", "ol", "open circuit", "fault"}
     | {"#value!", "#num!", "#div/0!", "#ref!", "#name?", "#null!", "****", "*****", "missing", "inval"}
+    | {"1.#inf", "-1.#inf", "1.#inf00", "-1.#inf00"}
 )
 """Texts that mostly stand for a missing value: proposed as ``missing``, and never taken so by themselves."""
 

@@ -42,6 +42,14 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None, split: 
             or "time alone",
             remedy="choose another file, or read it with other options",
         )
+    if finding.samples < 2:
+        raise ReaderError(
+            "one sample is no record",
+            where=finding.path,
+            expected="a row of numbers for each sample, at least two",
+            got=f"{finding.samples} row",
+            remedy="check that the recording was saved, and the options separator and skip_lines",
+        )
     # A data set under datasets/ is called by its folder, whatever the file is called.
     place = finding.path if folder is None else folder.resolve()
     name = place.name if place.parent.name == "datasets" and folder is not None else bare_stem(finding.path)
@@ -145,6 +153,8 @@ def _grid(finding: FileFinding) -> list[str]:
     pairs: dict[str, object] = {}
     if finding.needed.jitter is not None:
         pairs["method"] = "linear"
+    if finding.tolerance is not None:
+        pairs["tolerance"] = finding.tolerance
     if finding.distinct < GridOptions().fewest_samples:
         pairs["fewest_samples"] = max(finding.distinct, 2)
     return [f"  grid: {_mapping(pairs)}"] if pairs else []

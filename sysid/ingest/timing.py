@@ -13,6 +13,7 @@ from sysid.ingest.grid import grid_places
 _MOST_SLOTS = 1e18  # of one gap: a stamp that is nonsense shall not overflow
 _PIECE = 1 << 16
 _FEW = 0.25  # of the samples, that may be missing for stamps to be asked whether they are uneven instead
+_FEWEST_ROUNDED = 16  # stamps that tell a rounded clock from an uneven one
 _GAP_FACTOR = 1.5  # a step this many times the usual one means that a sample is missing
 
 
@@ -172,6 +173,49 @@ def even_step(stamps: NDArray[np.float64], timing: Timing, *, tolerance: float) 
         if places is not None and int(np.sum(np.diff(places) > 1)) == len(timing.gaps):
             return value
     return None
+
+
+def rounded_step(stamps: NDArray[np.float64], timing: Timing) -> tuple[float, float] | None:
+    """The sample time of an even clock whose stamps were rounded when they were written: 30 in a second, to 0.01 s.
+
+    Between neighbours there are then two steps only, one unit of the last digit apart, and no stamp is further off an
+    even clock than that unit: nothing has to be interpolated.
+
+    Args:
+        stamps: Shape ``(n,)``, rising, seconds.
+        timing: Their survey.
+
+    Returns:
+        The sample time, as a period or a rate of few digits; and how far off the grid of the first stamp the others
+        may lie, as a fraction of it. ``None`` if the clock is not such a one.
+
+    Example:
+        >>> stamps = np.round(np.arange(60) / 30, 2)
+        >>> rounded_step(stamps, survey(stamps))
+        (0.03333333333333333, 0.31)
+    """
+    if len(stamps) < _FEWEST_ROUNDED or not timing.step > 0.0:
+        return None
+    slots = np.rint((stamps - stamps[0]) / timing.step)
+    apart = np.diff(slots)
+    steps = np.sort(np.diff(stamps)[apart == 1.0])
+    if apart.min() < 1.0 or len(steps) < 2 or int(np.sum(apart > 1.0)) != len(timing.gaps):
+        return None
+    fuzz = max(1e-6 * timing.step, 8.0 * float(np.spacing(np.abs(stamps).max())))
+    rises = np.diff(steps)
+    unit = float(steps[-1] - steps[0])
+    if int(np.sum(rises > fuzz)) != 1 or rises.max() < unit - fuzz or not fuzz < unit < 0.5 * timing.step:
+        return None
+    found = [(len(f"{value:.15g}".strip("0.")), rate, value) for value, rate in _periods_and_rates(timing.step)]
+    for _, rate, value in sorted(found):
+        step = 1.0 / value if rate else value
+        if np.ptp(stamps - step * slots) <= unit * (1.0 + 1e-3) + fuzz:
+            return step, float(np.ceil(100.0 * (unit + fuzz) / step) / 100.0)
+    return None
+
+
+def _periods_and_rates(step: float) -> list[tuple[float, bool]]:
+    return [(value, False) for value in _by_digits(step)] + [(value, True) for value in _by_digits(1.0 / step)]
 
 
 def _by_digits(step: float) -> list[float]:

@@ -23,7 +23,15 @@ PAIRS: tuple[dict[str, float], ...] = tuple(
         *("off on", "aus ein", "aus an", "uit aan", "closed open", "close open", "zu auf", "dicht open", "shut open"),
         *("no yes", "nein ja", "nee ja", "low high", "stop run", "stopped running", "inactive active", "idle active"),
         *("disabled enabled", "released applied", "released pressed", "falsch wahr", "faux vrai", "f t", "n y"),
-        *("down up", "ok alarm", "normal alarm", "ok fault", "manual auto"),
+        *("down up", "ok alarm", "normal alarm", "ok fault", "manual auto", "ok nok"),
+        *("non oui", "fermé ouvert", "fermée ouverte", "ferme ouvert", "arrêt marche", "arret marche", "éteint allumé"),
+        *("spento acceso", "chiuso aperto", "no si", "no sì", "falso vero"),
+        *("apagado encendido", "cerrado abierto", "cerrada abierta", "no sí", "falso verdadero"),
+        *("desligado ligado", "fechado aberto", "fechada aberta", "não sim", "falso verdadeiro"),
+        *("av på", "fra til", "stängd öppen", "lukket åpen", "lukket åben", "nej ja", "nei ja", "ei kyllä"),
+        *("wyłączony włączony", "wył zał", "zamknięty otwarty", "nie tak", "vypnuto zapnuto", "ne ano"),
+        *("kapalı açık", "hayır evet", "выкл вкл", "закрыт открыт", "закрыто открыто", "нет да"),
+        *("关 开", "关闭 打开", "關 開", "停止 运行", "停止 運転", "オフ オン", "切 入", "閉 開", "否 是"),
     )
 )
 """States that are known: proposed as numbers, to be checked."""
@@ -79,6 +87,16 @@ class Words:
                 remedy="leave the column out",
             )
         shown = ", ".join(f"{text[:30]!r}" for text in self.texts[:6])
+        shown = shown if len(self.texts) <= 6 else f"{shown} and {len(self.texts) - 6} more"
+        if all(sum(map(str.isdigit, text)) >= _DIGITS_OF_STAMPS for text in self.texts):
+            return ReaderError(
+                "the column holds dates or times in a form that is not known",
+                where=where,
+                expected="ISO 8601 (2024-05-01 10:00:00.5), or a pattern",
+                got=shown,
+                remedy="if it is the time, give its pattern as for datetime.strptime: "
+                "time: {column: ..., unit: datetime, format: '%d.%m.%Y %H:%M:%S.%f'}",
+            )
         # The one that stands for nothing is 0, whichever came first.
         ordered = sorted(self.texts[:6], key=lambda text: text.casefold() not in NOTHING)
         table = ", ".join(f"{quoted(text)}: {index}" for index, text in enumerate(ordered))
@@ -86,30 +104,18 @@ class Words:
             "the column holds words",
             where=where,
             expected="numbers, or a number for each word",
-            got=shown if len(self.texts) <= 6 else f"{shown} and {len(self.texts) - 6} more",
+            got=shown,
             remedy=f"say what they stand for: states: {{{table}}}"
             + (", and so on for each word" if len(self.texts) > 6 else "")
             + f"; if one stands for a missing value, write missing: [{quoted(self.texts[0])}]",
         )
 
 
-NOTHING = {
-    "off",
-    "false",
-    "no",
-    "n",
-    "low",
-    "shut",
-    "closed",
-    "stop",
-    "stopped",
-    "idle",
-    "inactive",
-    "aus",
-    "zu",
-    "nein",
-}
+NOTHING = {"shut", "closed", "false", *(word for pair in PAIRS for word, number in pair.items() if not number)}
 """Words that stand for 0 beside their opposites."""
+
+_DIGITS_OF_STAMPS = 4
+"""So many digits in every text are a date or a time, or none that states have."""
 
 
 def quoted(text: str) -> str:
@@ -192,11 +198,16 @@ def known_states(texts: Sequence[str]) -> dict[str, float] | None:
     Returns:
         Numbers by text, or ``None`` if the texts are not a known pair, or one of a pair.
     """
-    plain = {text.casefold() for text in texts}
+    plain = {text: _folded(text) for text in texts}
     for pair in PAIRS:
-        if len(plain) > 1 and plain == set(pair):
-            return {text: pair[text.casefold()] for text in sorted(texts, key=lambda text: pair[text.casefold()])}
+        folded = {_folded(word): number for word, number in pair.items()}
+        if len(plain) > 1 and set(plain.values()) == set(folded):
+            return {text: folded[plain[text]] for text in sorted(texts, key=lambda text: folded[plain[text]])}
     return None
+
+
+def _folded(text: str) -> str:
+    return text.casefold().replace("ı", "i")  # which is I in capitals
 
 
 def _truth(texts: Sequence[str]) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+import re
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from functools import cache
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError, available_timezones
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +15,10 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 
 _SECOND = 1_000_000
-_HOUR = 3600 * _SECOND
+_SHIFTS = (3600 * _SECOND, 1800 * _SECOND)  # by which clocks are changed; by half an hour on Lord Howe Island
 _QUARTER = 900 * _SECOND  # no clock is changed but at a quarter of an hour
-_EPOCH = datetime(1970, 1, 1)
+_EPOCH, _A_DAY = datetime(1970, 1, 1), timedelta(days=1)
+_IN_USE = re.compile(r"(?:Africa|America|Antarctica|Asia|Atlantic|Australia|Europe|Indian|Pacific)/[A-Z][a-z].*")
 
 CANDIDATES = (
     "Europe/Berlin",
@@ -23,8 +27,11 @@ CANDIDATES = (
     "America/New_York",
     "Australia/Sydney",
     "Pacific/Auckland",
+    "America/Santiago",
+    "Atlantic/Azores",
+    "Africa/Cairo",
 )
-"""One zone for each rule of when the clock is changed; which of those with one rule does not matter for differences."""
+"""One zone for each rule that many live by; which of those with one rule does not matter for differences."""
 
 
 def to_utc(local: NDArray[np.int64], zone: str, *, where: str) -> NDArray[np.int64]:
@@ -63,7 +70,7 @@ def to_utc(local: NDArray[np.int64], zone: str, *, where: str) -> NDArray[np.int
 
 
 def guess_zone(local: NDArray[np.int64]) -> tuple[str, int] | None:
-    """A zone that explains why a clock jumps by an hour.
+    """A zone that explains why a clock jumps by an hour, or by half of one: one that many live by, else any other.
 
     Args:
         local: Shape ``(n,)``, microseconds since 1970 as the clock showed them.
@@ -76,18 +83,30 @@ def guess_zone(local: NDArray[np.int64]) -> tuple[str, int] | None:
     if not len(rising):
         return None
     usual = float(np.median(rising))
-    odd = np.abs(steps - usual) > 0.5 * usual
-    jumps = np.flatnonzero(
-        odd & (np.minimum(np.abs(steps + _HOUR - usual), np.abs(steps - _HOUR - usual)) < 0.5 * usual)
-    )
-    for zone in CANDIDATES if len(jumps) else ():
+    odd = np.abs(steps - usual) > 0.4 * usual  # half an hour, of samples an hour apart
+    near = [np.minimum(np.abs(steps + shift - usual), np.abs(steps - shift - usual)) < 0.5 * usual for shift in _SHIFTS]
+    jumps = np.flatnonzero(odd & np.logical_or.reduce(near))
+    if not len(jumps):
+        return None
+    first = int(jumps[0])
+    for zone in itertools.chain(CANDIDATES, _changing(local[first], local[first + 1])):
         try:
             explained = np.diff(to_utc(local, zone, where=""))[jumps]
         except ReaderError:
             continue
         if (np.abs(explained - usual) < 0.5 * usual).all():
-            return zone, int(jumps[0]) + 1
+            return zone, first + 1
     return None
+
+
+def _changing(before: np.int64, after: np.int64) -> Iterator[str]:
+    """The zones whose clocks are changed within a day of two stamps."""
+    low, high = (_EPOCH + timedelta(microseconds=int(stamp)) for stamp in (min(before, after), max(before, after)))
+    for zone in sorted(filter(_IN_USE.fullmatch, available_timezones())):
+        place = ZoneInfo(zone)
+        ahead = [stamp.replace(tzinfo=place).utcoffset() for stamp in (low - _A_DAY, high + _A_DAY)]
+        if ahead[0] != ahead[1]:
+            yield zone
 
 
 def _second_time(local: NDArray[np.int64], twice: NDArray[np.bool_], shift: int) -> NDArray[np.bool_]:

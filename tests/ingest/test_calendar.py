@@ -96,6 +96,11 @@ def test_the_clock_on_the_wall_is_undone(zone: str, start: datetime, step: float
         ("Europe/Berlin", datetime(2024, 3, 31, 0, 30)),
         ("America/New_York", datetime(2024, 11, 3, 5, 30)),
         ("Australia/Sydney", datetime(2024, 4, 6, 15, 30)),
+        ("Australia/Lord_Howe", datetime(2024, 4, 6, 14, 30)),
+        ("Australia/Lord_Howe", datetime(2024, 10, 5, 15, 0)),
+        ("America/Santiago", datetime(2024, 4, 7, 2, 30)),
+        ("Africa/Cairo", datetime(2024, 10, 31, 20, 30)),
+        ("America/Sao_Paulo", datetime(2018, 2, 18, 1, 30)),
     ],
 )
 def test_a_zone_is_proposed_where_it_explains_the_jump(zone: str, start: datetime, step: float) -> None:
@@ -145,3 +150,11 @@ def test_many_cells_at_once_are_what_each_of_them_is(form: str, start: datetime,
     for row, cell in enumerate(cells):
         one_by_one.add([cell], np.array([row]))
     np.testing.assert_array_equal(together, one_by_one.finish()[0])
+
+
+def test_zones_by_name_behind_the_clock() -> None:
+    autumn = [f"27.10.2024 0{h}:30:00 {zone}" for h, zone in ((1, "CEST"), (2, "CEST"), (2, "CET"), (3, "CET"))]
+    assert seconds(*autumn) == [0.0, 3600.0, 7200.0, 10_800.0]
+    assert seconds("2024-11-03 01:59:59 EDT", "2024-11-03 01:00:00 EST") == [0.0, 1.0]
+    assert seconds("2024-10-27T02:30:00+02:00[Europe/Berlin]", "2024-10-27T02:30:00+01:00[Europe/Berlin]") == [0, 3600]
+    assert not is_calendar("2024-11-03 01:59:59 PUMP")

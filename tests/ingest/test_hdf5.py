@@ -111,3 +111,15 @@ def test_stamps_and_words_as_text_are_read(tmp_path: Path, kind: str) -> None:
     table = read_table(tmp_path / "run.h5", files=FileOptions(states={"open": 1.0, "closed": 0.0}))
     assert table.find("valve").values.tolist() == [float(k % 7 > 3) for k in range(n)]
     assert table.find("y").values.tolist() == y.tolist()
+
+
+def test_scales_of_no_convention_are_told_and_not_applied(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["t"] = TIME
+        file["y"] = np.round(1000 * VOLT).astype(np.int16)
+        file["y"].attrs.update({"gain": 0.001, "offset": 1.0})
+    table = read_table(tmp_path / "a.h5")
+    assert any("gain = 0.001, offset = 1" in note for note in table.notes)
+    np.testing.assert_array_equal(table.find("y").values, np.round(1000 * VOLT))

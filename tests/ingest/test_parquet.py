@@ -40,3 +40,12 @@ def test_integers_beyond_float64_are_refused_not_rounded(tmp_path: Path) -> None
     parquet.write_table(pa.table({"t": [0.0, 1.0], "n": [2**60 + 1, 5]}), tmp_path / "run.parquet")
     with pytest.raises(ReaderError, match="53 bits"):
         read_table(tmp_path / "run.parquet").find("n")
+
+
+def test_columns_of_structures_are_a_column_for_each_field(tmp_path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    inner = pa.array([{"gyro": {"x": value}, "n": 1.0} for value in VOLT])
+    parquet.write_table(pa.table({"time": TIME, "imu": inner}), tmp_path / "run.parquet")
+    np.testing.assert_array_equal(read_table(tmp_path / "run.parquet").find("imu.gyro.x").values, VOLT)

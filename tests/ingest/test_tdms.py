@@ -42,3 +42,11 @@ def test_tdms_channels_with_clocks_of_their_own_are_joined(tmp_path: Path) -> No
     expected = 10.0 * np.minimum(TIME, 1.9)
     expected[TIME < 0.099] = np.nan
     np.testing.assert_allclose(table.find("y").values, expected, rtol=1e-12)
+
+
+def test_tdms_units_as_ni_daqmx_writes_them(tmp_path: Path) -> None:
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment([ChannelObject("g", "p", VOLT, {"wf_increment": 0.1, "NI_UnitDescription": "bar"})])
+    assert read_table(tmp_path / "a.tdms").find("p").unit == "bar"

@@ -56,6 +56,7 @@ def _reads(kind: str, opened: Callable[[Path], tuple[Any, int, Iterator[Any]]]) 
 
         try:
             schema, rows, parts = opened(path)
+            schema = _flat(schema.empty_table()).schema
             check_claim(path, [("the table", (rows, len(schema)))])
             arrays = _arrays(schema, rows, parts)
         except (pa.ArrowException, OSError) as error:
@@ -75,6 +76,15 @@ def _reads(kind: str, opened: Callable[[Path], tuple[Any, int, Iterator[Any]]]) 
     return _read
 
 
+def _flat(table: Any) -> Any:
+    """A table whose columns of structures are a column for each of their fields, ``imu.gyro.x``."""
+    import pyarrow as pa
+
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
+    return table
+
+
 def _arrays(schema: Any, rows: int, parts: Iterator[Any]) -> list[NDArray[Any]]:
     """Every column as one array: plain numbers are put in their place part by part, so that one copy is held."""
     import pyarrow as pa
@@ -83,7 +93,7 @@ def _arrays(schema: Any, rows: int, parts: Iterator[Any]) -> list[NDArray[Any]]:
     whole: list[Any] = [np.empty(rows) if is_plain else [] for is_plain in plain]
     at = 0
     for part in parts:
-        for index, chunks in enumerate(part.columns):
+        for index, chunks in enumerate(_flat(part).columns):
             if plain[index]:
                 # A null becomes NaN by itself, in float columns and in integer ones.
                 begin = at

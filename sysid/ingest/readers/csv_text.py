@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 from sysid.ingest.calendar import Calendar
 from sysid.ingest.columns import RawColumn
-from sysid.ingest.headers import Header, parse_header, split_reference
+from sysid.ingest.headers import Header, parse_headers, split_reference
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.rates import said_step
 from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
@@ -24,7 +24,14 @@ from sysid.ingest.readers.csv_layout import Layout, recognise
 from sysid.ingest.readers.csv_sideways import sideways
 from sysid.ingest.readers.reader import Reader
 from sysid.ingest.readers.sheets import SheetText
-from sysid.ingest.readers.text_source import PACKED_SUFFIXES, TextFile, ZeroBytesError, encodings, not_text
+from sysid.ingest.readers.text_source import (
+    PACKED_SUFFIXES,
+    TextFile,
+    ZeroBytesError,
+    encodings,
+    not_text,
+    seems_garbled,
+)
 from sysid.ingest.table import RawTable
 from sysid.ingest.time_columns import recognise_time
 from sysid.ingest.words import WordCollector, states_for
@@ -74,6 +81,8 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
     raw, guess = _finished(headers, columns, layout, path, notes, calendar=time)
     if layout.numbers.decimal != ".":
         notes.append("decimal comma")
+    if file.encoding == "cp1252" and options.encoding is None and seems_garbled(layout.names):
+        notes.append("the names are no words in Windows-1252: name the encoding (encoding: cp1251, cp1250, cp932 ...)")
     clock = headers[time].name if time is not None else recognise_time(raw)
     above = [*layout.comments, *(layout.separator.join(row.cells) for row in layout.preamble)]
     step = said_step(above)
@@ -116,7 +125,7 @@ def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
     texts: Sequence[str] = layout.names or [f"column_{index + 1}" for index in range(width)]
     if options.names is not None:
         texts = _given_names(options.names, layout, path)
-    headers = [parse_header(from_csv_cell(text)) for text in texts]
+    headers = parse_headers([from_csv_cell(text) for text in texts])
     headers = [
         Header(name=header.name, unit=split_reference(suffix)[0]) if suffix and header.unit is None else header
         for header, suffix in zip(headers, layout.suffixes, strict=True)

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import ReaderError
-from sysid.ingest.readers.joining import Signal, joined_signals
+from sysid.ingest.joining import Signal
+from sysid.ingest.readers.joining import joined_signals
 from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, refused, texts_of
 from sysid.ingest.readers.records import role_of
 

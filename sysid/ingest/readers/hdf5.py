@@ -25,6 +25,11 @@ from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable
 from sysid.units import Reference
 
+_CF = {"scale_factor", "add_offset"}
+_LIKE_SCALES = re.compile(
+    r"(?:.*[_ .])?(?:gain|offset|scale|scaling|factor|slope|intercept|sensitivity|lsb|bias)(?:[_ .]?(?:factor|value))?",
+    re.IGNORECASE,
+)
 _SINCE = re.compile(r"\s*(\w+)\s+since\s+(.+)", re.IGNORECASE | re.DOTALL)
 _POWERS = re.compile(r"(?=.*\d)[A-Za-z]+(?:-?[1-9])?(?: [A-Za-z]+(?:-?[1-9])?)*")
 _COLUMN_NAMES = ("columns", "column_names", "channel_names", "channels", "names")
@@ -188,7 +193,7 @@ def _is_said(key: str) -> bool:
     return key in _COLUMN_NAMES or step_in(key, 1.0) is not None or key in {
         "units", "unit", "description", "long_name", "reference", "scale_factor", "add_offset", "_FillValue",
         "missing_value", "valid_min", "valid_max", "valid_range", "standard_name", "_Unsigned",
-    }  # fmt: skip
+    } or _LIKE_SCALES.fullmatch(key) is not None  # fmt: skip
 
 
 def _classic_tree(path: Path) -> tuple[dict[str, Any], dict[str, str], list[str]]:
@@ -249,6 +254,10 @@ def _unpacked(name: str, array: NDArray[Any], attributes: Mapping[str, Any], not
     ]  # fmt: skip
     scale, offset = (_number(attributes.get(key)) for key in ("scale_factor", "add_offset"))
     bounds = _valid(attributes)
+    other = {key: _number(attributes[key]) for key in attributes if key not in _CF and _LIKE_SCALES.fullmatch(key)}
+    if any(value is not None and value not in {0.0, 1.0} for value in other.values()):
+        told = ", ".join(f"{key} = {value:g}" for key, value in other.items() if value is not None)
+        notes.append(f"{name}: {told} beside it: not applied, as no convention says how it is meant")
     if not stand_ins and scale is None and offset is None and bounds is None:
         return array
     missing = np.zeros(array.shape, dtype=np.bool_)

@@ -9,8 +9,9 @@ import numpy as np
 
 from sysid.errors import ReaderError, did_you_mean
 from sysid.extras import need
+from sysid.ingest.joining import Signal
 from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.readers.joining import Signal, as_leaf, joined_signals, not_over_time
+from sysid.ingest.readers.joining import as_leaf, joined_signals, not_over_time
 from sysid.ingest.readers.reader import Reader, damaged, silent
 from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable

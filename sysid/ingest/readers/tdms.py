@@ -10,15 +10,17 @@ import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.extras import need
+from sysid.ingest.joining import Signal
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.rates import said_step
-from sysid.ingest.readers.joining import Signal, joined_signals, not_over_time
+from sysid.ingest.readers.joining import joined_signals, not_over_time
 from sysid.ingest.readers.leaves import Leaf, refused
 from sysid.ingest.readers.reader import Reader, damaged, silent
 from sysid.ingest.readers.tree import table_of
 from sysid.ingest.table import RawTable
 from sysid.ingest.time_columns import is_called_time
 
+_UNITS = ("unit_string", "NI_UnitDescription", "unit", "units")
 _NO_TIMES = {"frequency", "frequenz", "angle", "winkel", "order", "ordnung", "distance", "weg"}
 
 
@@ -138,6 +140,6 @@ def _leaf(channel: Any, path: Path, step: float | None) -> Leaf:
     return Leaf(
         values=values,
         step=_said(properties) or step,
-        unit=str(properties.get("unit_string") or properties.get("unit") or "") or None,
+        unit=next((str(properties[key]) for key in _UNITS if properties.get(key)), None),
         description=str(properties.get("description") or ""),
     )

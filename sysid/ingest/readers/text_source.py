@@ -6,9 +6,10 @@ import bz2
 import codecs
 import gzip
 import lzma
+import re
 import zipfile
 import zlib
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,8 @@ _COUNTED = 1 << 17
 _HEAD = 1 << 18
 _ASCII_INSIDE = {"utf-8", "utf-8-sig", "cp1252", "iso8859-1", "iso8859-15", "ascii"}
 _FEWEST_LINES = 8
+_START = 256
+_GARBLED = re.compile("[\u00c0-\u00ff]{3}|\ufffd")
 _PACKED = (
     (b"\x1f\x8b", "gzip"),
     (b"BZh", "bzip2"),
@@ -164,14 +167,41 @@ def encodings(path: Path, encoding: str | None) -> list[str]:
         encoding: The one that was asked for, or ``None``.
 
     Returns:
-        That one; else what a byte-order mark says; else UTF-8 and, where that fails, Windows-1252.
+        That one; else what a byte-order mark, or a zero in every other byte, says; else UTF-8 and, where that fails,
+        Windows-1252.
     """
     if encoding is not None:
         return [encoding]
     with opened(path) as file:
-        start = file.read(4)
+        start = file.read(_START)
     marked = next((name for mark, name in _MARKS if start.startswith(mark)), None)
+    if marked is None and b"\x00" in start:
+        first, second = start[0::2].count(0), start[1::2].count(0)
+        few, many = min(first, second), max(first, second)
+        letters = start.translate(None, b"\x00")
+        if (
+            2 * many > 0.8 * len(start)
+            and few == 0
+            and letters.translate(None, b"\t\r\n").decode("latin-1").isprintable()
+        ):
+            marked = "utf-16-be" if first else "utf-16-le"
     return [marked] if marked else ["utf-8", "cp1252"]
+
+
+def seems_garbled(names: Iterable[str]) -> bool:
+    """Whether names were read in the wrong encoding: no western word has three letters beyond ASCII in a row.
+
+    Args:
+        names: As they were read in Windows-1252.
+
+    Returns:
+        Whether one seems to be.
+
+    Example:
+        >>> seems_garbled(["Âðåìÿ"]), seems_garbled(["Größe", "Débit (m³/h)"])
+        (True, False)
+    """
+    return any(_GARBLED.search(name) for name in names)
 
 
 def not_text(path: Path, tries: list[str], problem: Exception) -> ReaderError:
@@ -198,7 +228,8 @@ def not_text(path: Path, tries: list[str], problem: Exception) -> ReaderError:
         where=path,
         expected=f"text in {' or '.join(tries)}",
         got=problem,
-        remedy="check that it is a CSV file, or name its encoding (encoding: cp1252, encoding: utf-16-le)",
+        remedy="check that it is a CSV file, or name its encoding "
+        "(encoding: cp932 for Japanese, gb18030, big5, cp949, cp1251, cp1250, utf-16-le)",
     )
 
 
