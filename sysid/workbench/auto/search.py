@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sysid.errors import ConfigError
+from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, AbstractStructure
 from sysid.models.store import structure_from_dict
@@ -16,8 +17,8 @@ from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRI
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.finish import MOST_KEPT, finish_s, span
 from sysid.workbench.auto.look import Looked, look
-from sysid.workbench.auto.parts import ENSEMBLE, UNITED, Parts, part
-from sysid.workbench.auto.plan import AGAIN, SCATTER, Plan, Rank, ranked_by
+from sysid.workbench.auto.parts import ENSEMBLE, LAST, UNITED, Parts, part
+from sysid.workbench.auto.plan import AGAIN, FINALISTS, SCATTER, Plan, Rank, ranked_by
 from sysid.workbench.auto.race import Race, trains_on
 from sysid.workbench.auto.ripe import Ripening, young_told
 from sysid.workbench.auto.trials import Trials
@@ -46,6 +47,8 @@ APART = (
 LAST_FITS, LINEAR_LAST, RIPENING = 0.9, 0.25, 3
 """Share of the time that is left which the last fits may train, as they do more than that; of it, that of the best
 linear model; and iterations of a network below which it is not begun."""
+SURE, LEAST_LAST = 2.0, 0.05
+"""Times what the last fits are expected to take that is kept for them, and share of the time that is in any case."""
 LEAST_SHARE = 0.1
 """Share of the time of a search in which trials can be made at least."""
 CHECKED = 50
@@ -244,6 +247,7 @@ class Search:
         while points := plan.ask():
             found = trials.run(points)
             plan.tell(ripening(points, found) if self.parts.trained_on else found)
+            budget.refit = self._kept_for_the_last(plan)
         if not math.isfinite(plan.least()):
             raise ConfigError(
                 "nothing that was tried can be used",
@@ -304,15 +308,39 @@ class Search:
         apart = "ensemble" in chosen.values or plan.scattered.get(chosen.number, 0.0) > SCATTER
         if self.parts.trained_on or not row.unites or not apart:
             return {}
-        point = plan.points[chosen.number]
+        # As many starts as there is time for: halfway trained, none of them says anything.
+        left = LAST_FITS * (plan.budget.ends_s - spent_s)
+        return next((way for way in (UNITED, ENSEMBLE) if self._last_s(plan, chosen, way) <= left), {})
+
+    def _last_s(self, plan: Plan, trial: Trial, way: Mapping[str, Any]) -> float:
+        """How long a last fit takes by the clock, as its trial tells; NaN where it does not."""
+        structure = structure_from_dict(trial.structure)
         more = sum(map(len, self.data.estimation)) / sum(map(len, self.parts.folds[0].fitted))
         slowed = 1.0 if self.config.wall_s is None else plan.budget.slowed
-        # As many starts as there is time for: halfway trained, none of them says anything.
-        for way in (UNITED, ENSEMBLE):
-            longer = replace(point, training={**point.training, **way})
-            if slowed * chosen.iteration_s * price(longer) * more <= LAST_FITS * (plan.budget.ends_s - spent_s):
-                return way
-        return {}
+        if estimator_of(structure).linear:
+            return slowed * trial.cpu_s * more / len(self.parts.folds)
+        if estimator_of(structure).training is not Training:
+            return math.nan
+        point = plan.points[trial.number]
+        models = 1 if structure.for_outputs(self._n_outputs).several_outputs else self._n_outputs
+        longer = replace(point, training={**point.training, **way})
+        return slowed * trial.iteration_s * price(longer) * more * models
+
+    def _kept_for_the_last(self, plan: Plan) -> float:
+        """Share of the time that is kept for the last fits: no more than those of the best take, and as much again.
+
+        On a short record that is a few seconds, where a fifth of the time had been kept.
+        """
+        most, wall_s = refit_share(self.parts), self.config.wall_s
+        usable = [one for one in sorted(plan.trials, key=self._rank) if math.isfinite(error(one))]
+        kinds = {one.number: estimator_of(structure_from_dict(one.structure)) for one in usable}
+        best = [one for one in usable if not kinds[one.number].linear][:FINALISTS]
+        if wall_s is None or self.parts.trained_on or not best:
+            return most
+        need = [self._last_s(plan, one, UNITED if kinds[one.number].unites else LAST) for one in best]
+        need += [self._last_s(plan, one, {}) / LINEAR_LAST for one in usable if kinds[one.number].linear][:1]
+        told = max(need) if all(map(math.isfinite, need)) else math.inf
+        return min(most, max(LEAST_LAST, SURE * told / wall_s))
 
     @property
     def _rank(self) -> Rank:
