@@ -9,8 +9,9 @@ Nothing here knows a run folder, a screen or a tracker: a :class:`Keeper` is giv
 
 from sysid.composite.active_learning import ActiveLearned, Assessment, learn_actively, sequence_errors
 from sysid.composite.candidates import Candidate, Candidates, fit_candidates
-from sysid.composite.committee import DoubtFigures, committee, doubt_figures, doubt_threshold
+from sysid.composite.committee import committee
 from sysid.composite.composite import Composite, Member
+from sysid.composite.doubt_figures import DoubtFigures, doubt_figures, doubt_threshold
 from sysid.composite.doubting import Doubt, Doubting, Perturbation, doubting
 from sysid.composite.fixed_equations import equation_of, fixed_by_equations
 from sysid.composite.fixed_member import FixedMember, Standing

@@ -16,24 +16,21 @@ nothing. The threshold is found on sequences that trained nothing: :func:`doubt_
 With ``mean`` it is the mean of all that answers. Its squared error is the members' mean squared error less the variance
 between them (Krogh and Vedelsby 1995): where they err apart it is better than they are. It is in doubt where the
 largest answer less the smallest, its spread, is :math:`d` or more. A mean keeps fixed limits, and limits that are
-averaged channels, as each of its members does.
+averaged channels, as each of its members does, and tells where a limit holds any of them (``AT_LIMIT``).
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.models import NARX, AbstractModel, Cascade, Limit, Mapping, NARXModel, Scaling
 from sysid.models.cascade_run import Level
 from sysid.models.wiring import Member
-from sysid.traces import Trace
 
 APART = "_apart"
 """Behind the name of an output: the channel of its difference."""
@@ -70,8 +67,8 @@ def committee(
         spread, the largest less the smallest (``BC_spread``).
 
     Raises:
-        ConfigError: If there are fewer than two, they have not the same inputs, one of them does not compute a judged
-            or averaged output or has it at another level at rest, or a threshold is not positive.
+        ConfigError: If there are fewer than two, they have not the same inputs, units and sample time, one of them does
+            not compute a judged or averaged output or has it at another level at rest, or a threshold is not positive.
 
     Example:
         >>> from sysid.models import ARX, ARXModel
@@ -93,7 +90,7 @@ def committee(
     for number, one in enumerate(cascades[len(names) :], len(names) + 1):
         names.append({name: _free(f"{name}_{number}", taken) for name in one.outputs})
     made = _Made(
-        like=cascades[0], taken=taken, models=_renamed_models(cascades, names), limits=_limits(cascades, names)
+        like=cascades[0], taken=taken, models=_renamed_models(cascades, names), limits=_limits(cascades, names, mean)
     )
     for output in answered:
         own = [given[output] for given in names]
@@ -127,17 +124,45 @@ def _check(
             got=f"mean {', '.join(answered)}; thresholds {', '.join(thresholds) or 'none'}; each {each}",
             remedy="name the judged outputs in mean too, and leave each out",
         )
-    first = cascades[0]
-    for one in cascades:
-        lacking = [name for name in answered if name not in one.outputs]
-        if set(one.inputs) != set(first.inputs) or lacking:
-            raise ConfigError(
-                "the surrogates do not answer the same question",
-                where="committee",
-                expected=f"{', '.join(first.inputs)} in, {', '.join(answered)} among what is computed",
-                got=f"{', '.join(one.inputs)} in, {', '.join(one.outputs)} computed",
-                remedy="give surrogates with the same inputs, and judge or average outputs that all of them compute",
-            )
+    for number, one in enumerate(cascades[1:], 2):
+        check_alike(cascades[0], one, answered, where=f"committee, number {number}")
+
+
+def check_alike(first: Cascade, other: Cascade, answered: Sequence[str], *, where: str) -> None:
+    """Refuse a whole that cannot stand beside another.
+
+    Args:
+        first: The whole.
+        other: What is to stand beside it.
+        answered: Outputs that are judged or averaged.
+        where: Of whom an error speaks.
+
+    Raises:
+        ConfigError: If they have not the same inputs, outputs, units and sample time.
+    """
+    asked = (*first.inputs, *answered)
+    lacking = [name for one in (first, other) for name in answered if name not in one.outputs]
+    if set(other.inputs) != set(first.inputs) or lacking:
+        raise ConfigError(
+            "the surrogates do not answer the same question",
+            where=where,
+            expected=f"{', '.join(first.inputs)} in, {', '.join(answered)} among what is computed",
+            got=f"{', '.join(other.inputs)} in, {', '.join(other.outputs)} computed",
+            remedy="give surrogates with the same inputs, and judge or average outputs that all of them compute",
+        )
+    expected, got = (
+        [f"one sample every {one.sample_time:g} s", *(f"{name} in {one.units[name]}" for name in asked)]
+        for one in (first, other)
+    )
+    if unlike := [(one, two) for one, two in zip(expected, got, strict=True) if one != two]:
+        raise ConfigError(
+            "the surrogates answer at other times or in other units",
+            where=where,
+            expected=", ".join(one for one, _ in unlike),
+            got=", ".join(two for _, two in unlike),
+            remedy="train the other one on a data set that declares the same sample_time, for which grid resamples its "
+            "files, and the same units of its channels",
+        )
 
 
 def _levels(cascades: Sequence[Cascade], answered: Sequence[str], given: Dict[str, Level]) -> dict[str, Level]:
@@ -185,9 +210,16 @@ def _renamed_models(cascades: Sequence[Cascade], names: Sequence[Dict[str, str]]
     return [renamed(model, own) for one, own in zip(cascades, names, strict=True) for model in one.models]
 
 
-def _limits(cascades: Sequence[Cascade], names: Sequence[Dict[str, str]]) -> dict[str, Limit]:
-    pairs = zip(cascades, names, strict=True)
-    return {own[name]: _limit(limit, own) for one, own in pairs for name, limit in one.limits.items()}
+def _limits(cascades: Sequence[Cascade], names: Sequence[Dict[str, str]], mean: Collection[str]) -> dict[str, Limit]:
+    """The limits of all; what holds a part of a mean holds the mean, and is told of it."""
+    found = {}
+    for whole, own in zip(cascades, names, strict=True):
+        for name, limit in whole.limits.items():
+            of = next((one for one in (name, limit.tells) if one in mean), None)
+            low, high = (own.get(one, one) if isinstance(one, str) else one for one in (limit.low, limit.high))
+            tells = of if of is not None or limit.tells is None else own.get(limit.tells, limit.tells)
+            found[own[name]] = replace(limit, low=low, high=high, tells=tells)
+    return found
 
 
 def _free(name: str, taken: set[str]) -> str:
@@ -210,11 +242,6 @@ def renamed(model: Member, names: Dict[str, str]) -> Member:
     mapping = model.mapping
     inputs, outputs = ([names.get(name, name) for name in own] for own in (mapping.inputs, mapping.outputs))
     return model.over(Mapping(inputs=inputs, outputs=outputs))
-
-
-def _limit(limit: Limit, names: Dict[str, str]) -> Limit:
-    low, high = (names.get(one, one) if isinstance(one, str) else one for one in (limit.low, limit.high))
-    return replace(limit, low=low, high=high)
 
 
 @dataclass(kw_only=True, eq=False)
@@ -295,123 +322,3 @@ def _sum(gains: Dict[str, float], name: str, like: Cascade, output: str) -> NARX
         rest_output=0.0,
         clamp=np.inf,  # its bounds are limits of the whole
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class DoubtFigures:
-    """How far doubt can be trusted.
-
-    Args:
-        samples: How many were looked at.
-        wrong: Share of them with an error over what is allowed.
-        flagged: Share of the wrong ones that are in doubt; 1 where none is wrong.
-        false: Share of the others that are in doubt.
-        error: What is allowed, in the output's unit.
-        threshold: From which difference an answer is in doubt, in the output's unit.
-    """
-
-    samples: int
-    wrong: float
-    flagged: float
-    false: float
-    error: float
-    threshold: float
-
-
-def doubt_threshold(
-    wholes: Sequence[Cascade | AbstractModel],
-    traces: Sequence[Trace],
-    output: str,
-    *,
-    error: float,
-    false: float = 0.05,
-    each: bool = False,
-    mean: bool = False,
-    rest: Dict[str, Level] | None = None,
-) -> float:
-    """The smallest threshold at which hardly any right answer is in doubt.
-
-    Args:
-        wholes: The committee.
-        traces: Sequences that trained none of them, with the inputs and the measured output; of more than one kind, or
-            it holds for that kind only.
-        output: The output.
-        error: Largest error of a right answer, in its unit.
-        false: Share of the right answers that may be in doubt.
-        each: As in :func:`committee`.
-        mean: Whether the mean of all answers.
-        rest: As in :func:`committee`.
-
-    Returns:
-        In the output's unit.
-
-    Raises:
-        ConfigError: If no answer is right, or they cannot be a committee.
-    """
-    both = committee(wholes, {output: 1.0}, each=each, mean=[output] if mean else (), rest=rest)
-    apart, errors = _apart(both, traces, output)
-    right = apart[errors <= error]
-    if not len(right):
-        raise ConfigError(
-            "no answer of the committee is right",
-            where="doubt_threshold",
-            expected=f"samples of {output} with an error of at most {error:g}",
-            got=f"none of {len(errors)}",
-            remedy="allow a larger error, or train better surrogates",
-        )
-    return float(max(np.quantile(right, 1.0 - false), np.finfo(np.float64).tiny))
-
-
-def doubt_figures(whole: Cascade, traces: Sequence[Trace], output: str, *, error: float) -> DoubtFigures:
-    """How many wrong answers a committee doubts, and how many right ones.
-
-    Args:
-        whole: The committee.
-        traces: Sequences with the inputs and the measured output, which chose neither it nor its threshold.
-        output: A judged output.
-        error: Largest error of a right answer, in its unit.
-
-    Returns:
-        The figures over all samples.
-
-    Raises:
-        ConfigError: If the output is not judged.
-    """
-    limit = whole.limits[judging[0]].high if (judging := _judging(whole, output)) else None
-    if not isinstance(limit, float):
-        raise ConfigError(
-            f"{output} is not judged by this committee",
-            where="doubt_figures",
-            expected="an output with a threshold",
-            got=output,
-            remedy="name it when the committee is made",
-        )
-    apart, errors = _apart(whole, traces, output)
-    wrong, doubted = errors > error, apart >= limit
-    return DoubtFigures(
-        samples=len(errors),
-        wrong=float(np.mean(wrong)),
-        flagged=float(np.mean(doubted[wrong])) if wrong.any() else 1.0,
-        false=float(np.mean(doubted[~wrong])) if not wrong.all() else 0.0,
-        error=error,
-        threshold=limit,
-    )
-
-
-def _apart(whole: Cascade, traces: Sequence[Trace], output: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """At every sample how far the answers are apart, as what judges them has it, and the answer from the measured."""
-    groups = [whole.member(name).mapping.inputs for name in _judging(whole, output)]
-    apart, errors = [], []
-    for trace in traces:
-        run = whole.simulate_trace(trace)
-        each = [np.abs(run[one] - (np.mean([run[name] for name in rest], axis=0) if rest else 0.0))
-                for one, *rest in groups]  # fmt: skip
-        apart.append(np.max(each, axis=0))
-        errors.append(np.abs(run[output] - trace[output]))
-    return np.concatenate(apart), np.concatenate(errors)
-
-
-def _judging(whole: Cascade, output: str) -> list[str]:
-    """The channels that say how far apart the answers are: one, or one for each of the others."""
-    pattern = re.compile(re.escape(output + APART) + r"(_\d+)?")
-    return [name for name in whole.outputs if pattern.fullmatch(name) and whole.limits.get(name, Limit()).doubt]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from sysid.composite.committee import DoubtFigures, committee, doubt_figures, doubt_threshold
+from sysid.composite.committee import committee
+from sysid.composite.doubt_figures import DoubtFigures, doubt_figures, doubt_threshold
 from sysid.composite.perturbed import perturbed
 from sysid.errors import ConfigError
 from sysid.models import AbstractModel, Cascade
@@ -61,21 +63,23 @@ class Doubting:
     """A whole that doubts.
 
     Args:
-        whole: The committee, which answers as the whole did.
+        whole: The committee, which answers as the whole did, or with the mean of all.
         output: What is judged.
         figures: On the sequences that its threshold was found on.
+        judged_by: Of what the threshold is.
     """
 
     whole: Cascade
     output: str
     figures: DoubtFigures
+    judged_by: Literal["difference", "spread"] = "difference"
 
     @property
     def sentence(self) -> str:
         """What it does, in words."""
         one, unit = self.figures, self.whole.units[self.output]
         return (
-            f"{self.output} in doubt from a difference of {one.threshold:.3g} {unit} on; "
+            f"{self.output} in doubt from a {self.judged_by} of {one.threshold:.3g} {unit} on; "
             f"where the threshold was found, wrong by more than {one.error:g} {unit} are "
             f"{100 * one.wrong:.2g} % of the samples, of these in doubt {100 * one.flagged:.3g} %, "
             f"of the others {100 * one.false:.2g} %"
@@ -88,6 +92,7 @@ def doubting(
     traces: Sequence[Trace],
     *,
     beside: Sequence[Cascade | AbstractModel] = (),
+    mean: Collection[str] = (),
 ) -> Doubting:
     """A whole that says where it does not know.
 
@@ -98,6 +103,7 @@ def doubting(
             on them.
         beside: Wholes that were trained apart. Alone they are one committee, from whose median it parts; with
             perturbations it doubts where it is as far from any one.
+        mean: Outputs of which the mean of all answers, which doubts by its spread and has no perturbations.
 
     Returns:
         The whole with its doubts.
@@ -111,8 +117,12 @@ def doubting(
         for by in (one.by, -one.by)
     ]
     members, each = [whole, *beside, *moved], bool(moved)
-    threshold = doubt_threshold(members, traces, asked.output, error=asked.error, false=asked.false, each=each)
-    found = committee(members, {asked.output: threshold}, each=each)
+    output, answers = asked.output, bool(mean)
+    threshold = doubt_threshold(members, traces, output, error=asked.error, false=asked.false, each=each, mean=answers)
+    found = committee(members, {output: threshold}, each=each, mean=mean)
     return Doubting(
-        whole=found, output=asked.output, figures=doubt_figures(found, traces, asked.output, error=asked.error)
+        whole=found,
+        output=output,
+        figures=doubt_figures(found, traces, output, error=asked.error),
+        judged_by="spread" if mean else "difference",
     )

@@ -46,9 +46,9 @@ def holding(
         sequences: The random sequences; none is fine.
 
     Returns:
-        Of each output that has a limit how often it is there.
+        Of each output that has a limit how often it is there; of a mean, each of its parts.
     """
-    told = [name for name in outputs if name in whole.limits]
+    told = [name for out in outputs for name, limit in whole.limits.items() if out in (name, limit.tells)]
     if not told:
         return []
     over_cases, over_sequences = _counted(whole, cases), _counted(whole, sequences)

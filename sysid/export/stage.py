@@ -97,8 +97,9 @@ class Stage:
         sources: For each of its inputs the column in ``[inputs of the whole | what it computes]``.
         targets: For each of its outputs the column.
         limits: For each of its outputs the declared limits: the upper before the lower, which wins where they cross.
-        told: For each of its outputs whether it leaves the whole. Of one that does not, nobody is told that it is at a
-            limit: what is between two limits by its nature, such as a switch, is at one nearly always.
+        told: For each of its outputs whether it leaves the whole, or is a part of one that does. Of any other nobody is
+            told that it is at a limit: what is between two limits by its nature, such as a switch, is at one nearly
+            always.
         doubts: For each of its outputs whether being at a limit says that the answer is in doubt; that is always told.
         first: Where its state begins in the state of the whole.
         first_remainder: Where its remainders begin among those of the whole, in float32.
@@ -216,7 +217,7 @@ def stages_of(
             sources=tuple(columns[name] for name in ends.inputs),
             targets=tuple(columns[name] for name in ends.outputs),
             limits=tuple(_sides(limits.get(name, Limit()), columns) for name in ends.outputs),
-            told=tuple(name in outputs or limits.get(name, Limit()).doubt for name in ends.outputs),
+            told=tuple(_told(name, limits.get(name, Limit()), outputs) for name in ends.outputs),
             doubts=tuple(limits.get(name, Limit()).doubt for name in ends.outputs),
             first=first,
             first_remainder=remainder,
@@ -225,6 +226,10 @@ def stages_of(
         stages.append(stage)
         first, remainder = first + stage.state.size, remainder + stage.remainders
     return tuple(stages)
+
+
+def _told(name: str, limit: Limit, outputs: Sequence[str]) -> bool:
+    return name in outputs or limit.doubt or limit.tells in outputs
 
 
 def _sides(limit: Limit, columns: Dict[str, int]) -> tuple[Side, ...]:

@@ -29,6 +29,8 @@ class Limit:
         high: Upper limit, likewise.
         doubt: Whether an output that is there says that the whole does not know its answer: its exports raise a flag
             of their own for it. See :func:`sysid.composite.committee`.
+        tells: The output of which this one is a part, as of a mean: that it is held is told where that one leaves the
+            whole too.
 
     Example:
         >>> Limit(low=0.0, high="BP").to_dict()
@@ -38,6 +40,7 @@ class Limit:
     low: float | str | None = None
     high: float | str | None = None
     doubt: bool = False
+    tells: str | None = None
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -47,7 +50,8 @@ class Limit:
     def to_dict(self) -> dict[str, float | str | bool | None]:
         """The fields as JSON values."""
         sides: dict[str, float | str | bool | None] = {"low": self.low, "high": self.high}
-        return sides | ({"doubt": True} if self.doubt else {})
+        more = ({"doubt": True} if self.doubt else {}) | ({} if self.tells is None else {"tells": self.tells})
+        return sides | more
 
 
 def program_of(

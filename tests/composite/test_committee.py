@@ -93,7 +93,28 @@ def test_a_mean_answers_as_all_do_and_its_spread_is_how_far_they_are_apart(count
     surrogate = Surrogate.of(both, outputs=["AR"])
     flags = expected_flags(surrogate, handle, surrogate.compute(handle))
     np.testing.assert_array_equal((flags & Flag.IN_DOUBT) > 0, run["AR_spread"] >= 0.5)
+    held = [holds(one, handle, "AR") for one in wholes]
+    assert 0 < np.count_nonzero(np.any(held, axis=0)) < len(handle)
+    np.testing.assert_array_equal((flags & Flag.AT_LIMIT) > 0, np.any(held, axis=0))
+    of_pipe = Surrogate.of(both, outputs=["BP"])  # of what does not leave it nobody is told
+    assert not (expected_flags(of_pipe, handle, of_pipe.compute(handle)) & Flag.AT_LIMIT).any()
     assert cascade_from_dict(both.to_dict()).to_dict() == both.to_dict()
+
+
+def test_what_holds_a_part_of_a_mean_of_means_is_told_of_the_outermost() -> None:
+    handle = measured(0, WHOLES[0])["STP"][:, None]
+    both = committee([committee(WHOLES[:2], mean=["BP", "AR"]), WHOLES[2]], mean=["BP", "AR"])
+    surrogate = Surrogate.of(both, outputs=["AR"])
+    flags = expected_flags(surrogate, handle, surrogate.compute(handle))
+    np.testing.assert_array_equal(
+        (flags & Flag.AT_LIMIT) > 0, np.any([holds(one, handle, "AR") for one in WHOLES], axis=0)
+    )
+
+
+def holds(one: Cascade, u: np.ndarray, output: str) -> np.ndarray:
+    """Where the file of a whole raises AT_LIMIT."""
+    surrogate = Surrogate.of(one, outputs=[output])
+    return (expected_flags(surrogate, u, surrogate.compute(u)) & Flag.AT_LIMIT) > 0
 
 
 def test_a_mean_of_plain_models_may_be_one_of_a_committee_itself() -> None:
@@ -184,8 +205,18 @@ def test_the_figures_are_shares_of_wrong_and_of_right_answers() -> None:
         (WHOLES, {}, "not a committee"),
         (WHOLES, {"BC": 1.0}, "the same question"),
         ([WHOLES[0], network("BP+STP -> AR")], {"AR": 1.0}, "the same question"),
+        (
+            [network("STP -> BP"), replace(network("STP -> BP"), sample_time=0.2)],
+            {"BP": 1.0},
+            r"number 2(.|\n)*every 0.1 s(.|\n)*every 0.2 s",
+        ),
+        (
+            [network("STP -> BP"), replace(network("STP -> BP"), output_unit="bar")],
+            {"BP": 1.0},
+            r"number 2(.|\n)*BP in psi(.|\n)*BP in bar",
+        ),
     ],
-    ids=["one", "no threshold", "nothing judged", "not computed", "other inputs"],
+    ids=["one", "no threshold", "nothing judged", "not computed", "other inputs", "sample time", "unit"],
 )
 def test_what_is_no_committee_is_refused(wholes: list, thresholds: dict, said: str) -> None:
     with pytest.raises(ConfigError, match=said):
