@@ -17,6 +17,7 @@ from sysid.reporting.assembly.results import (
 from sysid.reporting.assembly.rounds import rounds_table
 from sysid.reporting.assembly.tables import (
     active_learning_table,
+    doubt_table,
     equation_table,
     limit_check_table,
     limit_table,
@@ -84,6 +85,7 @@ def _tables(results: AssemblyResults, published: PublishedTable | None) -> list[
             else [position_table(one, positions.run_time_s, name) for name, one in positions.outputs.items()]
         ),
         *([] if results.monte_carlo is None else monte_carlo_tables(results.monte_carlo)),
+        *([] if results.doubt is None else [doubt_table(results.doubt)]),
         time_table(results),
         *([limit_table(results.limits)] if results.limits else []),
         *([] if passed is None else [passed]),
@@ -213,11 +215,25 @@ def _sentences(results: AssemblyResults) -> list[str]:
     return [
         f"The whole has {whole.models} models and {whole.parameters} parameters; it reads {', '.join(whole.inputs)} "
         "and nothing else.",
-        f"The stage was chosen by the error of the whole on the selection traces ({results.chosen.selection:.3g}, a "
-        "geometric mean over traces and outputs).",
+        _choice(results),
         *([] if results.limit_check is None else limit_check_sentences(results.limit_check)),
         *results.notes,
+        *([] if results.doubt is None else [f"What is exported raises the flag IN_DOUBT: {results.doubt.sentence}."]),
     ]
+
+
+def _choice(results: AssemblyResults) -> str:
+    chosen = results.chosen
+    if not results.mean:
+        return (
+            f"The stage was chosen by the error of the whole on the selection traces ({chosen.selection:.3g}, a "
+            "geometric mean over traces and outputs)."
+        )
+    parts = [f"{stage.name} {stage.selection:.3g}" for stage in results.stages if stage.name in results.mean]
+    return (
+        f"The mean answers, as the pipeline says. On the selection traces its error is {chosen.selection:.3g} (a "
+        f"geometric mean over traces and outputs), that of what it is the mean of: {', '.join(parts)}."
+    )
 
 
 def limit_check_sentences(found: LimitCheckRecord) -> list[str]:

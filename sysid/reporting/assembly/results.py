@@ -33,7 +33,7 @@ class OutputRecord(Record):
 
 
 class StageRecord(Record):
-    """The whole as it stood after one stage of its training."""
+    """The whole as it stood after one stage of its training; or a whole beside it, or the mean of both."""
 
     name: str = Field(description="What it is called.")
     networks: list[str] = Field(default=[], description="Its networks, where they are others than a stage before.")
@@ -48,7 +48,7 @@ class StageRecord(Record):
 class WholeRecord(Record):
     """The chosen whole."""
 
-    stage: str = Field(description="Name of the stage that was chosen: the one with the least selection.")
+    stage: str = Field(description="Name of the stage that was chosen: the one with the least selection, or the mean.")
     inputs: list[str] = Field(description="Channels that it reads, and no others.")
     models: int = Field(description="How many models it is made of.")
     parameters: int = Field(description="Of all its models together.")
@@ -290,6 +290,30 @@ class InterpolationRecord(Record):
     run_time_s: ByCase = Field(description="Wall seconds of one run of all positions together on two threads.")
 
 
+class DoubtShares(Record):
+    """What the flag IN_DOUBT is worth on some data."""
+
+    data: str = Field(description="Name of the data set.")
+    samples: int = Field(description="How many were looked at.")
+    wrong: Number = Field(description="Share of them with an error over what is allowed, 0 to 1.")
+    flagged: Number = Field(description="Share of the wrong ones that are in doubt; 1 where none is wrong.")
+    false: Number = Field(description="Share of the others that are in doubt.")
+
+
+class DoubtRecord(Record):
+    """What is exported says where it does not know, by the flag IN_DOUBT."""
+
+    output: str = Field(description="The output that is judged.")
+    unit: str = Field(description="Of the output.")
+    error: Number = Field(description="Largest error of a right answer, in the unit.")
+    threshold: Number = Field(description="From here on an answer is in doubt, in the unit.")
+    of: Literal["difference", "spread"] = Field(
+        description="Of what the threshold is: from the others' answers, or between all that are averaged."
+    )
+    sentence: str = Field(description="The same in words, as the model card has it.")
+    on: list[DoubtShares] = Field(min_length=1, description="First where the threshold was found.")
+
+
 class AssemblyResults(RunResults):
     """All of results.json of a run of kind assembly."""
 
@@ -299,6 +323,7 @@ class AssemblyResults(RunResults):
     outputs: dict[str, OutputRecord] = Field(min_length=1)
     whole: WholeRecord
     stages: list[StageRecord] = Field(min_length=1, description="In the order of the training.")
+    mean: list[str] = Field(default=[], description="Names of the stages whose mean answers; empty without one.")
     published: dict[str, PublishedOutput] = Field(default={}, description="By output.")
     published_models: str | None = Field(default=None, description="Reference table with models of single members.")
     published_whole: str | None = Field(default=None, description="What that table calls the whole.")
@@ -311,6 +336,7 @@ class AssemblyResults(RunResults):
     limits: list[LimitRecord] = Field(default=[])
     limit_check: LimitCheckRecord | None = None
     interpolation: InterpolationRecord | None = None
+    doubt: DoubtRecord | None = None
     exports: list[ExportRecord] = Field(default=[])
     notes: list[str] = Field(default=[], description="Sentences on how the stages came about.")
 
@@ -334,4 +360,8 @@ class AssemblyResults(RunResults):
                         f"{output}/{case}/unseen positions/mse": sum(own) / len(own),
                         f"{output}/{case}/unseen positions/worst mse": max(own),
                     }
+        if (doubt := self.doubt) is not None:
+            for each in doubt.on:
+                shares = {"wrong": each.wrong, "in doubt": each.flagged, "false doubt": each.false}
+                found[self.whole.stage] |= {f"{doubt.output}/{each.data}/{name}": v for name, v in shares.items()}
         return found

@@ -9,6 +9,7 @@ from sysid.reporting.assembly.results import (
     ActiveLearningRecord,
     ActivityRecord,
     AssemblyResults,
+    DoubtRecord,
     EquationRecord,
     LimitCheckRecord,
     LimitRecord,
@@ -145,6 +146,28 @@ def monte_carlo_tables(found: MonteCarloRecord) -> list[Table]:
             )
         )
     return tables
+
+
+def doubt_table(found: DoubtRecord) -> Table:
+    """What the flag IN_DOUBT is worth.
+
+    Args:
+        found: The flag.
+
+    Returns:
+        The table.
+    """
+    error, threshold = (f"{value:.3g} {found.unit}" for value in (found.error, found.threshold))
+    return plain_table(
+        f"Where {found.output} is in doubt: from a {found.of} of {threshold} on",
+        [("", ""), ("Samples", ""), (f"Wrong by over {error}", "%"), ("Of these in doubt", "%"),
+         ("Of the others in doubt", "%")],
+        [
+            [one.data, one.samples, 100.0 * one.wrong, 100.0 * one.flagged if one.wrong else None, 100.0 * one.false]
+            for one in found.on
+        ],
+        note=f"The threshold was found on {found.on[0].data}.",
+    )  # fmt: skip
 
 
 def active_learning_table(found: ActiveLearningRecord, chosen: str) -> Table:

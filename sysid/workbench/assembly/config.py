@@ -13,7 +13,13 @@ from sysid.models import Limit
 from sysid.models.declared import Parameter, parameters_from
 from sysid.workbench.assembly.extending import extending_schema
 from sysid.workbench.assembly.member_config import FixedConfig, MemberConfig, ParametersField, StandingConfig
-from sysid.workbench.assembly.proof_config import DoubtConfig, InterpolationConfig, MonteCarloConfig, PublishedConfig
+from sysid.workbench.assembly.proof_config import (
+    DoubtConfig,
+    InterpolationConfig,
+    MeanConfig,
+    MonteCarloConfig,
+    PublishedConfig,
+)
 from sysid.workbench.assembly.stage_config import (
     AblationConfig,
     ActiveLearningConfig,
@@ -76,6 +82,7 @@ class AssemblyConfig(Words):
         active_learning: Adding to its data what the whole is worst at.
         interpolation: Positions between those that are modelled.
         monte_carlo: Random sequences on which the whole has to hold.
+        mean: Other wholes, the mean of which and of this one answers.
         doubt: Where the exported whole says that it does not know.
         published: Published figures by output.
         published_models: A table of ``reports/published`` with models of single members: where it has one of the same
@@ -112,6 +119,7 @@ class AssemblyConfig(Words):
     active_learning: ActiveLearningConfig | None = None
     interpolation: InterpolationConfig | None = None
     monte_carlo: MonteCarloConfig | None = None
+    mean: MeanConfig | None = None
     doubt: DoubtConfig | None = None
     published: dict[str, PublishedConfig] = Field(default_factory=dict)
     published_models: str | None = None
@@ -174,7 +182,13 @@ class AssemblyConfig(Words):
             else ()
         )
         doubted = (self.doubt.output,) if self.doubt else ()
-        return tuple(dict.fromkeys((*self.outputs, *self.choose_on, *stressed, *doubted, *line)))
+        spread = self.mean.spread if self.mean else ()
+        return tuple(dict.fromkeys((*self.outputs, *self.choose_on, *stressed, *doubted, *spread, *line)))
+
+    @property
+    def leaving(self) -> tuple[str, ...]:
+        """Outputs of what is exported."""
+        return (*self.outputs, *(self.mean.spreads if self.mean else ()))
 
     @model_validator(mode="after")
     def _check_published(self) -> AssemblyConfig:
@@ -233,6 +247,15 @@ class AssemblyConfig(Words):
 
     @model_validator(mode="after")
     def _check_doubt(self) -> AssemblyConfig:
+        if self.doubt is not None:
+            self.doubt.check_judges(averaged=self.mean is not None)
+        if self.mean is not None and self.interpolation is not None:
+            raise FieldError(
+                "there is no mean of positions between those that are modelled",
+                expected="mean, or interpolation",
+                got="both",
+                remedy="leave interpolation out; each of the wholes can have it in a pipeline of its own",
+            )
         training = (self.training,) if isinstance(self.training, str) else self.training
         fitted = (*training, *(self.together.data if self.together else ()))
         if self.doubt is not None and self.doubt.data in fitted:
@@ -280,6 +303,7 @@ class AssemblyConfig(Words):
             "published": tuple(self.published),
             "monte_carlo": (self.monte_carlo.output,) if self.monte_carlo else (),
             "doubt, output": (self.doubt.output,) if self.doubt else (),
+            "mean, spread": self.mean.spread if self.mean else (),
             "active_learning, outputs": self.active_learning.outputs if self.active_learning else (),
             "interpolation": (self.interpolation.channel, *self.interpolation.knots, *self.interpolation.outputs)
             if self.interpolation

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.composite.active_learning import Assessment, sequence_errors
-from sysid.composite.doubting import Doubting, doubting
+from sysid.composite.doubt_figures import DoubtFigures, doubt_figures
+from sysid.composite.doubting import Doubting
 from sysid.composite.keeper import Decision
 from sysid.composite.limits_held import holding
 from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
@@ -20,6 +21,7 @@ from sysid.traces import Trace, TraceSet
 from sysid.validation import evaluate_cascade
 from sysid.workbench.annotation import find_annotator
 from sysid.workbench.assembly.ablation import ablations_of
+from sysid.workbench.assembly.beside import Beside, Judged
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.data import AssemblyData
 from sysid.workbench.assembly.interpolation import (
@@ -30,7 +32,6 @@ from sysid.workbench.assembly.interpolation import (
 )
 from sysid.workbench.assembly.member_scores import score_candidates
 from sysid.workbench.assembly.record import Outcome, assembly_results, write_signals
-from sysid.workbench.assembly.warm_start import read_whole
 from sysid.workbench.runner import events
 from sysid.workbench.runner.steps import Outlined, Step, Work
 from sysid.workbench.runner.store import LINE, digest, strict, write_json
@@ -72,11 +73,13 @@ class Evaluating:
     Args:
         context: The run.
         trained: What it has trained.
+        beside: Who stands beside that.
         notes: Sentences on how that came about.
     """
 
     context: Context
     trained: TrainedComposite
+    beside: Beside
     notes: tuple[str, ...]
 
     def results(self, cases: TraceSet, data: AssemblyData) -> AssemblyResults:
@@ -98,31 +101,30 @@ class Evaluating:
     def _outcome(self, cases: TraceSet, data: AssemblyData) -> Outcome:
         """Every stage scored, one chosen by the selection traces, proven and exported."""
         config = self.context.config
-        scored = self._scored(cases)
-        scores, timing = scored["scores"], scored["timing"]
-        chosen, chosen_by = self.trained.chosen, self.trained.selection
-        whole = self._chosen()
+        judged = self.beside.judged(self.trained, data.data.with_fixed(config.composite), config)
+        scored = self._scored(cases, judged.stages)
+        scores = scored["scores"]
+        whole = self._chosen(judged)
         stressed, worst, sequences = self._stressed(whole)
         line = self._line(whole, data)
-        doubt = self._doubting(whole)
+        doubt = self._doubting()
         exported = self._export(whole, cases, evaluate_cascade(whole, cases), data, doubt)
         candidates = self.trained.candidates
         members = []
         if candidates is not None:
             members = self.context.compute(MEMBERS, lambda _: score_candidates(candidates, tuple(cases)))
+        trained = {stage: scores[stage] for stage in self.trained.stages}
         return Outcome(
-            whole=whole, stages=scores, selection=chosen_by, chosen=chosen, timing=timing[chosen], stressed=stressed,
+            whole=whole, stages=scores, judged=judged, timing=scored["timing"][judged.chosen], stressed=stressed,
             worst=worst, interpolation=line, unseen=self._unseen(sequences), exported=exported,
             holding=holding(whole, config.outputs, tuple(cases), sequences), members=members,
-            ablation=ablations_of(scores, members, cases, config.ablation),
-            doubt="" if doubt is None else doubt.sentence,
+            ablation=ablations_of(trained, members, cases, config.ablation), doubt=doubt,
+            doubt_on={} if doubt is None else self._doubted_on(doubt, cases, sequences),
         )  # fmt: skip
 
-    def _scored(self, cases: TraceSet) -> dict[str, Any]:
+    def _scored(self, cases: TraceSet, stages: Mapping[str, Cascade]) -> dict[str, Any]:
         """Of every stage ``scores``, errors by output and case, and ``timing``, seconds of a run by case."""
         config = self.context.config
-        # What only the training looked at is no part of the surrogate, nor of its run time.
-        stages = {stage: whole.upstream_of(config.wanted) for stage, whole in self.trained.stages.items()}
 
         def make(say: Callable[[str], None]) -> dict[str, Any]:
             scores, timing = {}, {}
@@ -148,9 +150,9 @@ class Evaluating:
             )
         )
 
-    def _chosen(self) -> Cascade:
-        """The whole that does best, which is what a run leaves."""
-        whole = self.trained.model.upstream_of(self.context.config.wanted)
+    def _chosen(self, judged: Judged) -> Cascade:
+        """What a run leaves: the whole that does best, or the mean of it and others."""
+        whole = judged.stages[judged.chosen]
         file, key = self.context.store.path / ASSEMBLY, digest(strict(whole.to_dict()))
 
         def write(found: Cascade) -> list[Path]:
@@ -164,7 +166,7 @@ class Evaluating:
             key=lambda: key,
             write=write,
             read=lambda _: whole,
-            outcome=lambda _: self.trained.chosen,
+            outcome=lambda _: judged.chosen,
             called=WHOLE.called,
             export=self.context.export,
         )
@@ -218,18 +220,28 @@ class Evaluating:
             outcome=lambda scores: f"all positions of the longest case in {max(scores.timing.values()):.3g} s",
         )
 
-    def _doubting(self, whole: Cascade) -> Doubting | None:
-        """The whole with its doubts, if it is to have some."""
+    def _doubting(self) -> Doubting | None:
+        """What answers with its doubts, if it is to have some."""
         asked = self.context.config.doubt
         if asked is None:
             return None
         sequences = tuple(self.context.load(asked.data))
-        beside = [read_whole(self.context.beside / one)[0] for one in asked.beside]
+        whole = self.trained.model.upstream_of(self.context.config.wanted)
         return self.context.compute(
-            DOUBT,
-            lambda _: doubting(whole, asked.asked(), sequences, beside=beside),
-            outcome=lambda one: one.sentence,
+            DOUBT, lambda _: self.beside.doubts(whole, asked, sequences), outcome=lambda one: one.sentence
         )
+
+    def _doubted_on(self, doubt: Doubting, cases: TraceSet, sequences: Sequence[Trace]) -> dict[str, DoubtFigures]:
+        """What the flag is worth, by the data: where its threshold was found, and where nothing of it was."""
+        config, found = self.context.config, {}
+        if (asked := config.doubt) is None:
+            return {}
+        beside = {config.data: tuple(cases)} if asked.output in config.outputs else {}
+        if config.monte_carlo is not None and config.monte_carlo.output == asked.output:
+            beside[config.monte_carlo.data] = tuple(sequences)
+        for name, traces in beside.items():
+            found[name] = doubt_figures(doubt.whole, traces, asked.output, error=asked.error)
+        return {asked.data: doubt.figures} | {name: one for name, one in found.items() if name != asked.data}
 
     def _export(
         self, whole: Cascade, cases: TraceSet, evaluation: Any, data: AssemblyData, doubt: Doubting | None
@@ -249,12 +261,13 @@ class Evaluating:
                 "notes": list(self.notes),
             },
             **({} if doubt is None else {"doubt": doubt.sentence}),
+            **({"mean": said} if (said := self.beside.sentence()) else {}),
         }
         exported = whole if doubt is None else doubt.whole
 
         def make(_: Work) -> Bundle:
             return export_bundle(
-                exported, cases, self.context.store.bundle, outputs=self.context.config.outputs,
+                exported, cases, self.context.store.bundle, outputs=self.context.config.leaving,
                 formats=formats, tolerance=asked.tolerance, metrics=evaluation, provenance=provenance,
             )  # fmt: skip
 

@@ -59,6 +59,7 @@ def export_model(
         start = Start()
         return export_bundle(found, seen, folder, start=start, metrics=evaluate(found.model, seen, start), **shared)
     whole = found.model if isinstance(found, CascadeFit) else found
-    whole = whole.upstream_of(config.wanted)
+    leaving = [name for name in config.leaving if name in whole.outputs]  # a spread of a mean alone
+    whole = whole.upstream_of([*config.wanted, *leaving])
     metrics = evaluate_cascade(whole, cases)
-    return export_bundle(whole, cases, folder, outputs=config.outputs, metrics=metrics, **shared)
+    return export_bundle(whole, cases, folder, outputs=leaving, metrics=metrics, **shared)

@@ -7,6 +7,7 @@ from itertools import pairwise
 from pydantic import BaseModel, Field, model_validator
 
 from sysid.composite import Doubt, Perturbation
+from sysid.composite.committee import SPREAD
 from sysid.field_checks import FieldError
 from sysid.workbench.old_words import STRICT
 
@@ -102,7 +103,8 @@ class DoubtConfig(BaseModel):
         false: Share of the right answers that may be in doubt.
         data: Data set with sequences that trained nothing, of more than one kind: all of them find the threshold.
         perturb: Channels that may decide; it doubts where it parts from itself with one of them moved.
-        beside: Bundles of wholes that were trained apart, seen from the folder of the YAML.
+        beside: Bundles of wholes that were trained apart, or runs that left one, seen from the folder of the YAML.
+            Where the mean of several answers (``mean``), their spread doubts, and neither is said.
     """
 
     model_config = STRICT
@@ -114,21 +116,55 @@ class DoubtConfig(BaseModel):
     perturb: tuple[PerturbationConfig, ...] = ()
     beside: tuple[str, ...] = ()
 
-    @model_validator(mode="after")
-    def _check(self) -> DoubtConfig:
-        if not self.perturb and not self.beside:
+    def check_judges(self, *, averaged: bool) -> None:
+        """Refuse what nobody would doubt.
+
+        Args:
+            averaged: Whether the mean of several wholes answers, whose spread judges it.
+
+        Raises:
+            FieldError: If nobody does, or somebody else beside the spread.
+        """
+        judging = [name for name in ("perturb", "beside") if getattr(self, name)]
+        if averaged and judging:
+            raise FieldError(
+                "a mean is doubted by the spread of what it is the mean of",
+                expected="doubt without perturb and beside, as there is a mean",
+                got=f"doubt: {' and '.join(judging)}",
+                remedy=f"leave out {' and '.join(judging)}; who is to be averaged stands under mean, beside",
+            )
+        if not averaged and not judging:
             raise FieldError(
                 "nobody doubts",
-                expected="perturb, or wholes beside it",
-                got="neither",
+                expected="perturb, or wholes beside it, or a mean whose spread doubts",
+                got="none of them",
                 remedy="write for example perturb: [{channel: BP, by: 0.3, readers: [RL]}]",
             )
-        return self
 
     def asked(self) -> Doubt:
         """What the whole is to doubt."""
         moved = tuple(Perturbation(channel=one.channel, by=one.by, readers=one.readers) for one in self.perturb)
         return Doubt(output=self.output, error=self.error, false=self.false, perturb=moved)
+
+
+class MeanConfig(BaseModel):
+    """The mean of several wholes answers: of the one that is trained here and of others, for every scored output.
+
+    Args:
+        beside: Bundles of wholes that were trained apart, or runs that left one, seen from the folder of the YAML.
+        spread: Outputs whose spread, the largest answer less the smallest, is an output of what is exported too:
+            ``BC_spread`` of ``BC``.
+    """
+
+    model_config = STRICT
+
+    beside: tuple[str, ...] = Field(min_length=1)
+    spread: tuple[str, ...] = ()
+
+    @property
+    def spreads(self) -> tuple[str, ...]:
+        """The names of these spreads."""
+        return tuple(f"{name}{SPREAD}" for name in self.spread)
 
 
 class PublishedConfig(BaseModel):

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from sysid.composite import FixedMember
 from sysid.composite.active_learning import ActiveLearned, Assessment
+from sysid.composite.doubt_figures import DoubtFigures
+from sysid.composite.doubting import Doubting
 from sysid.composite.fixed_equations import equation_of
 from sysid.composite.limits_held import Holding
 from sysid.composite.monte_carlo import MonteCarlo
@@ -25,10 +27,10 @@ from sysid.reporting.records import RESULTS_FILE, parse_record
 from sysid.reporting.signals import MONTE_CARLO_FILE, SIGNALS_FILE
 from sysid.traces import Trace, TraceSet
 from sysid.workbench.assembly.ablation import Ablation
+from sysid.workbench.assembly.beside import Judged
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.interpolation import InterpolationScores
 from sysid.workbench.assembly.member_scores import CandidateScores, MemberScores
-from sysid.workbench.assembly.written import written
 from sysid.workbench.runner.store import strict, write_arrays
 
 if TYPE_CHECKING:
@@ -45,15 +47,15 @@ class Outcome:
     Args:
         whole: The assembly of the chosen stage.
         stages: Scores by stage, in their order.
-        selection: Score of each stage on the selection traces.
-        chosen: The stage that was chosen.
+        judged: What is scored, and which of it answers.
         timing: Seconds of a free run of the whole by case.
         stressed: What came of the random sequences.
         worst: The sequences that the whole did worst on, whose signals are kept.
         unseen: By round of active learning, how it does on the random sequences.
         interpolation: How positions do between those that are modelled, if they were asked for.
         exported: The bundle, if one was asked for.
-        doubt: How far the doubts of what is exported can be trusted, in words.
+        doubt: What is exported with its doubts.
+        doubt_on: How far these can be trusted, by data set, the one that the threshold was found on first.
         holding: Which limits hold the outputs in free run.
         members: The members' candidates by themselves, where there are several or they were fitted one step ahead too.
         ablation: What the stages say of each step of modelling by parts.
@@ -61,15 +63,15 @@ class Outcome:
 
     whole: Cascade
     stages: Mapping[str, Scores]
-    selection: Mapping[str, float]
-    chosen: str
+    judged: Judged
     timing: Mapping[str, float]
     stressed: MonteCarlo | None
     worst: Sequence[Trace] = ()
     unseen: Mapping[str, Assessment] = field(default_factory=dict)
     interpolation: InterpolationScores | None = None
     exported: Bundle | None = None
-    doubt: str = ""
+    doubt: Doubting | None = None
+    doubt_on: Mapping[str, DoubtFigures] = field(default_factory=dict)
     holding: Sequence[Holding] = ()
     members: Sequence[MemberScores] = ()
     ablation: Sequence[Ablation] = ()
@@ -106,12 +108,13 @@ def assembly_results(
         "cases": {trace.name: _case(trace, cases, found) for trace in cases},
         "outputs": {name: {"unit": first.channel(name).unit} for name in config.outputs},
         "whole": {
-            "stage": found.chosen,
+            "stage": found.judged.chosen,
             "inputs": list(found.whole.inputs),
             "models": len(found.whole.models),
             "parameters": found.whole.n_parameters,
         },
-        "stages": _stages(context, trained, found),
+        "stages": _stages(found),
+        "mean": list(found.judged.averaged),
         "published": {name: one.model_dump() for name, one in config.published.items() if name in config.outputs},
         "published_models": config.published_models,
         "published_whole": config.published_whole,
@@ -127,7 +130,8 @@ def assembly_results(
         "limit_check": asdict(trained.limits) if trained.limits.limits else None,
         "interpolation": None if found.interpolation is None else _line(found.interpolation),
         "exports": [] if found.exported is None else _exports(found.exported),
-        "notes": [*notes, *([f"What is exported raises the flag IN_DOUBT: {found.doubt}."] if found.doubt else [])],
+        "doubt": None if found.doubt is None else _doubt(found.doubt, found.doubt_on),
+        "notes": list(notes),
     }
     return parse_record(AssemblyResults, strict(document), where=context.store.path / RESULTS_FILE)
 
@@ -174,12 +178,25 @@ def _case(trace: Trace, cases: TraceSet, found: Outcome) -> dict[str, Any]:
     }
 
 
-def _stages(context: Context, trained: TrainedComposite, found: Outcome) -> list[dict[str, Any]]:
-    networks = written(context.config.composite, trained.stages)
+def _stages(found: Outcome) -> list[dict[str, Any]]:
+    judged = found.judged
     return [
-        {"name": name, "networks": networks[name], "selection": found.selection[name], "mse": found.stages[name]}
-        for name in trained.stages
+        {"name": name, "networks": judged.networks[name], "selection": judged.selection[name], "mse": mse}
+        for name, mse in found.stages.items()
     ]
+
+
+def _doubt(one: Doubting, on: Mapping[str, DoubtFigures]) -> dict[str, Any]:
+    return {
+        "output": one.output,
+        "unit": one.whole.units[one.output],
+        "error": one.figures.error,
+        "threshold": one.figures.threshold,
+        "of": one.judged_by,
+        "sentence": one.sentence,
+        "on": [{"data": data} | {k: getattr(each, k) for k in ("samples", "wrong", "flagged", "false")}
+               for data, each in on.items()],
+    }  # fmt: skip
 
 
 def _member(one: MemberScores) -> dict[str, Any]:

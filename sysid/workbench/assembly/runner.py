@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.composite import train
+from sysid.composite.round_times import stand_in
 from sysid.errors import ConfigError
 from sysid.export.exporters import wanted_formats
 from sysid.field_checks import check
@@ -13,6 +14,7 @@ from sysid.models import Cascade, cascade_from_dict
 from sysid.reporting.assembly.document import headline
 from sysid.reporting.assembly.results import AssemblyResults
 from sysid.reporting.published.tables import read_published
+from sysid.workbench.assembly.beside import Beside
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.context import Context
 from sysid.workbench.assembly.data import AssemblyData
@@ -67,16 +69,20 @@ def _run(context: Context, estimates: RoundEstimates) -> AssemblyResults:
         read_published(config.published_models)  # a wrong name is said now, not when all is trained
     if config.export is not None:
         wanted_formats(config.export.formats)  # nor a format that cannot be written here
+    beside = Beside.read(config.doubt, config.mean, config.wanted, context.beside)
     cases = context.load(config.data)
     context.cases.append(cases)
     data, begin = AssemblyData.of(context), None
     estimates.data.append(data.data)
     if config.warm_start is not None:
-        begin, said = read_whole(context.beside / config.warm_start)
-        notes.append(said)
+        begin, begun = read_whole(context.beside / config.warm_start)
+        notes.append(begun)
+    if beside.doubting or beside.averaged:
+        beside.check(stand_in(config.composite, data.data.estimation[0]))  # not when all is trained
     given = {member.mapping.output: swept(context, member) for member in config.members}
     trained = train(config.composite, config.plan, data.data, begin=begin, given=given, keeper=context)
-    finish = Evaluating(context=context, trained=trained, notes=(*notes, *trained.notes))
+    said = [one for one in [beside.sentence()] if one]
+    finish = Evaluating(context=context, trained=trained, beside=beside, notes=(*notes, *trained.notes, *said))
     results = finish.results(cases, data)
     page = context.run.report(results)
     context.run.then(lambda: finish.track(results, page.value))

@@ -140,6 +140,10 @@ def export(
         Path | None,
         typer.Option(help="YAML with what the whole of a bundle is to doubt: the section doubt of a pipeline."),
     ] = None,
+    mean: Annotated[
+        Path | None,
+        typer.Option(help="YAML with other bundles, the mean of which and of this one answers: the section mean."),
+    ] = None,
 ) -> None:
     """Export a fit, a member or a whole of a finished run as files that run elsewhere, checked against the model.
 
@@ -147,7 +151,9 @@ def export(
     """
     from sysid.workbench.commands.export import export_command
 
-    export_command(pipeline, fit=fit, out=out, run_folder=run_folder, formats=formats, pack=pack, doubt=doubt)
+    export_command(
+        pipeline, fit=fit, out=out, run_folder=run_folder, formats=formats, pack=pack, doubt=doubt, mean=mean
+    )
 
 
 @commands.command(epilog="Example: sysid promote bp-ar-to-bc")

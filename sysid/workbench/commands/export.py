@@ -6,13 +6,17 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from sysid.composite.doubting import Doubting
 from sysid.errors import ConfigError, did_you_mean
 from sysid.export.bundle import Bundle
 from sysid.export.manifest import MANIFEST
+from sysid.export.reading import read_bundle
 from sysid.export.writing import zip_bundle
 from sysid.field_checks import check
+from sysid.ingest import load_dataset
 from sysid.names import slug
+from sysid.traces import TraceSet
+from sysid.workbench.assembly.beside import Beside, Other
+from sysid.workbench.assembly.proof_config import DoubtConfig, MeanConfig
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.kinds import RunRequest, kind_of, kinds
 from sysid.workbench.runner.console import console
@@ -31,6 +35,7 @@ def export_command(
     formats: str | None,
     pack: bool,
     doubt: Path | None = None,
+    mean: Path | None = None,
 ) -> None:
     """Export a result that is stored, in a run or in a bundle.
 
@@ -42,20 +47,22 @@ def export_command(
         formats: Of a bundle what is written, with commas.
         pack: Whether to write the bundle as one zip too.
         doubt: A YAML with what the whole of a bundle is to doubt, as in the section ``doubt`` of a pipeline.
+        mean: A YAML with the wholes whose mean with that of a bundle is to answer, as in the section ``mean``.
 
     Raises:
         ConfigError: If there is no such result, or it has not been run as the pipeline now stands.
         ParityError: If a file differs from the model by more than the tolerance.
     """
     if fit is None and _is_bundle(Path(pipeline)):
-        _tell(_renewed(Path(pipeline), out, formats, doubt), pack=pack)
+        _tell(_renewed(Path(pipeline), out, formats, doubt=doubt, mean=mean), pack=pack)
         return
-    if fit is None or formats is not None or doubt is not None:
+    given = {"--formats": formats, "--doubt": doubt, "--mean": mean}
+    if fit is None or any(one is not None for one in given.values()):
         raise ConfigError(
-            "a fit of a run is exported by its name, in the formats and with the doubts of its pipeline",
+            "a fit of a run is exported by its name, in the formats and with the doubts and the mean of its pipeline",
             where=pipeline,
-            expected="--fit NAME, no --formats and no --doubt; or a bundle",
-            got="no --fit" if fit is None else "--formats" if formats is not None else "--doubt",
+            expected="--fit NAME, none of --formats, --doubt and --mean; or a bundle",
+            got="no --fit" if fit is None else next(name for name, one in given.items() if one is not None),
             remedy="name the fit, or give the bundle's folder or zip",
         )
     path = find_pipeline(pipeline)
@@ -85,29 +92,64 @@ def _is_bundle(path: Path) -> bool:
     return (path / MANIFEST).is_file() or (path.is_file() and path.suffix == ".zip")
 
 
-def _renewed(path: Path, out: Path | None, formats: str | None, doubt: Path | None) -> Bundle:
+def _renewed(path: Path, out: Path | None, formats: str | None, *, doubt: Path | None, mean: Path | None) -> Bundle:
     from sysid.export.renewing import renew_bundle
 
     asked = None if formats is None else [name.strip() for name in formats.split(",") if name.strip()]
     beside = path.with_suffix("") if path.is_file() else path
+    if mean is not None:
+        return _averaged(path, out or beside.with_name(f"{beside.resolve().name}-mean"), asked, mean, doubt)
     if doubt is None:
         return renew_bundle(path, out or beside, formats=asked)
-    found = _doubting(path, doubt)
+    config = check(DoubtConfig, read_yaml(doubt), where=doubt)
+    whole = Other.of_bundle(read_bundle(path), str(path)).whole
+    others = Beside.read(config, None, [config.output], doubt.parent)
+    others.check(whole)
+    found = others.doubts(whole, config, tuple(load_dataset(config.data)))
     console().print(found.sentence, soft_wrap=True, markup=False)
     into = out or beside.with_name(f"{beside.resolve().name}-doubting")
     return renew_bundle(path, into, formats=asked, whole=found.whole, doubt=found.sentence)
 
 
-def _doubting(bundle: Path, file: Path) -> Doubting:
-    """The whole of a bundle with what a YAML asks it to doubt."""
-    from sysid.composite.doubting import doubting
-    from sysid.ingest import load_dataset
-    from sysid.workbench.assembly.proof_config import DoubtConfig
-    from sysid.workbench.assembly.warm_start import read_whole
+def _averaged(path: Path, into: Path, formats: Sequence[str] | None, mean: Path, doubt: Path | None) -> Bundle:
+    """The mean of a bundle's whole and others, scored and checked on the cases that the bundle was scored on."""
+    from sysid.export import export_bundle
+    from sysid.validation import evaluate_cascade
 
-    asked = check(DoubtConfig, read_yaml(file), where=file)
-    beside = [read_whole(file.parent / one)[0] for one in asked.beside]
-    return doubting(read_whole(bundle)[0], asked.asked(), tuple(load_dataset(asked.data)), beside=beside)
+    old = read_bundle(path)
+    outputs, averaged = [str(one["name"]) for one in old.outputs], check(MeanConfig, read_yaml(mean), where=mean)
+    asked = None if doubt is None else check(DoubtConfig, read_yaml(doubt), where=doubt)
+    names = dict.fromkeys([*outputs, *averaged.spread, *([] if asked is None else [asked.output])])
+    whole, others = Other.of_bundle(old, str(path)), Beside.read(asked, averaged, names, mean.parent)
+    others.check(whole.whole)
+    command = ["sysid", "export", str(path), "--mean", str(mean), *([] if doubt is None else ["--doubt", str(doubt)])]
+    provenance = {"command": shlex.join(command), "mean": others.sentence(whole.sentence)}
+    if asked is None:
+        found = others.answering(whole.whole)
+    else:
+        doubting = others.doubts(whole.whole, asked, tuple(load_dataset(asked.data)))
+        console().print(doubting.sentence, soft_wrap=True, markup=False)
+        found, provenance["doubt"] = doubting.whole, doubting.sentence
+    cases = _cases(old)
+    return export_bundle(
+        found, cases, into, outputs=[*outputs, *averaged.spreads], metrics=evaluate_cascade(found, cases),
+        formats=formats or list(dict.fromkeys(file.format for file in old.files)), provenance=provenance,
+    )  # fmt: skip
+
+
+def _cases(old: Bundle) -> TraceSet:
+    """The cases that a bundle was scored on: another answer has other figures."""
+    known = old.metadata["provenance"]["data"]
+    cases = load_dataset(known["name"])
+    if cases.digest != known["sha256"]:
+        raise ConfigError(
+            "the data set is not the one that the bundle was scored on, so that the mean cannot be",
+            where=str(old.folder),
+            expected=f"{known['name']}, SHA-256 {known['sha256']}",
+            got=f"SHA-256 {cases.digest}",
+            remedy="run where that data set is; or say mean in a pipeline of kind assembly, with warm_start",
+        )
+    return cases
 
 
 def _tell(bundle: Bundle, *, pack: bool) -> None:
