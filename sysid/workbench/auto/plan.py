@@ -29,6 +29,9 @@ RIVAL = 2.0
 """Times the least error within which the best of another kind of network is followed too."""
 GAIN = 0.02
 """Part of the least error, as a root of a mean square, by which a round has to better it to count as a gain."""
+FIRST = 0.4
+"""Share of the budget after which what stands next to the best of one kind is left for the other kinds, where these
+have yet to be tried."""
 PATIENCE = 2
 """Rounds without a gain after which the search ends."""
 FINALISTS, AGAIN = 5, 2
@@ -277,7 +280,7 @@ class Plan:
         if self.looked.in_motion:
             self.budget.unlimited = 1
             yield from self._rounds_of([one for family in nonlinear_first for one in family.in_motion(self.looked)])
-            yield from self._near_the_best()
+            yield from self._near_the_best(FIRST)
         # At ends it is what runs on through them; where another kind does as well, its least shows at once.
         if self.looked.ends:
             held = [one for family in nonlinear_first for one in family.at_ends(self.looked)]
@@ -288,7 +291,7 @@ class Plan:
             # Networks alone: blocks and polynomials, which take long, may wait.
             rivals = [one for one in self._least(linear=False) if estimator_of(one.structure).initial is not None]
             yield from self._rounds_of([one for one in rivals if one.structure.kind not in kinds])
-            yield from self._near_the_best()
+            yield from self._near_the_best(FIRST)
         yield from self._unasked(linear=True)
         yield from self._larger()
         self.looked = replace(self.looked, states=self._linear_states())
@@ -297,19 +300,27 @@ class Plan:
         yield from self._unasked(linear=False)
         yield from self._near_the_best()
 
-    def _near_the_best(self) -> Iterator[list[Try]]:
-        """What stands next to good ones, as long as it gains."""
+    def _near_the_best(self, share: float = 1.0) -> Iterator[list[Try]]:
+        """What stands next to good ones, as long as it gains.
+
+        Args:
+            share: Of the budget, beyond which no round of it begins: other kinds follow.
+        """
         stale = 0
         while stale < PATIENCE:
+            if share < 1.0 and self.budget.fraction() >= share:
+                return
             before, outside = self.least(), self._least_outside()
             wanted = self._next()
             if not wanted:
-                self.ended = self.ended or "everything next to the best was tried"
+                if share == 1.0:
+                    self.ended = self.ended or "everything next to the best was tried"
                 return
             yield wanted
             gained = math.sqrt(self.least()) < (1.0 - GAIN) * math.sqrt(before) or self._least_outside() < outside
             stale = 0 if gained else stale + 1
-        self.ended = self.ended or f"the last {PATIENCE * ROUND} trials gained less than {GAIN:.0%}"
+        if share == 1.0:
+            self.ended = self.ended or f"the last {PATIENCE * ROUND} trials gained less than {GAIN:.0%}"
 
     def _unasked(self, *, linear: bool) -> Iterator[list[Try]]:
         """The least of each kind, which tells what others cost; then those for which there is time.
