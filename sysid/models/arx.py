@@ -110,6 +110,8 @@ class ARXModel(LinearForms):
     output_unit: str
     rest_output: float
 
+    structure_field = "orders"
+
     def __post_init__(self) -> None:
         coefficients = np.array(self.coefficients, dtype=np.float64)
         coefficients.setflags(write=False)
@@ -184,28 +186,12 @@ class ARXModel(LinearForms):
         A, B, C, D = observer_row([(np.concatenate([[1.0], -self.a]), ups)], len(ups))
         return A, B, C, D
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        return {
-            "structure": self.orders.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
-            "output_unit": self.output_unit,
-            "rest_output": self.rest_output,
-            "coefficients": self.coefficients.tolist(),
-            "intercept": self.intercept,
-        }
+    def _written(self) -> dict[str, Any]:
+        return {"coefficients": self.coefficients.tolist(), "intercept": self.intercept}
 
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> ARXModel:
-        """The model that :meth:`to_dict` wrote."""
-        orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output", "intercept")}
-        return cls(
-            orders=ARX(**orders),
-            coefficients=np.array(fields["coefficients"], dtype=np.float64),
-            mapping=Mapping.parse(fields["mapping"]),
-            input_units=tuple(fields["input_units"]),
-            **rest,
-        )
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        return {
+            "coefficients": np.array(fields["coefficients"], dtype=np.float64),
+            "intercept": fields["intercept"],
+        }

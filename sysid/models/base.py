@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping as Dict
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,9 @@ class AbstractModel(ABC):
     """Unit of the output."""
     rest_output: float
     """Output of the system at rest, in its unit: where a free run starts unless told otherwise."""
+
+    structure_field: ClassVar[str] = "network"
+    """Name of the field with its structure."""
 
     @property
     @abstractmethod
@@ -89,21 +92,54 @@ class AbstractModel(ABC):
         found = {(0, j): self.ratio(j) for j in range(len(self.mapping.inputs))}
         return {places: ratio for places, ratio in found.items() if ratio is not None}
 
-    @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """Everything needed to build the model again, as JSON values."""
+        return {
+            "structure": self.structure.to_dict(),
+            "mapping": str(self.mapping),
+            "sample_time": self.sample_time,
+            "input_units": list(self.input_units),
+            **self._written_outputs(),
+            **self._written(),
+        }
 
     @classmethod
-    @abstractmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> AbstractModel:
+    def from_dict(cls, fields: Dict[str, Any], structure: AbstractStructure) -> Self:
         """The model that :meth:`to_dict` wrote.
 
         Args:
             fields: What it wrote.
+            structure: The structure among it, read.
 
         Returns:
             The model, equal in every parameter.
         """
+        make: Any = cls  # a dataclass with these fields
+        return make(  # type: ignore[no-any-return]
+            **{cls.structure_field: structure},
+            mapping=Mapping.parse(fields["mapping"]),
+            sample_time=fields["sample_time"],
+            input_units=tuple(fields["input_units"]),
+            **cls._read_outputs(fields),
+            **cls._read(fields),
+        )
+
+    @abstractmethod
+    def _written(self) -> dict[str, Any]:
+        """What a model of this kind has beside structure, channels and units, as JSON values."""
+
+    @staticmethod
+    @abstractmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        """Its fields from what :meth:`_written` wrote."""
+
+    def _written_outputs(self) -> dict[str, Any]:
+        """Unit of the output, and its value at rest."""
+        return {"output_unit": self.output_unit, "rest_output": self.rest_output}
+
+    @staticmethod
+    def _read_outputs(fields: Dict[str, Any]) -> dict[str, Any]:
+        return {name: fields[name] for name in ("output_unit", "rest_output")}
 
     @property
     def resting(self) -> float | NDArray[np.float64]:
@@ -349,6 +385,13 @@ class SeveralOutputs(AbstractModel):
             rest_outputs=self.rest_outputs,
             direct=self.recursion.reads_now(self.mapping.inputs),
         )
+
+    def _written_outputs(self) -> dict[str, Any]:
+        return {"output_units": list(self.output_units), "rest_outputs": list(self.rest_outputs)}
+
+    @staticmethod
+    def _read_outputs(fields: Dict[str, Any]) -> dict[str, Any]:
+        return {name: tuple(fields[name]) for name in ("output_units", "rest_outputs")}
 
     @property
     def output_unit(self) -> str:  # type: ignore[override]  # read only: a model is frozen

@@ -11,7 +11,6 @@ from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
 from sysid.models.grey_box import GreyBox
 from sysid.models.grey_box_model import GreyBoxModel
 from sysid.models.polynomial_narx import PolynomialNARX
-from sysid.models.scaling import Scaling
 from sysid.models.structure import AbstractStructure
 
 BUILT: tuple[type[AbstractStructure], ...] = (HammersteinWiener, WienerHammerstein, PolynomialNARX)
@@ -28,6 +27,8 @@ class BuiltModel(GreyBoxModel):
 
     built_of: AbstractStructure
 
+    structure_field = "built_of"
+
     @property
     def structure(self) -> AbstractStructure:  # type: ignore[override]  # any that becomes equations
         """What was asked for."""
@@ -41,26 +42,13 @@ class BuiltModel(GreyBoxModel):
             text = _with_number(text, name, self.parameters[name])
         return text
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        found = super().to_dict()
-        return found | {"structure": self.built_of.to_dict(), "equations": self.grey.to_dict()}
+    def _written(self) -> dict[str, Any]:
+        return super()._written() | {"equations": self.grey.to_dict()}
 
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> BuiltModel:
-        """The model that :meth:`to_dict` wrote."""
-        kinds = {one.kind: one for one in BUILT}
-        structure, equations = (
-            {key: value for key, value in fields[name].items() if key != "kind"} for name in ("structure", "equations")
-        )
-        return cls(
-            built_of=kinds[fields["structure"]["kind"]](**structure),
-            grey=GreyBox(**equations),
-            scaling=Scaling.from_dict(fields["scaling"]),
-            output_unit=fields["output_unit"],
-            rest_output=fields["rest_output"],
-            **cls._read(fields),
-        )
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        equations = {key: value for key, value in fields["equations"].items() if key != "kind"}
+        return GreyBoxModel._read(fields) | {"grey": GreyBox(**equations)}
 
 
 def _with_number(text: str, name: str, value: float) -> str:

@@ -17,7 +17,7 @@ from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
 from sysid.models.column_recursion import ColumnRecursion
-from sysid.models.ends import Ends
+from sysid.models.ends import Ends, check_record
 from sysid.models.history import known_inputs
 from sysid.models.rest_levels import leaders, resting
 from sysid.models.to_control import of_wired
@@ -297,16 +297,9 @@ class Cascade:
 
         Raises:
             ChannelError: If the trace lacks an input.
-            TraceError: If the trace has another sample time.
+            ConfigError: If the trace has another sample time, or a channel in another unit.
         """
-        if not np.isclose(trace.sample_time, self.sample_time, rtol=1e-9, atol=0.0):
-            raise TraceError(
-                "the trace has another sample time than the cascade",
-                where=f"trace {trace.name}",
-                expected=f"{self.sample_time:g} s",
-                got=f"{trace.sample_time:g} s",
-                remedy="resample it at ingest",
-            )
+        check_record(self.units, self.sample_time, trace)
         return self.simulate(trace.columns(self.inputs), rest=rest)
 
     def simulate_batch(

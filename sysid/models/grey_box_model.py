@@ -16,10 +16,10 @@ from sysid.errors import ConfigError, did_you_mean
 from sysid.models.base import AbstractModel, SeveralOutputs
 from sysid.models.case_values import CaseValues
 from sysid.models.equation_form import EquationForm, StateTerms
-from sysid.models.grey_box import GreyBox, VectorGreyBox, lowered
+from sysid.models.grey_box import GreyBox, lowered
 from sysid.models.history import History
 from sysid.models.mapping import Mapping
-from sysid.models.scaling import Scaling, VectorScaling
+from sysid.models.scaling import Scaling, VectorScaling, scaling_from_dict
 
 Array = NDArray[np.float64]
 
@@ -44,6 +44,7 @@ class EquationModel(AbstractModel):
     solver: str = RUNGE_KUTTA
     cases: tuple[str, ...] = ()
 
+    structure_field = "grey"
     clamp = np.inf
     """Bound of the output: none."""
 
@@ -238,13 +239,8 @@ class EquationModel(AbstractModel):
         _, J = form.moved(form.given(inputs, history.inputs), x, S, p)
         return np.asarray((J if self.structure.several_outputs else J[:, 0]) @ factor)
 
-    def _fields(self) -> dict[str, Any]:
-        """What is stored of either kind."""
+    def _written(self) -> dict[str, Any]:
         return {
-            "structure": self.grey.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
             "substeps": self.substeps,
             "solver": self.solver,
             "norms": list(self.norms),
@@ -256,13 +252,12 @@ class EquationModel(AbstractModel):
 
     @staticmethod
     def _read(fields: Dict[str, Any]) -> dict[str, Any]:
-        """The arguments that are the same for either kind."""
-        given = ("sample_time", "substeps", "norms", "levels", "spans", "input_units")
-        found = {name: fields[name] for name in given}
-        theta = np.array(fields["theta"], dtype=np.float64)
-        found["solver"] = fields.get("solver", RUNGE_KUTTA)  # the only one, once
-        found["cases"] = tuple(fields.get("cases", ()))
-        return found | {"theta": theta, "mapping": Mapping.parse(fields["mapping"])}
+        return {name: fields[name] for name in ("substeps", "norms", "levels", "spans")} | {
+            "theta": np.array(fields["theta"], dtype=np.float64),
+            "scaling": scaling_from_dict(fields["scaling"]),
+            "solver": fields.get("solver", RUNGE_KUTTA),  # the only one, once
+            "cases": tuple(fields.get("cases", ())),
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -291,22 +286,6 @@ class GreyBoxModel(EquationModel):
     output_unit: str
     rest_output: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        return self._fields() | {"output_unit": self.output_unit, "rest_output": self.rest_output}
-
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> GreyBoxModel:
-        """The model that :meth:`to_dict` wrote."""
-        structure = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        return cls(
-            grey=GreyBox(**structure),
-            scaling=Scaling.from_dict(fields["scaling"]),
-            output_unit=fields["output_unit"],
-            rest_output=fields["rest_output"],
-            **cls._read(fields),
-        )
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VectorGreyBoxModel(EquationModel, SeveralOutputs):
@@ -320,19 +299,3 @@ class VectorGreyBoxModel(EquationModel, SeveralOutputs):
     scaling: VectorScaling
     output_units: tuple[str, ...]
     rest_outputs: tuple[float, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        return self._fields() | {"output_units": list(self.output_units), "rest_outputs": list(self.rest_outputs)}
-
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> VectorGreyBoxModel:
-        """The model that :meth:`to_dict` wrote."""
-        structure = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        return cls(
-            grey=VectorGreyBox(**structure),
-            scaling=VectorScaling.from_dict(fields["scaling"]),
-            output_units=tuple(fields["output_units"]),
-            rest_outputs=tuple(fields["rest_outputs"]),
-            **cls._read(fields),
-        )

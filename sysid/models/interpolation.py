@@ -24,9 +24,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.errors import ChannelError, ConfigError
 from sysid.models.cascade import Cascade
 from sysid.models.cascade_run import CascadeRun
+from sysid.models.ends import check_record
 from sysid.models.store import cascade_from_dict
 from sysid.traces import Trace
 
@@ -203,16 +204,9 @@ class Interpolation:
 
         Raises:
             ChannelError: If the trace lacks an input.
-            TraceError: If the trace has another sample time.
+            ConfigError: If the trace has another sample time, or a channel in another unit.
         """
-        if not np.isclose(trace.sample_time, self.sample_time, rtol=1e-9, atol=0.0):
-            raise TraceError(
-                "the trace has another sample time than the line",
-                where=f"trace {trace.name}",
-                expected=f"{self.sample_time:g} s",
-                got=f"{trace.sample_time:g} s",
-                remedy="resample it at ingest",
-            )
+        check_record(self.along.units, self.sample_time, trace)
         return self.simulate(trace.columns(self.inputs), positions, workers=workers)
 
     def to_dict(self) -> dict[str, Any]:

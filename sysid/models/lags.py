@@ -151,11 +151,6 @@ class Lags:
         """Lag of each input regressor, shape ``(n_input_regressors,)``."""
         return np.array([lag for lags in self.inputs for lag in lags], dtype=np.int64)
 
-    @property
-    def output_lag(self) -> NDArray[np.int64]:
-        """Lag of each output regressor, shape ``(n_output_regressors,)``."""
-        return np.array(self.output, dtype=np.int64)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Lagged:

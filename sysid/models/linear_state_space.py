@@ -22,7 +22,7 @@ from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
-from sysid.models.scaling import Scaling, VectorScaling
+from sysid.models.scaling import Scaling, VectorScaling, scaling_from_dict
 from sysid.models.state_space import Filter, StateSpace
 from sysid.models.structure import AbstractStructure
 from sysid.models.to_control import Matrices, state_space
@@ -158,6 +158,8 @@ class _StateSpaceModel(InnovationModel):
     sample_time: float
     input_units: tuple[str, ...]
 
+    structure_field = "orders"
+
     @property
     def structure(self) -> LinearStateSpace:
         """The number of states."""
@@ -226,25 +228,14 @@ class _StateSpaceModel(InnovationModel):
         """``K`` from innovations in the outputs' units, for the state of :attr:`matrices`."""
         return np.asarray(self.lowered.K / np.array(self.scaling.output_scale))
 
-    def _fields(self) -> dict[str, Any]:
-        """What :meth:`_read` takes, as JSON values."""
-        return {
-            "structure": self.orders.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
-            "scaling": self.scaling.to_dict(),
-            "system": self.system.to_dict(),
-        }
+    def _written(self) -> dict[str, Any]:
+        return {"scaling": self.scaling.to_dict(), "system": self.system.to_dict()}
 
     @staticmethod
     def _read(fields: Dict[str, Any]) -> dict[str, Any]:
-        """The parts that models of one and of several outputs store alike."""
         return {
+            "scaling": scaling_from_dict(fields["scaling"]),
             "system": Innovations.from_dict(fields["system"]),
-            "mapping": Mapping.parse(fields["mapping"]),
-            "input_units": tuple(fields["input_units"]),
-            "sample_time": fields["sample_time"],
         }
 
 
@@ -277,22 +268,6 @@ class LinearStateSpaceModel(_StateSpaceModel, LinearForms):
             B=gain * numerators[0, j, first:], F=F, delay=first + late, discrete=True,
             of_numerator=f"B({self.mapping.inputs[j]}, ", of_denominator="F(",
         )  # fmt: skip
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        return self._fields() | {"output_unit": self.output_unit, "rest_output": self.rest_output}
-
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> LinearStateSpaceModel:
-        """The model that :meth:`to_dict` wrote."""
-        orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        return cls(
-            orders=LinearStateSpace(**orders),
-            scaling=Scaling.from_dict(fields["scaling"]),
-            output_unit=fields["output_unit"],
-            rest_output=fields["rest_output"],
-            **cls._read(fields),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -359,22 +334,6 @@ class VectorStateSpaceModel(_StateSpaceModel, SeveralOutputs):
             ConfigError: If there is no continuous form.
         """
         return self.continuous().to_control(pade_order=pade_order) if continuous else state_space(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        return self._fields() | {"output_units": list(self.output_units), "rest_outputs": list(self.rest_outputs)}
-
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> VectorStateSpaceModel:
-        """The model that :meth:`to_dict` wrote."""
-        orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        return cls(
-            orders=VectorStateSpace(**orders),
-            scaling=VectorScaling.from_dict(fields["scaling"]),
-            output_units=tuple(fields["output_units"]),
-            rest_outputs=tuple(fields["rest_outputs"]),
-            **cls._read(fields),
-        )
 
 
 def continuous_form(model: _StateSpaceModel) -> ContinuousStateSpace:

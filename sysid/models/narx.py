@@ -256,33 +256,19 @@ class NARXModel(AbstractModel):
             activation=self.network.activation,
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
+    def _written(self) -> dict[str, Any]:
         return {
-            "structure": self.network.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
-            "output_unit": self.output_unit,
-            "rest_output": self.rest_output,
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
             "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
             **({"between": list(self.between)} if self.limits else {}),
         }
 
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> NARXModel:
-        """The model that :meth:`to_dict` wrote."""
-        network = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output")}
-        return cls(
-            network=NARX(**network),
-            theta=np.array(fields["theta"], dtype=np.float64),
-            scaling=Scaling.from_dict(fields["scaling"]),
-            mapping=Mapping.parse(fields["mapping"]),
-            input_units=tuple(fields["input_units"]),
-            clamp=np.inf if fields["clamp"] is None else fields["clamp"],
-            between=tuple(fields.get("between", (None, None))),
-            **rest,
-        )
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        return {
+            "theta": np.array(fields["theta"], dtype=np.float64),
+            "scaling": Scaling.from_dict(fields["scaling"]),
+            "clamp": np.inf if fields["clamp"] is None else fields["clamp"],
+            "between": tuple(fields.get("between", (None, None))),
+        }

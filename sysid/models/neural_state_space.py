@@ -21,7 +21,7 @@ from sysid.models.narx import CLAMP
 from sysid.models.neural_ensemble import NeuralEnsemble, check_shares
 from sysid.models.neural_form import NeuralForm
 from sysid.models.neural_sizes import Sizes
-from sysid.models.scaling import Scaling, VectorScaling
+from sysid.models.scaling import Scaling, VectorScaling, scaling_from_dict
 from sysid.models.structure import AbstractStructure
 
 OUTPUTS = ("plain", "absolute")
@@ -255,13 +255,8 @@ class _NeuralModel(AbstractModel):
         found *= np.reshape(self.scaling.output_scale, (-1, 1))
         return found if self.structure.several_outputs else found[:, 0]
 
-    def _fields(self) -> dict[str, Any]:
-        """What is stored of either kind."""
+    def _written(self) -> dict[str, Any]:
         return {
-            "structure": self.network.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
             "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
@@ -270,12 +265,9 @@ class _NeuralModel(AbstractModel):
 
     @staticmethod
     def _read(fields: Dict[str, Any]) -> dict[str, Any]:
-        """The arguments that are the same for either kind."""
         return {
             "theta": np.array(fields["theta"], dtype=np.float64),
-            "mapping": Mapping.parse(fields["mapping"]),
-            "sample_time": fields["sample_time"],
-            "input_units": tuple(fields["input_units"]),
+            "scaling": scaling_from_dict(fields["scaling"]),
             "clamp": np.inf if fields["clamp"] is None else fields["clamp"],
             "shares": tuple(fields.get("shares", (1,))),
         }
@@ -303,22 +295,6 @@ class NeuralStateSpaceModel(_NeuralModel):
     output_unit: str
     rest_output: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        return self._fields() | {"output_unit": self.output_unit, "rest_output": self.rest_output}
-
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> NeuralStateSpaceModel:
-        """The model that :meth:`to_dict` wrote."""
-        network = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        return cls(
-            network=NeuralStateSpace(**network),
-            scaling=Scaling.from_dict(fields["scaling"]),
-            output_unit=fields["output_unit"],
-            rest_output=fields["rest_output"],
-            **cls._read(fields),
-        )
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VectorNeuralStateSpaceModel(_NeuralModel, SeveralOutputs):
@@ -341,19 +317,3 @@ class VectorNeuralStateSpaceModel(_NeuralModel, SeveralOutputs):
     scaling: VectorScaling
     output_units: tuple[str, ...]
     rest_outputs: tuple[float, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        return self._fields() | {"output_units": list(self.output_units), "rest_outputs": list(self.rest_outputs)}
-
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> VectorNeuralStateSpaceModel:
-        """The model that :meth:`to_dict` wrote."""
-        network = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        return cls(
-            network=VectorNeuralStateSpace(**network),
-            scaling=VectorScaling.from_dict(fields["scaling"]),
-            output_units=tuple(fields["output_units"]),
-            rest_outputs=tuple(fields["rest_outputs"]),
-            **cls._read(fields),
-        )

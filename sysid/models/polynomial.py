@@ -335,6 +335,8 @@ class PolynomialModel(LinearForms, InnovationModel):
     output_unit: str
     rest_output: float
 
+    structure_field = "orders"
+
     def __post_init__(self) -> None:
         theta = np.array(self.theta, dtype=np.float64)
         theta.setflags(write=False)
@@ -411,31 +413,15 @@ class PolynomialModel(LinearForms, InnovationModel):
         gain, scale = self.scaling.output_scale, np.array(self.scaling.input_scale)
         return self.system.A, self.system.B / scale, gain * self.system.C, gain * self.system.D / scale
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
-        return {
-            "structure": self.orders.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
-            "output_unit": self.output_unit,
-            "rest_output": self.rest_output,
-            "scaling": self.scaling.to_dict(),
-            "theta": self.theta.tolist(),
-        }
+    def _written(self) -> dict[str, Any]:
+        return {"scaling": self.scaling.to_dict(), "theta": self.theta.tolist()}
 
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> PolynomialModel:
-        """The model that :meth:`to_dict` wrote."""
-        given = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        return cls(
-            orders=POLYNOMIALS[fields["structure"]["kind"]](**given),
-            theta=np.array(fields["theta"], dtype=np.float64),
-            scaling=Scaling.from_dict(fields["scaling"]),
-            mapping=Mapping.parse(fields["mapping"]),
-            input_units=tuple(fields["input_units"]),
-            **{key: fields[key] for key in ("sample_time", "output_unit", "rest_output")},
-        )
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        return {
+            "scaling": Scaling.from_dict(fields["scaling"]),
+            "theta": np.array(fields["theta"], dtype=np.float64),
+        }
 
 
 _ALL: tuple[type[AbstractPolynomial], ...] = (OE, BJ, ARMAX)

@@ -165,3 +165,15 @@ class VectorScaling:
     def error_unit(self) -> float:
         """A squared error of 1 in scaled numbers, as errors are told: several outputs have no unit in common."""
         return 1.0
+
+
+def scaling_from_dict(fields: Mapping[str, Any]) -> Scaling | VectorScaling:
+    """The scaling of one output, or of several, that was written.
+
+    Args:
+        fields: What ``to_dict`` wrote.
+
+    Returns:
+        The scaling.
+    """
+    return (VectorScaling if isinstance(fields["output_scale"], list) else Scaling).from_dict(fields)

@@ -75,7 +75,7 @@ def model_from_dict(fields: Dict[str, Any]) -> AbstractModel:
     """
     kind = _check_kind(fields.get("structure", {}).get("kind"))
     try:
-        return _KINDS[kind][1].from_dict(fields)
+        return _KINDS[kind][1].from_dict(fields, structure_from_dict(fields["structure"]))
     except KeyError as error:
         raise ConfigError(
             f"the stored {kind} model lacks the field {error}", remedy="store the model again; this file is incomplete"

@@ -179,6 +179,8 @@ class TransferFunctionModel(LinearForms):
     output_unit: str
     rest_output: float
 
+    structure_field = "orders"
+
     @property
     def structure(self) -> TransferFunction:
         """The orders."""
@@ -380,38 +382,19 @@ class TransferFunctionModel(LinearForms):
         gain, scale = self.scaling.output_scale, np.array(self.scaling.input_scale)
         return form.A, form.B / scale, gain * form.C, gain * form.D / scale
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
+    def _written(self) -> dict[str, Any]:
         return {
-            "structure": self.orders.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
-            "output_unit": self.output_unit,
-            "rest_output": self.rest_output,
             "sections": [[d.tolist() for d in sections] for sections in self.sections],
             "taps": [taps.tolist() for taps in self.taps],
             "constant": self.constant,
-            "scaling": {
-                "input_offset": list(self.scaling.input_offset),
-                "input_scale": list(self.scaling.input_scale),
-                "output_offset": self.scaling.output_offset,
-                "output_scale": self.scaling.output_scale,
-            },
+            "scaling": self.scaling.to_dict(),
         }
 
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> TransferFunctionModel:
-        """The model that :meth:`to_dict` wrote."""
-        orders = {key: value for key, value in fields["structure"].items() if key != "kind"}
-        scaling: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields["scaling"].items()}
-        rest = {key: fields[key] for key in ("sample_time", "output_unit", "rest_output", "constant")}
-        return cls(
-            orders=TransferFunction(**orders),
-            sections=tuple(tuple(np.array(d, dtype=np.float64) for d in part) for part in fields["sections"]),
-            taps=tuple(np.array(taps, dtype=np.float64) for taps in fields["taps"]),
-            scaling=Scaling(**scaling),
-            mapping=Mapping.parse(fields["mapping"]),
-            input_units=tuple(fields["input_units"]),
-            **rest,
-        )
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        return {
+            "sections": tuple(tuple(np.array(d, dtype=np.float64) for d in part) for part in fields["sections"]),
+            "taps": tuple(np.array(taps, dtype=np.float64) for taps in fields["taps"]),
+            "constant": fields["constant"],
+            "scaling": Scaling.from_dict(fields["scaling"]),
+        }

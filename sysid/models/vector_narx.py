@@ -276,33 +276,19 @@ class VectorNARXModel(SeveralOutputs):
 
         return moves_of(run, self.theta, factor, (len(inputs), len(self.mapping.outputs)))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to build the model again."""
+    def _written(self) -> dict[str, Any]:
         return {
-            "structure": self.network.to_dict(),
-            "mapping": str(self.mapping),
-            "sample_time": self.sample_time,
-            "input_units": list(self.input_units),
-            "output_units": list(self.output_units),
-            "rest_outputs": list(self.rest_outputs),
             "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
             "scaling": self.scaling.to_dict(),
             "theta": self.theta.tolist(),
             **({"between": [list(sides) for sides in self.between]} if self.limits else {}),
         }
 
-    @classmethod
-    def from_dict(cls, fields: Dict[str, Any]) -> VectorNARXModel:
-        """The model that :meth:`to_dict` wrote."""
-        return cls(
-            network=VectorNARX(**{key: value for key, value in fields["structure"].items() if key != "kind"}),
-            theta=np.array(fields["theta"], dtype=np.float64),
-            scaling=VectorScaling.from_dict(fields["scaling"]),
-            mapping=Mapping.parse(fields["mapping"]),
-            sample_time=fields["sample_time"],
-            input_units=tuple(fields["input_units"]),
-            output_units=tuple(fields["output_units"]),
-            rest_outputs=tuple(fields["rest_outputs"]),
-            clamp=np.inf if fields["clamp"] is None else fields["clamp"],
-            between=tuple(tuple(sides) for sides in fields.get("between", ())),
-        )
+    @staticmethod
+    def _read(fields: Dict[str, Any]) -> dict[str, Any]:
+        return {
+            "theta": np.array(fields["theta"], dtype=np.float64),
+            "scaling": VectorScaling.from_dict(fields["scaling"]),
+            "clamp": np.inf if fields["clamp"] is None else fields["clamp"],
+            "between": tuple(tuple(sides) for sides in fields.get("between", ())),
+        }

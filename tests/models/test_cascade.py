@@ -391,9 +391,11 @@ def test_inputs_of_the_wrong_shape_are_refused(shape):
         service().simulate(np.zeros(shape))
 
 
-def test_a_trace_of_another_sample_time_is_refused():
-    trace = Trace(name="a", sample_time=0.2, channels=(Channel(name="STP", unit="psi"),), values=command())
-    with pytest.raises(TraceError, match="another sample time"):
+@pytest.mark.parametrize(("sample_time", "unit", "said"), [(0.2, "psi", "sample time"), (0.1, "kPa", "unit")])
+def test_a_trace_whose_numbers_mean_something_else_is_refused(sample_time, unit, said):
+    channels = (Channel(name="STP", unit=unit),)
+    trace = Trace(name="a", sample_time=sample_time, channels=channels, values=command())
+    with pytest.raises(ConfigError, match=f"another {said}"):
         service().simulate_trace(trace)
 
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
-from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.errors import ChannelError, ConfigError
 from sysid.models import Cascade, Interpolation, Limit, Mapping
 from sysid.traces import Channel, Trace
 from tests.models.cascades import network
@@ -114,8 +114,10 @@ def test_a_trace_of_another_sample_time_is_refused():
     channel = (Channel(name="STP", unit="psi"),)
     same = Trace(name="T", sample_time=0.1, channels=channel, values=handle())
     assert_allclose(line().simulate_trace(same, [5.0])["BC"], line().simulate(handle(), [5.0])["BC"])
-    with pytest.raises(TraceError, match="another sample time"):
+    with pytest.raises(ConfigError, match="another sample time"):
         line().simulate_trace(Trace(name="T", sample_time=0.2, channels=channel, values=handle()), [5.0])
+    with pytest.raises(ConfigError, match="in another unit"):
+        line().simulate_trace(replace(same, channels=(Channel(name="STP", unit="kPa"),)), [5.0])
 
 
 def test_it_is_stored_and_read_again():

@@ -162,7 +162,6 @@ class BrakeComputer:
         self._entered = 0.0
         self._sent = 0.0
         self._lowest = 0.0
-        self._applied_from = 0.0
 
     @property
     def time(self) -> float:

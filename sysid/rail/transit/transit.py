@@ -277,7 +277,3 @@ def largest_jerk(deceleration: NDArray[np.float64], sample_time: float, *, windo
     """
     back = max(1, round(window / sample_time))
     return float(np.abs(deceleration[back:] - deceleration[:-back]).max() / (back * sample_time))
-
-
-COMFORT_LIMITS = (RATE, JERK)
-"""Deceleration in m/s2 and jerk in m/s3 that the source asks for."""
