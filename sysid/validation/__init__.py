@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING
 from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
+    from sysid.estimation.stability.excursions import Excursions
     from sysid.estimation.stability.free_run import Stability, check_stability
-    from sysid.estimation.stability.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
+    from sysid.estimation.stability.sequences import AbstractSequences, InputSequence, TraceSequences
     from sysid.validation.cascade_evaluation import CascadeEvaluation, evaluate_cascade
     from sysid.validation.evaluation import (
         CaseResult,
@@ -49,8 +50,9 @@ __all__ = [
 ]
 
 _WHERE = {
+    "sysid.estimation.stability.excursions": ("Excursions",),
     "sysid.estimation.stability.free_run": ("Stability", "check_stability"),
-    "sysid.estimation.stability.sequences": ("AbstractSequences", "Excursions", "InputSequence", "TraceSequences"),
+    "sysid.estimation.stability.sequences": ("AbstractSequences", "InputSequence", "TraceSequences"),
     "sysid.validation.evaluation": (
         "CaseResult",
         "Evaluation",

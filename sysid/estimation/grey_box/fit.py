@@ -27,6 +27,7 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import Choice, choose
 from sysid.estimation.networks.multistart_result import left_on, multistart_result, multistart_status
+from sysid.estimation.networks.race import run_race
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult
@@ -182,7 +183,7 @@ def fit_equations(
     )
     # The latest first: of a start that converged, the last look at it is chosen, and not one that saw the same.
     training = multistart.training
-    candidates = [settled(one, ready.provider) for one in reversed(starts.run(multistart))]
+    candidates = [settled(one, ready.provider) for one in reversed(run_race(multistart))]
     choice = choose(candidates, _chosen_by(training, ready), vet)
     if windows.samples:
         race = choice.chosen
@@ -242,7 +243,7 @@ def raced_equations(
         began=began,
         on_progress=lambda _: None,
     )
-    best = min(starts.run(multistart), key=lambda one: (not one.solution.status.usable, one.loss))
+    best = min(run_race(multistart), key=lambda one: (not one.solution.status.usable, one.loss))
     assert isinstance(best.model, BuiltModel)  # noqa: S101 - the template is one
     return best.model, best.loss
 

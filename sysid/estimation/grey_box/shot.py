@@ -13,15 +13,13 @@ from sysid.estimation.grey_box.at_noise import at_noise
 from sysid.estimation.grey_box.layout import Begun, EquationLayout
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.shooting import Shooting
-from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.named import FLAT_ALPHA, Named
-from sysid.estimation.networks.halving import planned_iterations
 from sysid.estimation.networks.multistart import PRETRAINED, Candidate, Multistart
-from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.networks.training import Training
 from sysid.estimation.result import FitResult
 from sysid.models.built_model import BuiltModel
 from sysid.models.grey_box_model import EquationModel
@@ -171,32 +169,13 @@ def _prior(windows: Shooting, trained: Array, named: tuple[Named, ...]) -> Prior
 
 
 def _engine(multistart: Multistart, number: int, name: str) -> LevenbergMarquardt:
-    training, scale = multistart.training, multistart.template.scaling.error_unit
-
-    def report(entry: Iteration) -> None:
-        multistart.on_progress(
-            FitProgress(
-                stage=f"multiple shooting, {name.rsplit(' ', 1)[-1]} of {WEIGHTS[-1]:g}",
-                start=number + 1,
-                starts=training.n_starts,
-                iteration=0,  # the free run's, which have not begun
-                max_iterations=training.max_iterations,
-                mse=entry.mse * scale,
-                elapsed_s=entry.elapsed_s,
-                fraction=min(1.0, sum(multistart.iterations.values()) / planned_iterations(training)),
-            )
-        )
-
+    training = multistart.training
     seconds = PRETRAINED * training.max_time_s / training.n_starts / len(WEIGHTS)
-    return LevenbergMarquardt(
-        termination=Termination(
-            max_iterations=ITERATIONS,
-            max_time_s=min(seconds, multistart.left(name)),
-            tolerance=TOLERANCE,
-            patience=PATIENCE,
-        ),
-        damping=DAMPINGS[training.damping](),
-        evidence_after=None,
-        on_iteration=report,
-        should_stop=multistart.stop.is_set,
+    limits = Termination(
+        max_iterations=ITERATIONS,
+        max_time_s=min(seconds, multistart.left(name)),
+        tolerance=TOLERANCE,
+        patience=PATIENCE,
     )
+    said = f"multiple shooting, {name.rsplit(' ', 1)[-1]} of {WEIGHTS[-1]:g}"
+    return replace(multistart.engine(number, limits, stage=lambda _: said), evidence_after=None)

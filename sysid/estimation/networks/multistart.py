@@ -1,10 +1,10 @@
-"""Multistart with successive halving: random starts of one network, chosen between on traces that train nothing.
+"""Random starts of one network: what they have in common, and how each begins, is trained and is judged.
 
 A free-run fit has many local minima. Starts of equal error on the estimation record can differ by orders of magnitude
 on the next one, so that how one chooses matters as much as how one trains. The starts run side by side for a part of
-the iterations; the better half goes on; and every state at which a start was looked at stays a candidate, which makes
-the choice an early stopping too. What chooses is the selection traces: they train nothing, and no score on them is
-published as one on unseen data.
+the iterations, and the better half goes on (:mod:`sysid.estimation.networks.race`); every state at which a start was
+looked at stays a candidate, which makes the choice an early stopping too. What chooses is the selection traces: they
+train nothing, and no score on them is published as one on unseen data.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -29,7 +28,7 @@ from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Levenb
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
-from sysid.estimation.networks.halving import better_half, planned_iterations, rungs_of, turns
+from sysid.estimation.networks.halving import planned_iterations
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.training import FitProgress, Training
@@ -45,10 +44,6 @@ from sysid.models import (
     gaps,
 )
 from sysid.traces import Trace
-
-FEWEST = 5
-"""Iterations for which there has to be time in its first part for a start to be begun, or that part where it has fewer:
-where an iteration is slow, few starts that come somewhere tell more than many that stand where they began."""
 
 SETTLED = 5
 """Iterations after which a candidate with other weights of its residuals is near a minimum again."""
@@ -122,6 +117,60 @@ class Multistart:
         """Seconds that a run may take, what earlier sessions have spent on it included."""
         return max(0.0, self.until - now()) + self.checkpoints.spent_s(run)
 
+    def engine(
+        self, number: int, limits: Termination, *, stage: Callable[[Iteration], str] | None = None
+    ) -> LevenbergMarquardt:
+        """What trains a start, and tells how far all are.
+
+        Args:
+            number: Which start.
+            limits: When it ends.
+            stage: What it is called before the training itself, whose iterations alone count; ``None`` for that.
+
+        Returns:
+            The engine.
+        """
+        training, scale = self.training, self.template.scaling.error_unit
+        planned = planned_iterations(training, self.least)
+        own = "free run" if training.loop is Loop.CLOSED else "one step ahead"
+
+        def report(entry: Iteration) -> None:
+            if stage is None:
+                self.iterations[number] = entry.iteration
+            self.on_progress(
+                FitProgress(
+                    stage=own if stage is None else stage(entry),
+                    start=number + 1,
+                    starts=training.n_starts,
+                    iteration=entry.iteration if stage is None else 0,
+                    max_iterations=training.max_iterations,
+                    mse=entry.mse * scale,
+                    elapsed_s=entry.elapsed_s,
+                    fraction=min(1.0, sum(self.iterations.values()) / planned),
+                )
+            )
+
+        damping = DAMPINGS[training.damping]()
+        return LevenbergMarquardt(
+            termination=limits, damping=damping, on_iteration=report, should_stop=self.stop.is_set
+        )
+
+    def trained(self, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
+        """What trains a start itself.
+
+        Args:
+            number: Which start.
+            iterations: At most.
+            seconds: Likewise.
+
+        Returns:
+            The engine; it looks for the evidence where no regularisation was given.
+        """
+        tolerance, patience = self.training.tolerance, self.training.patience
+        limits = Termination(max_iterations=iterations, max_time_s=seconds, tolerance=tolerance, patience=patience)
+        engine = self.engine(number, limits)
+        return engine if self.training.regularisation is None else replace(engine, evidence_after=None)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Candidate:
@@ -192,112 +241,25 @@ def check_samples(provider: AbstractProvider) -> None:
         )
 
 
-def run(multistart: Multistart) -> list[Candidate]:
-    """Multistart the starts; an interruption from the keyboard ends the multistart, and what there is comes back.
-
-    Threads suffice: the kernels and BLAS release the interpreter.
+def advance(multistart: Multistart, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
+    """Train one start on, to a share of its iterations.
 
     Args:
-        multistart: What they have in common.
+        multistart: What the starts have in common.
+        number: Which start.
+        before: As it stood when it was looked at last; ``None`` to begin it.
+        share: Of the iterations, from the first on.
+        seconds: That it may take.
 
     Returns:
-        Every start at every rung that it reached.
-
-    Raises:
-        TraceError: If no sample counts.
+        The start as it stands then; as before where it had come to its end.
     """
-    check_samples(multistart.provider)
-    training = multistart.training
-    rungs = rungs_of(training)
-    numbers = list(range(training.n_starts))
-    latest: dict[int, Candidate] = {}
-    seen: list[Candidate] = []
-    total = turns(training.n_starts, rungs, training.workers, multistart.least)
-    # The limit of BLAS threads is the process's: held here, it does not depend on which start ends first.
-    with one_blas_thread():
-        for rung, share in enumerate(rungs):
-            before = rungs[rung - 1] if rung else 0.0
-            seconds = training.max_time_s * (share - before) / total
-            reached: dict[int, Candidate] = {}
-            for some in _one_by_one(multistart, numbers) if rung == 0 else [numbers]:
-                _rung(multistart, some, latest, (share, seconds), reached)
-                more = len(some) < len(numbers)
-                if multistart.stop.is_set() or (
-                    more and any(multistart.enough(reached[n]) for n in some if n in reached)
-                ):
-                    break
-            if rung == 0:  # the time of those that were left out is the others'
-                total = turns(len(reached), rungs, training.workers, multistart.least)
-            seen += [candidate for n, candidate in sorted(reached.items()) if candidate is not latest.get(n)]
-            if multistart.stop.is_set():
-                break
-            latest = reached
-            order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
-            numbers = [candidate.number for candidate in better_half(order, multistart.least)]
-    return seen
-
-
-def _one_by_one(multistart: Multistart, numbers: Sequence[int]) -> list[Sequence[int]]:
-    """Starts in the order in which they are looked at first."""
-    alone = multistart.alone
-    return [one for one in (*([n] for n in numbers[:alone]), numbers[alone:]) if one]
-
-
-def _rung(
-    multistart: Multistart,
-    numbers: Sequence[int],
-    latest: dict[int, Candidate],
-    limits: tuple[float, float],
-    reached: dict[int, Candidate],
-) -> None:
-    """One rung of the multistart, to a share of the iterations within some seconds.
-
-    Workers leave what they reach in a table: an interruption loses none of it.
-    """
-    share, seconds = limits
-    begun: list[threading.Event] = []
-
-    def work(number: int) -> None:
-        ended = threading.Event()
-        begun.append(ended)
-        try:
-            if not multistart.stop.is_set() and (latest or _in_time(multistart, reached, share, seconds)):
-                reached[number] = _advance(multistart, number, latest.get(number), share, seconds)
-        finally:
-            ended.set()
-
-    with ThreadPoolExecutor(
-        min(multistart.training.workers, len(numbers))
-    ) as pool:  # leaving it waits for those that run
-        try:
-            for future in [pool.submit(work, number) for number in numbers]:
-                future.result()
-        except KeyboardInterrupt:
-            multistart.stop.set()
-        except BaseException:
-            multistart.stop.set()  # nobody waits for the others
-            raise
-    for ended in begun:  # the pool does not know of a thread during whose start it was interrupted
-        ended.wait()
-    if not reached and not latest:  # interrupted before anything had begun: the start as it is
-        reached[numbers[0]] = _advance(multistart, numbers[0], None, share, seconds)
-
-
-def _in_time(multistart: Multistart, reached: dict[int, Candidate], share: float, seconds: float) -> bool:
-    """Whether there is time for another start, by what an iteration of those before it took."""
-    curves = [one.solution.curve[-1] for one in list(reached.values())]
-    each = [one.elapsed_s / one.iteration for one in curves if one.iteration]
-    first = min(FEWEST, max(1, round(share * multistart.training.max_iterations)))
-    return not each or min(each) * first <= seconds
-
-
-def _advance(multistart: Multistart, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
     training = multistart.training
     iterations = max(1, round(share * training.max_iterations))
     run, keep = f"{multistart.name}start {number + 1}, to {iterations}", multistart.checkpoints
 
     def in_time() -> LevenbergMarquardt:
-        return _engine(multistart, number, iterations, min(seconds, multistart.left(run)))
+        return multistart.trained(number, iterations, min(seconds, multistart.left(run)))
 
     if before is None and number == 0 and multistart.resume is not None:
         prior = multistart.layout.prior(
@@ -353,7 +315,7 @@ def advanced(
         prior = first_prior(multistart.training, multistart.layout, provider, theta, centre)
         damping = DAMPINGS[multistart.training.damping]()
         first = replace(state, theta=theta, at=at, prior=prior, losses=(at.loss,), damping=damping)
-        engine = _engine(multistart, before.number, state.iteration + iterations, multistart.left(name))
+        engine = multistart.trained(before.number, state.iteration + iterations, multistart.left(name))
         if engine.evidence_after is not None:
             engine = replace(engine, evidence_after=state.iteration + SETTLED)
         solution = keep.resume(name, engine, provider, first)
@@ -367,33 +329,15 @@ def _pretraining(
 ) -> NDArray[np.float64]:
     """A random start after its pretraining."""
     training, name = multistart.training, f"{multistart.name}start {number + 1}, one step ahead"
-    scale = multistart.template.scaling.error_unit
     rounds = math.ceil(training.n_starts / training.workers)
-
-    def report(entry: Iteration) -> None:
-        multistart.on_progress(
-            FitProgress(
-                stage=f"pretraining {entry.iteration} of {training.pretraining_iterations}",
-                start=number + 1,
-                starts=training.n_starts,
-                iteration=0,  # the free run's, which have not begun
-                max_iterations=training.max_iterations,
-                mse=entry.mse * scale,
-                elapsed_s=entry.elapsed_s,
-                fraction=min(1.0, sum(multistart.iterations.values()) / planned_iterations(training, multistart.least)),
-            )
-        )
-
-    engine = LevenbergMarquardt(
-        termination=Termination(
-            max_iterations=training.pretraining_iterations,
-            max_time_s=min(PRETRAINED * training.max_time_s / rounds, multistart.left(name)),
-            tolerance=training.tolerance,
-            patience=training.patience,
-        ),
-        damping=DAMPINGS[training.damping](),
-        on_iteration=report,
-        should_stop=multistart.stop.is_set,
+    limits = Termination(
+        max_iterations=training.pretraining_iterations,
+        max_time_s=min(PRETRAINED * training.max_time_s / rounds, multistart.left(name)),
+        tolerance=training.tolerance,
+        patience=training.patience,
+    )
+    engine = multistart.engine(
+        number, limits, stage=lambda entry: f"pretraining {entry.iteration} of {training.pretraining_iterations}"
     )
     theta = pretraining.draw(np.random.default_rng(seed), centre)
     prior = first_prior(training, multistart.layout, pretraining, theta, centre)
@@ -441,38 +385,6 @@ def _in_basis(multistart: Multistart, theta: NDArray[np.float64]) -> NDArray[np.
     if multistart.to_plain.shape[0] == multistart.to_plain.shape[1]:
         return np.asarray(np.linalg.solve(multistart.to_plain, theta), dtype=np.float64)
     return np.asarray(np.linalg.lstsq(multistart.to_plain, theta, rcond=None)[0], dtype=np.float64)
-
-
-def _engine(multistart: Multistart, number: int, iterations: int, seconds: float) -> LevenbergMarquardt:
-    training = multistart.training
-    scale = multistart.template.scaling.error_unit
-    planned = planned_iterations(training, multistart.least)
-
-    def report(entry: Iteration) -> None:
-        multistart.iterations[number] = entry.iteration
-        multistart.on_progress(
-            FitProgress(
-                stage="free run" if training.loop is Loop.CLOSED else "one step ahead",
-                start=number + 1,
-                starts=training.n_starts,
-                iteration=entry.iteration,
-                max_iterations=training.max_iterations,
-                mse=entry.mse * scale,
-                elapsed_s=entry.elapsed_s,
-                fraction=min(1.0, sum(multistart.iterations.values()) / planned),
-            )
-        )
-
-    limits = Termination(
-        max_iterations=iterations, max_time_s=seconds, tolerance=training.tolerance, patience=training.patience
-    )
-    engine = LevenbergMarquardt(
-        termination=limits,
-        damping=DAMPINGS[training.damping](),
-        on_iteration=report,
-        should_stop=multistart.stop.is_set,
-    )
-    return engine if training.regularisation is None else replace(engine, evidence_after=None)
 
 
 def judged(multistart: Multistart, model: Network) -> tuple[float, int]:

@@ -26,6 +26,7 @@ from sysid.estimation.networks.multistart_result import left_on, multistart_resu
 from sysid.estimation.networks.posterior import calibrate, laplace
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.networks.race import run_race
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import check_initial, grown
 from sysid.estimation.networks.windows import Windows, in_place, with_note
@@ -203,7 +204,7 @@ def _started(
                 resume=None,
                 pretraining=_pretraining(view.training, part, experiments),
             )
-        found = starts.run(own)
+        found = run_race(own)
         named = [replace(one, number=one.number + view.first, without=view.without) for one in found]
         tasks |= dict.fromkeys(named, part if view.without else task)
         if multistart.stop.is_set():

@@ -22,11 +22,13 @@ from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.choosing import choose
 from sysid.estimation.networks.multistart_result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.neural_ensemble import United, united
+from sysid.estimation.networks.neural_layout import NeuralLayout
 from sysid.estimation.networks.neural_map import learnt_map
 from sysid.estimation.networks.neural_provider import NeuralProvider
-from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
+from sysid.estimation.networks.neural_start import linear_start
 from sysid.estimation.networks.output_weights import reweighted, weighed
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
+from sysid.estimation.networks.race import run_race
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult
@@ -258,7 +260,7 @@ def _fit(
         least=training.ensemble,
         until=max(starts.deadline(began, training, on_progress), now() + LEAST_FREE * training.max_time_s),
     )
-    candidates = starts.run(multistart)
+    candidates = run_race(multistart)
     for best in _ends(candidates, training):
         candidates += reweighted(multistart, provider, best)
     whole = None

@@ -7,8 +7,9 @@ from sysid.estimation.stability.check import (
     PoleCheck,
     StabilityOptions,
 )
+from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import Stability, check_stability
-from sysid.estimation.stability.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
+from sysid.estimation.stability.sequences import AbstractSequences, InputSequence, TraceSequences
 
 __all__ = [
     "AbstractSequences",

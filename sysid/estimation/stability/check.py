@@ -16,8 +16,9 @@ from sysid.errors import ConfigError, TraceError, shortened
 from sysid.estimation.clock import now
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability
-from sysid.estimation.stability.sequences import AbstractSequences, Excursions, InputSequence, TraceSequences
+from sysid.estimation.stability.sequences import AbstractSequences, InputSequence, TraceSequences
 from sysid.models import ARX, AbstractModel, Mapping, Start, StartKind, beginning
 from sysid.models.lags import whole
 from sysid.models.typed_fields import TypedFields

@@ -177,7 +177,7 @@ def check_stability(
     Example:
         >>> from sysid.models import ARX, ARXModel, Mapping
         >>> from sysid.traces import Channel, Trace
-        >>> from sysid.estimation.stability.sequences import Excursions
+        >>> from sysid.estimation.stability.excursions import Excursions
         >>> u = np.repeat([0.0, 1.0, 0.0], 60)
         >>> model = ARXModel(orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.2, 0.8]), intercept=0.0,
         ...     mapping=Mapping.parse("u -> y"), sample_time=1.0, input_units=("V",), output_unit="V", rest_output=0.0)

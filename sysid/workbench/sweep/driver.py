@@ -23,9 +23,10 @@ from sysid.reporting.sweep_record import FIGURES, Trial
 from sysid.workbench.runner.events import StepProgress, Watcher
 from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.config import SweepConfig
+from sysid.workbench.sweep.progress import Progress, Rung
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.store import Clock, TrialStore
-from sysid.workbench.sweep.trial import FAILED, Bench, Job, forget_checkpoint, gave_up, run_job
+from sysid.workbench.sweep.trial import Bench, Job, forget_checkpoint, gave_up, run_job
 from sysid.workbench.sweep.workers import AbstractWorkers
 
 FORMAT = 2
@@ -37,21 +38,6 @@ LINEAR = {"loop": "open", "max_iterations": 20, "regularisation": 0.0}
 
 LINEAR_COST = 100.0
 """Work of a linear fit, in the units of :meth:`Driver.cost`."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rung:
-    """How far trials are trained before they are looked at.
-
-    Args:
-        iterations: Of the training.
-        record: Share of the estimation traces.
-        keep: Share of the trials that goes on; 1 for the last rung.
-    """
-
-    iterations: int
-    record: float
-    keep: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,7 +65,7 @@ class Driver:
     step: str
     tell: Watcher
     _shared: str = field(init=False)
-    _progress: _Progress = field(init=False)
+    _progress: Progress = field(init=False)
     last: dict[int, Job] = field(default_factory=dict)
     fold: int = 0
     late: Callable[[], bool] = lambda: False
@@ -94,7 +80,11 @@ class Driver:
             "selection": [trace.digest for trace in bench.selection],
         }
         object.__setattr__(self, "_shared", digest(terms))
-        object.__setattr__(self, "_progress", _Progress(driver=self))
+        progress = Progress(
+            cost=self.cost, rank=self.rank, by=self.config.choose.by, session_s=lambda: self.clock.session,
+            show_at=lambda share, said: self.tell(StepProgress(step=self.step, fraction=share, detail=said)),
+        )  # fmt: skip
+        object.__setattr__(self, "_progress", progress)
 
     @property
     def done_now(self) -> int:
@@ -403,68 +393,3 @@ def _next_smaller(points: Sequence[Point]) -> dict[int, Point]:
         rising = sorted(group, key=lambda point: point.structure.to_dict()["neurons"])
         found |= {larger.number: smaller for smaller, larger in itertools.pairwise(rising)}
     return found
-
-
-@dataclass(eq=False)
-class _Progress:
-    """Counts work, and says how it stands."""
-
-    driver: Driver
-    expected: float = 0.0
-    finished: float = 0.0
-    worked: float = 0.0
-    n_done: int = 0
-    n_fresh: int = 0
-    n_expected: int = 0
-    best: Trial | None = None
-    mean_cost: Callable[[float], float] = lambda _: 0.0
-
-    def expect(self, points: Sequence[Point], rungs: Sequence[Rung]) -> None:
-        """Count on these points."""
-        costs = self.driver.cost
-        self.mean_cost = lambda iterations: sum(costs(p, iterations) for p in points) / max(1, len(points))
-        self._plan(len(points), rungs, 0)
-
-    def dropped(self, n_left: int, rungs: Sequence[Rung]) -> None:
-        """Count again: so many go on."""
-        self.expected, self.n_expected = self.finished, self.n_done
-        if rungs:
-            self._plan(n_left, rungs, 0)
-
-    def _plan(self, n: int, rungs: Sequence[Rung], done: int) -> None:
-        for rung in rungs:
-            self.expected += n * self.mean_cost((rung.iterations - done) * rung.record)
-            self.n_expected += n
-            n, done = max(1, math.ceil(rung.keep * n)), rung.iterations
-
-    def done(self, job: Job, trial: Trial, *, fresh: bool) -> None:
-        """A job is done, now or earlier."""
-        self.finished += job.cost
-        self.n_done += 1 if job.number else 0
-        self.worked += job.cost if fresh else 0.0
-        self.n_fresh += fresh
-        counts = job.number > 0 and trial.status != FAILED and job.record == 1.0
-        if counts and (self.best is None or self.driver.rank(trial) < self.driver.rank(self.best)):
-            self.best = trial
-
-    def show(self) -> None:
-        """Tell the screen: how many, how long still, the best so far."""
-        best = ""
-        if self.best is not None:
-            value = self.driver.rank(self.best)[-1]
-            best = f", best so far {self.best.label}: {self.driver.config.choose.by} {value:.3g}"
-        left = self.left()
-        ahead = "" if left is None else f", {_duration(left)} left"
-        total = max(self.expected, self.finished, 1.0)
-        detail = f"{self.n_done} of {max(self.n_expected, self.n_done)}{ahead}{best}"
-        self.driver.tell(StepProgress(step=self.driver.step, fraction=min(1.0, self.finished / total), detail=detail))
-
-    def left(self) -> float | None:
-        """Seconds to go, from the work of this session; ``None`` before its first result."""
-        if self.worked <= 0.0:
-            return None
-        return max(0.0, self.expected - self.finished) * self.driver.clock.session / self.worked
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds / 60:.0f} min" if seconds >= 90 else f"{seconds:.0f} s"

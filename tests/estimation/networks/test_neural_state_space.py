@@ -9,9 +9,10 @@ import pytest
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space, fit_vector_neural_state_space
 from sysid.estimation.experiment import experiments_of
-from sysid.estimation.networks import neural_start
+from sysid.estimation.networks import neural_layout, neural_start
+from sysid.estimation.networks.neural_layout import NeuralLayout
 from sysid.estimation.networks.neural_provider import NeuralProvider
-from sysid.estimation.networks.neural_start import NeuralLayout, linear_start
+from sysid.estimation.networks.neural_start import linear_start
 from sysid.estimation.networks.neural_state_space import STARTS
 from sysid.estimation.networks.provider import BLOCK
 from sysid.models import (
@@ -338,7 +339,7 @@ def test_cubes_begin_so_quiet_that_no_start_is_lost() -> None:
         )
     )
     assert max(map(provider.loss, loud)) > 10.0 * provider.loss(base)
-    assert max(map(provider.loss, quiet)) <= neural_start.LOST * provider.loss(base)
+    assert max(map(provider.loss, quiet)) <= neural_layout.LOST * provider.loss(base)
     assert all((np.abs(one[form.sizes.readout]) > 0.0).all() for one in quiet)
 
 

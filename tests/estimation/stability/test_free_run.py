@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sysid.errors import TraceError
-from sysid.estimation.stability import sequences
+from sysid.estimation.stability import excursions as module
 from sysid.models import ARX, ARXModel, Mapping
 from sysid.traces import Channel, Trace
 from sysid.validation import Excursions, TraceSequences, check_stability
@@ -106,7 +106,7 @@ def test_the_worst_sequence_is_kept_to_the_digits_that_repeat_it():
 
 def test_the_seed_decides_and_a_sequence_does_not_depend_on_how_many_are_drawn():
     few = list(excursions().draw(3, 5))
-    sequences._kept.cache_clear()  # what is found again is the same anyhow
+    module._kept.cache_clear()  # what is found again is the same anyhow
     many = list(excursions().draw(6, 5))
     assert all(np.array_equal(a.inputs, b.inputs) for a, b in zip(few, many, strict=False))
     assert not np.array_equal(few[0].inputs, next(iter(excursions().draw(1, 6))).inputs)
@@ -128,9 +128,9 @@ def test_what_was_drawn_is_found_again_by_all_that_it_depends_on_and_cannot_be_c
 
 
 def test_no_more_is_kept_than_memory_is_meant_for_it(monkeypatch):
-    sequences._kept.cache_clear()
+    module._kept.cache_clear()
     rows = next(excursions().draw(1, 5))
-    monkeypatch.setattr(sequences, "MOST_KEPT", 2 * (rows.inputs.nbytes + rows.targets.nbytes))
+    monkeypatch.setattr(module, "MOST_KEPT", 2 * (rows.inputs.nbytes + rows.targets.nbytes))
     drawn, again = list(excursions().draw(4, 8)), list(excursions().draw(4, 8))
     assert [a is b for a, b in zip(drawn, again, strict=True)].count(True) in {1, 2}
     assert all(np.array_equal(a.inputs, b.inputs) for a, b in zip(drawn, again, strict=True))
