@@ -99,8 +99,7 @@ def excite(
 
     Args:
         kind: ``prbs``, ``multisine``, ``noise``, ``chirp``, ``staircase``, ``aprbs``, ``ramps``, ``sine`` or
-            ``pulses``; or one with its options, as
-            ``PRBS(clock=4)``.
+            ``pulses``; or one with its options, as ``PRBS(clock=4)``.
         sample_time: Seconds between samples.
         samples: Length of the experiment, or
         duration: in seconds.

@@ -81,7 +81,7 @@ def publish(
 def equations(
     pipeline: Annotated[str, typer.Argument(help="Name of a pipeline of kind assembly, or its YAML file.")],
 ) -> None:
-    """Print what is fixed in an assembly as equations, for its YAML; weights by name and lag are the older form."""
+    """Print the fixed members of an assembly as equations, in the form that its YAML takes now."""
     from sysid.workbench.commands.equations import equations_command
 
     equations_command(pipeline)

@@ -63,7 +63,7 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
     began = time.monotonic()  # what is imported counts
     from sysid.workbench.commands.surrogate import surrogate_command
 
-    wish = _wish(span, parameter, output, sample_time, duration)
+    wish = wished(span, parameter, output, sample_time, duration)
     raise typer.Exit(
         surrogate_command(
             source,
@@ -80,34 +80,23 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
     )
 
 
-def _wish(
+def wished(
     ranges: list[str] | None, parameters: list[str] | None, outputs: list[str] | None, sample_time: float | None,
     duration: float | None,
 ) -> Wish:  # fmt: skip
+    """What is asked of a surrogate, from the options of the command line.
+
+    Args:
+        ranges: Of inputs, each ``NAME=LOW:HIGH``.
+        parameters: Likewise of parameters that vary.
+        outputs: Names.
+        sample_time: Seconds.
+        duration: Seconds of an experiment.
+
+    Returns:
+        The wish.
+    """
     from sysid.workbench.surrogates.asked import pairs, wish_of
 
     inputs, varied = pairs(ranges or [], "--range"), pairs(parameters or [], "--parameter")
     return wish_of(inputs, varied, outputs or [], sample_time=sample_time, duration=duration)
-
-
-@commands.command(epilog="Example: sysid init mine  sysid init mine --reference cylinder.fmu --range valve=-10:10")
-def init(  # noqa: PLR0917 - one parameter an option, by name on the command line
-    folder: Annotated[Path, typer.Argument(help="Folder to make.")],
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            help="A slow model, as sysid surrogate takes it: the workspace has a pipeline of experiments on it. "
-            "Nothing is run."
-        ),
-    ] = None,
-    span: Ranges = None,
-    parameter: Parameters = None,
-    output: Outputs = None,
-    sample_time: SampleTime = None,
-    duration: Duration = None,
-) -> None:
-    """Make a workspace: folders for data sets, pipelines and reports, with a first pipeline that runs in seconds."""
-    from sysid.workbench.commands.init import init_command
-
-    wish = _wish(span, parameter, output, sample_time, duration)
-    init_command(folder, reference=reference, wish=wish)

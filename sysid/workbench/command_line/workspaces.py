@@ -1,4 +1,4 @@
-"""Commands around a workspace: the page of its fits, the schemas of its files."""
+"""Commands around a workspace: to make one, the page of its fits, the schemas of its files."""
 
 from __future__ import annotations
 
@@ -7,7 +7,31 @@ from typing import Annotated
 
 import typer
 
+from sysid.workbench.command_line.surrogates import Duration, Outputs, Parameters, Ranges, SampleTime, wished
+
 commands = typer.Typer()
+
+
+@commands.command(epilog="Example: sysid init mine  sysid init mine --reference cylinder.fmu --range valve=-10:10")
+def init(  # noqa: PLR0917 - one parameter an option, by name on the command line
+    folder: Annotated[Path, typer.Argument(help="Folder to make.")],
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            help="A slow model, as sysid surrogate takes it: the workspace has a pipeline of experiments on it. "
+            "Nothing is run."
+        ),
+    ] = None,
+    span: Ranges = None,
+    parameter: Parameters = None,
+    output: Outputs = None,
+    sample_time: SampleTime = None,
+    duration: Duration = None,
+) -> None:
+    """Make a workspace: folders for data sets, pipelines and reports, with a first pipeline that runs in seconds."""
+    from sysid.workbench.commands.init import init_command
+
+    init_command(folder, reference=reference, wish=wished(span, parameter, output, sample_time, duration))
 
 
 @commands.command(epilog="Example: sysid ui")
