@@ -13,6 +13,7 @@ from sysid.errors import ChannelError, ConfigError
 from sysid.export.bundle import Bundle, channel_of
 from sysid.ingest import FileOptions, GridOptions, RawTable, RepairOptions, read_table
 from sysid.ingest.assemble import Wanted, assemble
+from sysid.ingest.undescribed import guessed_time
 from sysid.traces import Channel, Trace
 
 
@@ -53,6 +54,9 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
         ChannelError: If an input is missing.
         ConfigError: If a constant is none.
         TraceError: If something is wrong with the samples and its repair was not asked for.
+
+    Warns:
+        GuessedWarning: If the file does not say what its time is, which was guessed.
     """
     options = options or InputOptions()
     options = replace(options, constants=ticking(bundle, options.constants))
@@ -74,7 +78,8 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
             expected="a file with an input or the measured output", got=", ".join(table.names),
             remedy="give --command with two rows in place of the file: the first at 0, the second at the end",
         )  # fmt: skip
-    repairs, files = options.repairs, options.files
+    repairs = options.repairs
+    files = guessed_time(table, options.files, sample_time=bundle.model.sample_time)
     if outputs:
         nan = {c.name: repairs.nan for c in wanted} if isinstance(repairs.nan, str) else dict(repairs.nan or {})
         repairs = repairs.model_copy(update={"nan": {**dict.fromkeys((c.name for c in outputs), "mask"), **nan}})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,10 +16,11 @@ from sysid.ingest.description import DatasetDescription
 from sysid.ingest.findings import FileFinding
 from sysid.ingest.in_python import proposal_of, remedies_of_a_file
 from sysid.ingest.inspection import inspect_file
-from sysid.ingest.options import RepairOptions
+from sysid.ingest.options import FileOptions, RepairOptions, TimeOptions
 from sysid.ingest.proposal import propose_dataset
 from sysid.ingest.readers.text_source import bare_stem
 from sysid.ingest.reading import read_trace
+from sysid.ingest.table import RawTable
 from sysid.traces import Role, TraceSet
 
 
@@ -70,9 +71,43 @@ def _as_proposed(path: Path, error: UserError) -> TraceSet:
         raise error if isinstance(error, TraceError) else also from None
     guesses = list(_guesses(found))
     if guesses:
-        told = f"{path}: guessed, as the file does not say it: {'; '.join(guesses)}"
-        warnings.warn(f"{told}. {proposal_of(path)} writes this down, to be corrected", GuessedWarning, stacklevel=4)
+        told = f"{_told(path, guesses)}. {proposal_of(path)} writes this down, to be corrected"
+        warnings.warn(told, GuessedWarning, stacklevel=4)
     return traces
+
+
+def guessed_time(table: RawTable, files: FileOptions, *, sample_time: float) -> FileOptions:
+    """The options of a file's reader with its time, where the file does not say what that is.
+
+    Args:
+        table: The file as it was read.
+        files: What is known.
+        sample_time: Seconds between rows, where the file has no time stamps.
+
+    Returns:
+        The options; the same where the file says its time, or the options do.
+
+    Raises:
+        ReaderError: If the file cannot be read at all.
+
+    Warns:
+        GuessedWarning: If something was guessed.
+    """
+    said = table.step is not None or (table.time is not None and table.find(table.time).unit is not None)
+    if said or files.time != TimeOptions():
+        return files
+    found = inspect_file(table.source, files=files)
+    if not found.time_guessed or found.cases:
+        return files
+    time, told = found.time, found.time_told.removeprefix("guessed: ")
+    if time.step is not None:
+        time, told = TimeOptions(step=sample_time), f"no time stamps, {sample_time:g} s between them"
+    warnings.warn(_told(table.source, [told]), GuessedWarning, stacklevel=3)
+    return files.model_copy(update={"time": time})
+
+
+def _told(path: Path, guesses: Sequence[str]) -> str:
+    return f"{path}: guessed, as the file does not say it: {'; '.join(guesses)}"
 
 
 def _guesses(found: FileFinding) -> Iterator[str]:
