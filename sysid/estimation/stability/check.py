@@ -276,8 +276,9 @@ class FreeRunCheck(AbstractStabilityCheck):
             return fit
         status = fit.status if found.stable else _unstable(fit.status)
         attempts = tuple(replace(one, stable=found.stable) if one.chosen else one for one in fit.attempts)
-        notes = (*fit.notes, found.sentence)
-        return replace(fit, status=status, stability=found.to_dict(), attempts=attempts, notes=notes)
+        told = () if found.forgets or found.beginnings is None else (found.beginnings.sentence,)
+        notes, warnings = (*fit.notes, found.sentence, *told), (*fit.warnings, *told)
+        return replace(fit, status=status, stability=found.to_dict(), attempts=attempts, notes=notes, warnings=warnings)
 
     @cached_property
     def reference(self) -> Run | None:

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from itertools import cycle, islice
 from typing import Any
 
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
+from sysid.estimation.stability.beginnings import TWICE, Beginnings, compare_beginnings
 from sysid.estimation.stability.sequences import AbstractSequences, InputSequence
 from sysid.models import AbstractModel
 from sysid.names import csv_cell
@@ -60,6 +62,7 @@ class Stability:
         beyond: On how many a linear model that follows the records left the bounds, or did not settle, either: they
             say nothing, and are neither counted as unbounded nor judged.
         asked: How many were to be run; more than were, where the time ended. 0 where nobody said.
+        beginnings: Whether the run forgets where it began; ``None`` where that was not asked.
     """
 
     source: str
@@ -76,6 +79,7 @@ class Stability:
     sample_time: float
     beyond: int = 0
     asked: int = 0
+    beginnings: Beginnings | None = None
 
     @property
     def cut(self) -> bool:
@@ -86,6 +90,11 @@ class Stability:
     def stable(self) -> bool:
         """Whether every run stayed bounded and settled where it should."""
         return self.unbounded == 0 and self.unsettled == 0
+
+    @property
+    def forgets(self) -> bool:
+        """Whether the run forgets where it began; true where that was not asked."""
+        return self.beginnings is None or self.beginnings.forgets
 
     @property
     def sentence(self) -> str:
@@ -130,6 +139,7 @@ class Stability:
             "largest_plateau_error": None if math.isnan(self.largest_plateau_error) else self.largest_plateau_error,
             "worst": self.worst.name,
             **({"asked": self.asked} if self.cut else {}),
+            **({} if self.beginnings is None or self.forgets else {"apart": self.beginnings.apart}),
         }
 
     def worst_csv(self) -> str:
@@ -192,9 +202,11 @@ def check_stability(
     unbounded = judged = unsettled = drawn = further = 0
     largest = np.nan
     worst: tuple[tuple[bool, float], InputSequence, NDArray[np.float64]] | None = None
+    begun: list[tuple[InputSequence, NDArray[np.float64]]] = []
     for sequence, output in _runs(model, _in_time(sequences.draw(count, seed), until)):
         drawn += 1
         outputs = output.reshape(len(sequence.inputs), -1)
+        begun += [(sequence, outputs)] if drawn <= TWICE else []
         lost, error = _lost(outputs, low, high), _away(outputs, sequence, width)
         if (lost or error > tolerance) and _says_nothing(sequence, reference(), (low, high), tolerance, lost=lost):
             further += 1
@@ -225,6 +237,8 @@ def check_stability(
         sample_time=sequences.sample_time,
         beyond=further,
         asked=sequences.available(count),
+        # What runs away is not asked whether it forgets.
+        beginnings=None if unbounded or unsettled else compare_beginnings(partial(_runs, model), begun, width),
     )
 
 

@@ -117,8 +117,6 @@ class Plan:
     _repeats: dict[int, int] = field(default_factory=dict)
     """By the number of a repeated point, the place of its trial."""
     _told_again: list[int] = field(default_factory=list)
-    _late: set[int] = field(default_factory=set)
-    """Places of trials that were to be repeated, for which the time was up."""
     scattered: dict[int, float] = field(default_factory=dict)
     """By the number of a trial that was repeated, how far its starts are apart, as :func:`scatter` has it."""
     _united: set[int] = field(default_factory=set)
@@ -152,7 +150,6 @@ class Plan:
         self.budget.tell(trials)
         again = [trial for trial in trials if trial.number in self._repeats]
         repeated = [trial for trial in again if trial.reason != NOT_DONE]
-        self._late |= {self._repeats[trial.number] for trial in again if trial.reason == NOT_DONE}
         self.trials += [trial for trial in trials if trial.number not in self._repeats]
         for place in dict.fromkeys(self._repeats[trial.number] for trial in repeated):
             own = [trial for trial in repeated if self._repeats[trial.number] == place]
@@ -200,10 +197,11 @@ class Plan:
         """
         kinds = {family.kind for family in self.families if family.linear}
         again = {n for n in self._told_again if math.isfinite(self.error(self.trials[n]))}
+        late = set(self._repeats.values()) - set(self._told_again)
         return [
             t
             for n, t in enumerate(self.trials)
-            if n in again | self._late or not again or t.number in self._united or t.structure["kind"] in kinds
+            if n in again | late or not again or t.number in self._united or t.structure["kind"] in kinds
         ]
 
     def _all_rounds(self) -> Iterator[list[Try]]:
@@ -328,6 +326,10 @@ class Plan:
         Args:
             linear: Linear structures, which leave time for the others; or those.
         """
+        if linear and self.trials and not any(estimator_of(one.structure).linear for one in self._tries):
+            # Least squares cost next to nothing, and without them nobody knows what the networks before are worth.
+            self.budget.unlimited = 1
+            yield from self._rounds_of([one for one in self._first(linear=True) if one.structure.kind == ARX.kind][:1])
         yield from self._rounds_of(self._least(linear=linear))
         self.budget.most = LINEAR if linear else 1.0
         yield from self._rounds_of(self._first(linear=linear))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -25,6 +26,9 @@ from sysid.workbench.sweep.trial import Bench, fit_of, stored_models, train
 if TYPE_CHECKING:
     from sysid.estimation.networks.posterior import Posterior
 
+NEAR = 0.2
+"""Share of its error by which a fit that forgets where it began may be worse than one that does not."""
+
 FOLDER = "checked"
 """Beside the trials: those whose free run was checked."""
 
@@ -44,7 +48,7 @@ class Checks:
     """Fits that were checked, by the trial's number."""
 
     def first_stable(self, ranked: Sequence[Trial]) -> tuple[Trial, int]:
-        """The best trial, or the best stable one among the best.
+        """The best trial, or the best stable one among the best; of those alike one that forgets where it began.
 
         Args:
             ranked: Trials that can be used, the best first.
@@ -55,9 +59,23 @@ class Checks:
         """
         for refused, trial in enumerate(ranked[:VETTED]):
             asks = self.bench.stability.choose and self._stored(trial)[0].loop is Loop.CLOSED
-            if not asks or all(fit.status is not Status.UNSTABLE for fit in self._checked(trial)):
+            if not asks:
                 return trial, refused
+            if all(fit.status is not Status.UNSTABLE for fit in self._checked(trial)):
+                return self._that_forgets(ranked[refused:VETTED]), refused
         return ranked[0], 0
+
+    def _that_forgets(self, ranked: Sequence[Trial]) -> Trial:
+        """The first of some trials, or of those alike the first whose free run is stable and forgets where it began."""
+        first = ranked[0]
+        limit = (1.0 + NEAR) ** 2 * (first.selection_free_run_mse or 0.0)
+        for trial in ranked:
+            if not (trial.selection_free_run_mse or math.inf) <= limit:
+                continue
+            fits = self._checked(trial)
+            if all(fit.status is not Status.UNSTABLE and not (fit.stability or {}).get("apart") for fit in fits):
+                return trial
+        return first
 
     def given(self, trial: Trial) -> list[GivenFit]:
         """A trial as fits that were made elsewhere.

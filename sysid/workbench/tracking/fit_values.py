@@ -161,7 +161,7 @@ def metrics(ready: FitReady) -> dict[str, float]:
         found["log_evidence"] = fit.evidence.log_evidence
         found["effective_parameters"] = fit.evidence.total_effective_parameters
     if fit.stability is not None:
-        found["unstable_sequences"] = fit.stability["unbounded"] + fit.stability["unsettled"]
+        found["unstable_sequences"] = sum(fit.stability.get(one, 0) for one in ("unbounded", "unsettled", "apart"))
     keys = distinct(cases, tracking_key)
     for name, case in cases.items():
         case_name = keys[name]

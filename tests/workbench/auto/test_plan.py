@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
@@ -245,6 +245,36 @@ def test_a_network_for_whose_second_start_the_time_was_up_is_worth_what_it_was()
     least = min(plan.candidates, key=error)
     assert plan.n_again == FINALISTS - 1
     assert error(least) == min(map(error, plan.trials))
+
+
+def test_a_network_for_whose_second_start_there_was_no_time_is_worth_what_it_was() -> None:
+    """A state space of four neurons gave way to a network of eight with more error, as that alone was done again."""
+    budget = Budget(wall_s=None, iterations=10**9, clock=lambda: 0.0, is_stored=lambda _: False)
+    plan = Plan(looked=LOOKED, budget=budget, error=error, training={"max_iterations": 50}, again=1)
+    take = budget.take
+
+    def all_but_the_first(points: Sequence[Point]) -> list[Point]:
+        again = "seed" in points[0].training and "ensemble" not in points[0].training
+        return take(points[1:] if again else points)
+
+    budget.take = all_but_the_first  # type: ignore[method-assign]
+    while points := plan.ask():
+        plan.tell([trial(point, by_size(point)) for point in points])
+    assert plan.n_again == FINALISTS - 1
+    assert min(map(error, plan.candidates)) == min(map(error, plan.trials))
+
+
+def test_one_linear_model_is_tried_where_networks_that_came_first_took_the_time() -> None:
+    """Without it nobody knew that a furnace's network, with half the time, was worse than least squares."""
+    clock = [0.0]
+    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
+    plan = Plan(looked=replace(LOOKED, in_motion=True), budget=budget, error=error)
+    tried: list[Point] = []
+    while points := plan.ask():
+        tried += points
+        clock[0] += 55.0 if len(tried) == len(points) else 1.0
+        plan.tell([trial(point, 1.0) for point in points])
+    assert "ARX [2; 2; 1]" in [point.structure.label for point in tried if linear(point)]
 
 
 def test_the_mean_of_several_starts_of_the_best_may_be_chosen_too() -> None:

@@ -1,0 +1,82 @@
+"""Two runs over the same inputs come together, or it is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.stability import StabilityOptions
+from sysid.estimation.stability.beginnings import Beginnings
+from sysid.estimation.stability.check import FreeRunCheck
+from sysid.estimation.stability.free_run import Run, check_stability
+from sysid.estimation.stability.sequences import Excursions, InputSequence
+from sysid.models import ARX, ARXModel, Mapping
+from sysid.traces import Channel, Trace
+
+MAPPING = Mapping.parse("u -> y")
+
+
+def model(pole: float = 0.9) -> ARXModel:
+    return ARXModel(
+        orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([1.0 - pole, pole]), intercept=0.0,
+        mapping=MAPPING, sample_time=0.5, input_units=("V",), output_unit="V", rest_output=0.0,
+    )  # fmt: skip
+
+
+def record() -> Trace:
+    """Always in motion, so that there is no plateau on which it would be seen where a run settles."""
+    u = np.random.default_rng(0).uniform(0.0, 1.0, 2000)
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+    return Trace(
+        name="record", sample_time=0.5, channels=channels, values=np.column_stack([u, model().simulate(u[:, None])])
+    )
+
+
+def swinging(share: float) -> Run:
+    """A run that swings by itself from where it begins on, within its bounds, on a share of the sequences."""
+    rng = np.random.default_rng(1)
+
+    def run(sequence: InputSequence) -> np.ndarray:
+        steady = model().simulate(sequence.inputs, sequence.history(several=False))
+        swings = rng.random() < share
+        return steady + swings * 0.3 * np.sin(0.7 * np.arange(len(steady)) + rng.uniform(0.0, 6.0))
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("run", "forgets"), [(model(), True), (model(0.99), True), (swinging(0.01), True), (swinging(0.2), False)]
+)
+def test_a_run_that_swings_by_itself_does_not_forget_where_it_began(run: Run | ARXModel, forgets: bool) -> None:
+    found = check_stability(run, Excursions.of([record()], ["u"], ["y"]), count=150)
+    assert found.stable  # it stays within its bounds
+    assert found.beginnings is not None
+    assert found.beginnings.sequences == 100
+    assert found.forgets is forgets
+    assert found.to_dict().get("apart", 0) == (0 if forgets else found.beginnings.apart)
+
+
+def test_what_leaves_its_bounds_is_not_asked() -> None:
+    found = check_stability(model(1.05), Excursions.of([record()], ["u"], ["y"]), count=20)
+    assert found.unbounded
+    assert found.beginnings is None
+
+
+def test_a_fit_that_does_not_forget_says_so_and_keeps_its_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    check = FreeRunCheck.of(StabilityOptions(count=20), MAPPING, [record()])
+    fit = FitResult(model=model(), status=Status.CONVERGED, loop=Loop.CLOSED, history={}, train_time_s=0.0)
+    assert not check.applied(fit).warnings
+    asked = check.finding(model())
+    assert asked is not None
+    swings = replace(asked, beginnings=Beginnings(sequences=20, apart=9))
+    monkeypatch.setattr(FreeRunCheck, "finding", lambda *_, **__: swings)
+    told = check.applied(fit)
+    assert told.status is Status.CONVERGED
+    assert told.stability is not None
+    assert told.stability["apart"] == 9
+    assert len(told.warnings) == 1
+    assert "hangs on where it began, on 9 of 20 random sequences" in told.warnings[0]
+    assert set(told.warnings) <= set(told.notes)

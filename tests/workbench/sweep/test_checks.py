@@ -1,0 +1,50 @@
+"""Of the best trials the first whose free run is stable, and of those alike one that forgets where it began."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from sysid.estimation import Loop, Status
+from sysid.workbench.sweep.checks import Checks
+
+
+def checks(monkeypatch: pytest.MonkeyPatch, found: list[tuple[Status, int]]) -> Checks:
+    """Checks of trials of which it is said how their free run ended, and on how many sequences it does not forget."""
+    bench: Any = SimpleNamespace(stability=SimpleNamespace(choose=True))
+    one = Checks(driver=SimpleNamespace(), bench=bench)  # type: ignore[arg-type]
+    fits = [
+        SimpleNamespace(status=status, stability={"apart": apart} if apart else {}, loop=Loop.CLOSED)
+        for status, apart in found
+    ]
+    monkeypatch.setattr(Checks, "_stored", lambda _, trial: [fits[trial.number]])
+    monkeypatch.setattr(Checks, "_checked", lambda _, trial: [fits[trial.number]])
+    return one
+
+
+GOOD, SWINGS, RUNS_AWAY = (Status.CONVERGED, 0), (Status.CONVERGED, 8), (Status.UNSTABLE, 0)
+
+
+@pytest.mark.parametrize(
+    ("found", "errors", "chosen", "refused"),
+    [
+        ([GOOD, GOOD], [1.0, 1.1], 0, 0),
+        ([RUNS_AWAY, GOOD], [1.0, 9.0], 1, 1),
+        ([SWINGS, GOOD], [1.0, 1.3], 1, 0),
+        ([SWINGS, GOOD], [1.0, 1.5], 0, 0),  # the plant may swing by itself: one that does not is far worse
+        ([SWINGS, RUNS_AWAY, GOOD], [1.0, 1.1, 1.2], 2, 0),
+        ([RUNS_AWAY, SWINGS, SWINGS], [1.0, 1.1, 1.2], 1, 1),
+    ],
+)
+def test_the_first_stable_one_and_of_those_alike_one_that_forgets(
+    monkeypatch: pytest.MonkeyPatch,
+    found: list[tuple[Status, int]],
+    errors: list[float],
+    chosen: int,
+    refused: int,
+) -> None:
+    ranked: Any = [SimpleNamespace(number=n, selection_free_run_mse=mse) for n, mse in enumerate(errors)]
+    winner, passed_over = checks(monkeypatch, found).first_stable(ranked)
+    assert (winner.number, passed_over) == (chosen, refused)
