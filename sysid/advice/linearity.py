@@ -30,6 +30,8 @@ from sysid.estimation.nonparametric.segments import Segment
 SURE, LIKELY = 1e-4, 1e-2
 SLIGHT, CLEAR = 0.05, 0.2
 """Parts of what a linear response leaves that curvature explains: where it is told, and where it is clear."""
+MATTERS = 1e-4
+"""Part of the output's variance that curvature has to explain to be worth a network: one hundredth of its deviation."""
 NOTHING_LEFT = 1e-6
 """Part of the output's variance that a linear response leaves, below which there is nothing to ask."""
 NEIGHBOURS, SMOOTH = 6, 10
@@ -186,7 +188,7 @@ def _curvature(record: Record) -> Finding:
     features = _moving([_features(one, found) for one in records])
     plain, share, p = _asked(features, records)
     figures = {"share": plain, "p": p, "left": rest / total}
-    if p < SURE and plain > CLEAR:
+    if p < SURE and plain > CLEAR and plain * rest / total >= MATTERS:
         code, verdict = "linearity.curved", Verdict.LOOK
     elif p < LIKELY and plain > CLEAR:
         code, verdict = "linearity.perhaps_curved", Verdict.NOTE

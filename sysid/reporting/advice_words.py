@@ -72,7 +72,7 @@ SAID: Final[dict[str, Words]] = {
         "Mask these samples, declare the limit, or use a model that is not linear: a linear one is bent by them.",
     ),
     "channel.spikes": Words(
-        "{who} has {count:.0f} single samples that jump away and back, by up to {largest:.3g} {unit}.",
+        "Single samples of {who} jump away and back: {count:.0f}, by up to {largest:.3g} {unit}.",
         "Mask them, or fit with a robust loss: repairs: {{nan: mask}} after they are emptied in the file.",
     ),
     "channel.held": Words(
@@ -258,7 +258,7 @@ SAID: Final[dict[str, Words]] = {
         "Try a network beside the linear model, and compare them in free run.",
     ),
     "linearity.slightly_curved": Words(
-        "Curvature explains {share:.0%} of the {left:.2%} that a linear response leaves.",
+        "Curvature explains {share:.0%} of the {left:.2g} of the output's variance that a linear response leaves.",
         "A linear model may do; compare it with a network in free run.",
     ),
     "linearity.curved": Words(

@@ -155,7 +155,9 @@ def finalist_of(fit: FitResult, cases: Sequence[Trace], start: Start, one_step_m
         target = target[scored]
         found[case.name] = figures(target, output, model.output_unit, counted)
         spread = float(np.std(target[counted])) if counted.any() else 0.0
-        errors += parts_of((target - output)[counted] / spread) if spread > 0.0 else ()
+        with np.errstate(over="ignore", invalid="ignore"):  # of a run that has left
+            away = (target - output)[counted] / spread if spread > 0.0 else np.empty(0)
+        errors += parts_of(away)
     return Finalist(fit=fit, cases=found, one_step_mse=one_step_mse, errors=tuple(errors))
 
 

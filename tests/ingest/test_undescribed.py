@@ -100,3 +100,18 @@ def test_the_command_line_tells_what_was_guessed(
         warnings.simplefilter("default", GuessedWarning)
         assert run_cli(["advise", str(path)]) == 0
     assert "no unit for u, y" in capsys.readouterr().err
+
+
+def test_simulate_guesses_the_time_of_a_file_and_has_the_models_where_there_is_none(write: Write) -> None:
+    from sysid.ingest import FileOptions, read_table
+    from sysid.ingest.undescribed import guessed_time
+
+    stamped = write("stamped.csv", lines("clock,u", lambda k: f"{100 * k},{k % 7}"))
+    with pytest.warns(GuessedWarning, match="clock in ms"):
+        found = guessed_time(read_table(stamped), FileOptions(), sample_time=0.5)
+    assert (found.time.column, found.time.unit) == ("clock", "ms")
+    bare = write("bare.csv", lines("u,w", lambda k: f"{k % 7},{k * k % 11}"))
+    with pytest.warns(GuessedWarning, match="no time stamps, 0.5 s between them"):
+        assert guessed_time(read_table(bare), FileOptions(), sample_time=0.5).time.step == 0.5
+    said = write("said.csv", lines("t [s],u", lambda k: f"{k},{k % 7}"))
+    assert guessed_time(read_table(said), FileOptions(), sample_time=0.5) == FileOptions()
