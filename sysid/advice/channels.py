@@ -99,7 +99,7 @@ def _channel(record: Record, name: str) -> Iterator[Finding]:
         yield from _resolution(name, parts, levels)
     # Of coarse steps the outermost is an end that is stayed at, and none that anything runs into.
     if name == record.mapping.output and not any(map(coarse_step, parts)):
-        yield from _ends(name, parts, x)
+        yield from _ends(record, name, parts, x)
     yield from _spikes(record, name, levels)
 
 
@@ -117,8 +117,9 @@ def _resolution(name: str, parts: Sequence[NDArray[np.float64]], levels: NDArray
         )
 
 
-def _ends(name: str, parts: list[NDArray[np.float64]], x: NDArray[np.float64]) -> Iterator[Finding]:
+def _ends(record: Record, name: str, parts: list[NDArray[np.float64]], x: NDArray[np.float64]) -> Iterator[Finding]:
     """Stays at an end of the range that begin abruptly: a limit, and not a level that was settled at."""
+    answering = _answering(record)
     span = float(np.ptp(x))
     moves = [np.abs(np.diff(part)) for part in parts if len(part) > 1]
     usual = float(np.sqrt(np.mean(np.concatenate(moves) ** 2))) if moves else 0.0
@@ -128,8 +129,8 @@ def _ends(name: str, parts: list[NDArray[np.float64]], x: NDArray[np.float64]) -
         (float(x.min()), -1.0, "channel.clipped_below"),
     ):
         stays, abrupt = list[NDArray[np.float64]](), list[float]()
-        for part in parts:
-            near = sign * (end - part) <= AT_END * span
+        for part, moves_on in zip(parts, answering, strict=True):
+            near = (sign * (end - part) <= AT_END * span) & moves_on
             edges = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(np.int8), [0]])))
             for a, b in zip(edges[::2], edges[1::2], strict=True):
                 if b - a >= (LONG_STAY if rough > 0.0 else VERY_LONG_STAY):
@@ -147,6 +148,20 @@ def _ends(name: str, parts: list[NDArray[np.float64]], x: NDArray[np.float64]) -
                 subject=(name,),
                 figures={"share": share, "stays": len(stays), "value": end},
             )
+
+
+def _answering(record: Record) -> list[NDArray[np.bool_]]:
+    """Where the output may still answer an input: one that has answered stands still, at an end of its range too."""
+    found = record.impulse
+    if isinstance(found, str) or not found.settled:
+        return [np.ones(len(segment), dtype=np.bool_) for segment in record.segments]
+    longest, places = max(found.settling(AT_END)), [record.mapping.inputs.index(name) for name in record.moving]
+    made = []
+    for segment in record.segments:
+        moved = np.concatenate([[True], np.any(np.diff(segment.inputs[:, places], axis=0) != 0.0, axis=1)])
+        last = np.maximum.accumulate(np.where(moved, np.arange(len(segment)), 0))
+        made.append(np.arange(len(segment)) - last <= longest)
+    return made
 
 
 def _roughness(parts: Sequence[NDArray[np.float64]]) -> float:

@@ -25,8 +25,9 @@ FACTORS = (1, 2, 4, 8, 16, 32)
 """Samples of a step."""
 ROUNDING = 1e-12
 """Of the output's variance: what a linear equation leaves below it is no curve."""
-SURE, CLEAR = 1e-4, 0.2
-"""How improbable by chance, and what part of what a linear equation leaves, curves must be to be told."""
+SURE, CLEAR, SOME = 1e-4, 0.2, 0.02
+"""How improbable by chance, and what part of what a linear equation leaves, curves must be to be told; and what part
+without the inputs of the step that is foretold."""
 OUTPUTS, MOST_COLUMNS, ROWS = 4, 200, 4
 """Past steps of the output in the linear equation; its columns at most; and rows for each of them, at least."""
 
@@ -75,11 +76,24 @@ def curve_of_state(segments: Sequence[Segment], response: ImpulseResponse) -> St
         if samples * (OUTPUTS + 1) * len(late) <= MOST_COLUMNS:
             one = _asked(scaled, answers, late, samples)
             found += [one] if one is not None else []
-    return max(found, key=lambda one: one.share, default=None)
+    best = max(found, key=lambda one: one.share, default=None)
+    if best is None or not best.sure:
+        return best
+    # Where the output acts on the inputs, those within the step tell the noise in it, and of a set point with few
+    # levels they tell it by curves: there must be some without them, too.
+    before = [max(k, best.samples) for k in late]
+    alone = _asked(scaled, answers, before, best.samples, within=False)
+    told = alone is not None and alone.p < SURE and alone.share > SOME
+    return best if told else replace(best, p=1.0)
 
 
 def _asked(
-    segments: Sequence[Segment], answers: list[NDArray[np.float64]], late: list[int], samples: int
+    segments: Sequence[Segment],
+    answers: list[NDArray[np.float64]],
+    late: list[int],
+    samples: int,
+    *,
+    within: bool = True,
 ) -> StateCurve | None:
     blocks, q = list[NDArray[np.float64]](), 0
     window = samples * (OUTPUTS + 1)
@@ -93,7 +107,7 @@ def _asked(
         past = columns_of_lags(y, range(1, OUTPUTS + 1), slice(first, steps))
         # At every sample: means over steps would hide where in a step an input moved, and that would look like a curve.
         acting = [u[ends[:, None] - np.arange(k, k + window)] for u, k in zip(s.inputs.T, late, strict=True)]
-        linear = columns_of_lags(w, range(OUTPUTS + 1), slice(first, steps))
+        linear = columns_of_lags(w, range(0 if within else 1, OUTPUTS + 1), slice(first, steps))
         curves = _curves(past, [lags[:, : 2 * samples].mean(axis=1) for lags in acting])
         block = np.column_stack([past, *acting, linear, curves, y[first:]])
         blocks.append(block - block.mean(axis=0))

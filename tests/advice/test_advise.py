@@ -222,6 +222,15 @@ def test_limits_spikes_jumps_and_drifts() -> None:
     assert coarse["step"] == pytest.approx(0.08)
 
 
+@pytest.mark.parametrize("dead", [1, 3])
+def test_a_fast_plant_that_has_answered_is_at_no_limit(dead: int) -> None:
+    u = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 60), 5)
+    y = lfilter([*np.zeros(dead), 0.99], [1.0, -0.01], u)
+    found = look(trace(u, y, sample_time=10.0))
+    assert not codes(found) & {"channel.clipped_above", "channel.clipped_below"}
+    assert not any(isinstance(one.structure, NARX) for one in found.suggestions)
+
+
 def test_levels_of_a_command_are_no_fault_of_a_channel() -> None:
     u = np.round(np.clip(3.0 * steps(1500, 14), -2.0, 2.0), 2)
     assert looks(look(trace(u, plant(u) + noise(1500, 14, 0.02)))) == set()

@@ -121,3 +121,18 @@ def test_nor_has_one_that_adds_up_twice_and_is_slow_beside_its_record(seed: int)
     y = np.cumsum(np.cumsum(u - u.mean())) * 1e-6 + 1e-4 * rng.standard_normal(4_000)
     found = sysid.advise(sysid.data((u, y), sample_time=1e-3), "u -> y")
     assert found.find("linearity.curved_state") is None
+
+
+@pytest.mark.parametrize("seed", [2, 5])
+def test_a_linear_plant_in_a_loop_with_a_set_point_of_two_levels_is_no_curve(seed: int) -> None:
+    """Inputs within a step that is foretold tell its noise, by curves, where the set point has two levels."""
+    n, rng = 1800, np.random.default_rng(seed)
+    target = np.repeat(rng.choice([-1.0, 1.0], n // 20), 20)
+    v = lfilter([1.0], [1.0, -0.9], 0.05 * rng.standard_normal(n))
+    x, y, u = np.zeros(n), np.zeros(n), np.zeros(n)
+    for k in range(n):
+        x[k] = 0.8 * x[k - 1] + 0.2 * u[k - 2] if k > 1 else 0.0
+        y[k] = x[k] + v[k] + 4.0
+        u[k] = 1.5 * (target[k] - (y[k] - 4.0)) + 0.7
+    found = {one.code for one in sysid.advise(sysid.data((u, y), sample_time=1.0), "u -> y").findings}
+    assert "linearity.curved_state" not in found
