@@ -19,8 +19,9 @@ what is left is not white."""
 def at_noise(provider: EquationProvider, theta: Array) -> bool:
     """Whether what some parameters leave of every output is white, or no more than the steps of the solver are worth.
 
-    Errors of a minimum that is not the one sought persist over many samples: it takes the wrong oscillation for the
-    right one. White ones are those of a sensor, which no other parameters take away.
+    More than half the range of an output is none. Errors of a minimum that is not the one sought persist over many
+    samples: it takes the wrong oscillation for the right one. White ones are those of a sensor, which no other
+    parameters take away.
 
     Args:
         provider: The records.
@@ -48,7 +49,8 @@ def _is_noise(records: list[Array]) -> bool:
     power, n = float(whole @ whole), len(whole)
     if power <= ACCURACY**2 * n:
         return True
-    if n < FEWEST:
+    # A run that explodes leaves one sample beside which all others are none, and that is as white as noise.
+    if n < FEWEST or power > n:
         return False
     lags = np.arange(1, LAGS + 1)
     products = np.array([sum(float(one[k:] @ one[:-k]) for one in records) for k in lags])

@@ -43,12 +43,16 @@ STEP_ROUNDS = 2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ready:
-    """A fit that can begin: the model but for its parameters, the records, and where the parameters start."""
+    """A fit that can begin: the model but for its parameters, the records, and where the parameters start.
+
+    Whether a free run there tells something of the records (``runs``), or windows had to, says how starts begin.
+    """
 
     template: GreyBoxModel | VectorGreyBoxModel
     provider: EquationProvider
     theta: Array
     stepping: Stepping
+    runs: bool = True
 
     @property
     def named(self) -> tuple[Named, ...]:

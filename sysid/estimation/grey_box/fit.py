@@ -18,9 +18,17 @@ from sysid.estimation.grey_box.layout import Begun, EquationLayout
 from sysid.estimation.grey_box.preparing import (
     WINDOW,
 )
-from sysid.estimation.grey_box.readying import common, ready_for
+from sysid.estimation.grey_box.readying import common, no_run, ready_for
 from sysid.estimation.grey_box.record import Record
-from sysid.estimation.grey_box.shot import AUTO, SINGLE, shooting_terms, way_of, with_starts_begun, with_way
+from sysid.estimation.grey_box.shot import (
+    AUTO,
+    SINGLE,
+    may_shoot,
+    shooting_terms,
+    way_of,
+    with_starts_begun,
+    with_way,
+)
 from sysid.estimation.grey_box.telling import told
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
@@ -184,6 +192,8 @@ def fit_equations(
     # The latest first: of a start that converged, the last look at it is chosen, and not one that saw the same.
     training = multistart.training
     candidates = [settled(one, ready.provider) for one in reversed(run_race(multistart))]
+    if not ready.runs and not any(np.isfinite(one.loss) for one in candidates):
+        raise no_run()
     choice = choose(candidates, _chosen_by(training, ready), vet)
     if windows.samples:
         race = choice.chosen
@@ -197,7 +207,7 @@ def fit_equations(
     seconds = multistart.checkpoints.earlier_s + now() - began
     begun = with_starts_begun(training, multistart, candidates)
     found = with_note(multistart_result(choice, candidates, begun, status, seconds, left=left), windows)
-    found = with_way(found, done.candidate, way_of(training, template, begins), begun, training)
+    found = with_way(found, done.candidate, way_of(training, template, begins, runs=ready.runs), begun, training)
     return told(found, done, data, ready.named)
 
 
@@ -261,11 +271,11 @@ def _prepared(
 ) -> tuple[Windows, Ready, starts.Multistart]:
     """The windows of the records, what is trained on them, and its starts."""
     windows = Windows.of(experiments, replace(training, window=0) if template.grey.by_case else training)
-    ready = ready_for(template, windows.experiments)
+    ready = ready_for(template, windows.experiments, shoots=may_shoot(training, template, begins))
     starts.check_samples(ready.provider)
     if not len(ready.theta):  # nothing to estimate, and one start is as good as another
         training = replace(training, starts=1, shooting=SINGLE)
-    way = way_of(training, ready.template, begins)
+    way = way_of(training, ready.template, begins, runs=ready.runs)
     layout = EquationLayout(
         declared=2 if way == AUTO else 1,
         named=ready.named,

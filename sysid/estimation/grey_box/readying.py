@@ -17,6 +17,7 @@ from sysid.estimation.grey_box.finishing import Ready
 from sysid.estimation.grey_box.preparing import WINDOW, first_terms, norms_for, provider_for, seen_terms, widths_for
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.record import Record
+from sysid.estimation.grey_box.shooting import in_windows
 from sysid.estimation.grey_box.stepping import STIFF, Stepping, can_be_implicit, explicit_steps, solver_for
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.named import named_of
@@ -27,6 +28,9 @@ from sysid.models.grey_box_model import GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]
+
+LOST = 10.0
+"""Root mean square error of a free run, over half the output's range, from which on it tells nothing of the records."""
 
 FIRST_SUBSTEPS = 8
 """Steps before it is known how many are needed."""
@@ -93,12 +97,16 @@ def common(first: Trace, mapping: Mapping, grey: GreyBox) -> dict[str, Any]:
     }
 
 
-def ready_for(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence[Experiment]) -> Ready:
+def ready_for(
+    template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence[Experiment], *, shoots: bool = False
+) -> Ready:
     """Levels, ranges and a step, from the records at the declared start.
 
     Args:
         template: The model before its fit.
         experiments: The records.
+        shoots: Whether starts may begin by multiple shooting: where the free run from the declared start is lost, what
+            is hidden is then looked at in short windows, each begun at the state that it shows.
 
     Returns:
         What a fit begins with.
@@ -106,27 +114,24 @@ def ready_for(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence
     Raises:
         TraceError: If the equations have no free run there.
     """
-    grey, form = template.grey, template.recursion
+    form = template.recursion
     records = tuple(Record.of(experiment, form) for experiment in experiments)
     means = np.array([np.mean([np.mean(record.output[:, j]) for record in records]) for j in range(form.n_outputs)])
-    provider = provider_for(template, first_terms(form, template.mapping.outputs, means), records)
-    places = np.array([one.place for one in named_of(grey, template.cases, template.lowered.n_weights)], dtype=np.int64)
-    theta = np.zeros(provider.n_parameters)
-    theta[places] = template.theta[places] / provider.scale[places]
-    provider, theta, stepping = _stepping(template, provider, theta)
-    seen, begun = seen_terms(provider, theta)
-    provider = provider.with_form(seen)
-    theta = provider.with_states(theta, begun)
-    theta = provider.with_states(theta, provider.states(theta, WINDOW))
+    whole = provider_for(template, first_terms(form, template.mapping.outputs, means), records)
+    named = named_of(template.grey, template.cases, template.lowered.n_weights)
+    places = np.array([one.place for one in named], dtype=np.int64)
+    declared = np.zeros(whole.n_parameters)
+    declared[places] = template.theta[places] / whole.scale[places]
+    provider, theta, stepping = _looked_at(template, whole, declared)
+    # Without networks another start has multiple shooting in any case, and the far end of a run shows levels enough.
+    most = LOST**2 * whole.n_samples if template.lowered.nets else np.inf
+    runs, parted = 2.0 * provider.loss(theta) < most, False
+    if not runs and shoots:
+        other = _looked_at(template, *in_windows(whole, declared), begun=True)
+        if parted := bool(np.isfinite(other[0].loss(other[1]))):
+            provider, theta, stepping = other
     if not np.isfinite(provider.loss(theta)):
-        raise TraceError(
-            "the equations have no free run at their declared start",
-            where="equations",
-            expected="numbers over every record",
-            got="what grows without bound, or is no number",
-            remedy="start the parameters and initial states at values with which the equations run: look for "
-            "a sign, a division by 0, or the logarithm of what is not above 0" + _stiff_remedy(grey, provider, theta),
-        )
+        raise no_run(_stiff_remedy(template.grey, provider, theta))
     seen = provider.form
     template = replace(
         template,
@@ -136,8 +141,40 @@ def ready_for(template: GreyBoxModel | VectorGreyBoxModel, experiments: Sequence
         spans=tuple(map(float, seen.terms.scale)),
         substeps=stepping.substeps,
     )
-    provider = provider.with_form(replace(template.recursion, widths=widths_for(provider, theta)))
-    return Ready(template=template, provider=provider, theta=theta, stepping=stepping)
+    found = whole.with_form(replace(template.recursion, widths=widths_for(provider, theta)))
+    if parted:
+        theta = found.with_states(declared, found.states(declared, WINDOW))
+    return Ready(template=template, provider=found, theta=theta, stepping=stepping, runs=not parted)
+
+
+def no_run(more: str = "") -> TraceError:
+    """What is said of equations that cannot be run over the records.
+
+    Args:
+        more: What helps beside.
+
+    Returns:
+        The error.
+    """
+    return TraceError(
+        "the equations have no free run at their declared start",
+        where="equations",
+        expected="numbers over every record",
+        got="what grows without bound, or is no number",
+        remedy="start the parameters and initial states at values with which the equations run: look for "
+        f"a sign, a division by 0, or the logarithm of what is not above 0{more}",
+    )
+
+
+def _looked_at(
+    template: GreyBoxModel | VectorGreyBoxModel, provider: EquationProvider, theta: Array, *, begun: bool = False
+) -> tuple[EquationProvider, Array, Stepping]:
+    """Records as they are run, with levels and ranges of the states that they visit, and what is trained."""
+    provider, theta, stepping = _stepping(template, provider, theta, begun=begun)
+    seen, states = seen_terms(provider, theta)
+    provider = provider.with_form(seen)
+    theta = provider.with_states(theta, states)
+    return provider, theta if begun else provider.with_states(theta, provider.states(theta, WINDOW)), stepping
 
 
 def _stiff_remedy(grey: GreyBox, provider: EquationProvider, theta: Array) -> str:
@@ -152,7 +189,7 @@ def _stiff_remedy(grey: GreyBox, provider: EquationProvider, theta: Array) -> st
 
 
 def _stepping(
-    template: GreyBoxModel | VectorGreyBoxModel, provider: EquationProvider, theta: Array
+    template: GreyBoxModel | VectorGreyBoxModel, provider: EquationProvider, theta: Array, *, begun: bool
 ) -> tuple[EquationProvider, Array, Stepping]:
     """The solver and its steps; and what is trained, with the states from where the records are then looked at."""
     explicit, asked = provider.form, template.grey.substeps
@@ -163,7 +200,8 @@ def _stepping(
     stiff = implicit is not None and needed > max(STIFF, asked or 0)
     if implicit is not None and stiff:  # explicitly the records would show no states
         provider = provider.with_form(replace(explicit, lowered=implicit()))
-    theta = provider.with_states(theta, provider.states(theta, WINDOW))
+    if not begun:
+        theta = provider.with_states(theta, provider.states(theta, WINDOW))
     if asked is not None:
         return provider, theta, Stepping(substeps=asked, change=0.0, explicit=needed if stiff else 0.0)
     provider, stepping = solver_for(provider.with_form(explicit), theta, implicit)

@@ -255,6 +255,22 @@ class Shooting(EquationProvider):
         return np.asarray(np.clip(found, *whole.bounds))
 
 
+def in_windows(whole: EquationProvider, theta: Array) -> tuple[EquationProvider, Array]:
+    """The windows of some records as records of their own, each begun at the state that it shows.
+
+    Args:
+        whole: The records.
+        theta: What is trained of them.
+
+    Returns:
+        The windows, and what is trained of them: the same parameters, and their states.
+    """
+    windows, trained = Shooting.of(whole, theta).begun_at(whole, theta)
+    form, records = windows.form, windows.records
+    found = EquationProvider(form=form, records=records, scale=whole.scale, limits=whole.limits, noise=whole.noise)
+    return found, windows.plain(trained)
+
+
 def _samples(whole: EquationProvider) -> int:
     """Of a window, so that there are not too many states."""
     total = sum(len(record.output) for record in whole.records)

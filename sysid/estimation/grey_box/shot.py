@@ -37,8 +37,8 @@ ITERATIONS, TOLERANCE, PATIENCE = 40, 1e-2, 4
 AUTO, SINGLE, MULTIPLE = "auto", "single", "multiple"
 
 
-def way_of(training: Training, template: EquationModel, begins: Sequence[Begun]) -> str:
-    """How the starts of a fit begin.
+def may_shoot(training: Training, template: EquationModel, begins: Sequence[Begun]) -> bool:
+    """Whether starts of a fit may begin by multiple shooting.
 
     Args:
         training: How it is trained.
@@ -46,12 +46,30 @@ def way_of(training: Training, template: EquationModel, begins: Sequence[Begun])
         begins: Starts that are given.
 
     Returns:
-        As asked for; single shooting by default where starts are given or the equations were built of a structure,
-        which begin near a minimum, and where networks leave nothing known of what noise is.
+        Whether they may: not where starts are given or the equations were built of a structure, which begin near a
+        minimum.
+    """
+    return training.shooting != SINGLE and not begins and not isinstance(template, BuiltModel)
+
+
+def way_of(training: Training, template: EquationModel, begins: Sequence[Begun], *, runs: bool) -> str:
+    """How the starts of a fit begin.
+
+    Args:
+        training: How it is trained.
+        template: The model before its fit.
+        begins: Starts that are given.
+        runs: Whether the free run from the declared start stays by the records.
+
+    Returns:
+        As asked for. By default single shooting where that alone may be (:func:`may_shoot`); and where networks leave
+        nothing known of what noise is, unless the declared start is lost.
     """
     if training.shooting != AUTO:
         return training.shooting
-    return SINGLE if begins or isinstance(template, BuiltModel) or template.lowered.nets else AUTO
+    if not may_shoot(training, template, begins):
+        return SINGLE
+    return (SINGLE if runs else MULTIPLE) if template.lowered.nets else AUTO
 
 
 def shooting_terms(way: str, provider: EquationProvider) -> dict[str, Any]:
@@ -104,9 +122,9 @@ def with_way(found: FitResult, chosen: Candidate, way: str, begun: Training, ask
         asked: As it was asked for.
 
     Returns:
-        The fit; as it is where nothing but single shooting was asked for.
+        The fit; as it is where nothing but single shooting was asked for, and where no minimum was found.
     """
-    if way == SINGLE:
+    if way == SINGLE or not found.status.usable:
         return found
     declared = chosen.number < (2 if way == AUTO else 1)
     multiple = way == MULTIPLE or chosen.number == 1

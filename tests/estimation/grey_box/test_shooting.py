@@ -152,6 +152,32 @@ def test_noise_is_told_from_what_is_left_of_a_wrong_run() -> None:
     assert not at_noise.at_noise(short, true)
 
 
+def test_a_run_that_explodes_in_its_last_sample_is_no_noise() -> None:
+    """All others are none beside it, so that nothing correlates."""
+    errors = np.append(0.01 * np.random.default_rng(0).standard_normal(200), 1e30)
+    assert at_noise._is_noise([errors[:-1]])
+    assert not at_noise._is_noise([errors])
+
+
+def test_equations_with_a_network_are_fitted_where_their_declared_start_has_no_run() -> None:
+    """A pole that is declared unstable: the run leaves the record by 50 powers of ten, and windows do not."""
+    rng = np.random.default_rng(0)
+    u, y, x = np.repeat(rng.uniform(-1.0, 1.0, 40), 10), np.empty(400), 0.3
+    for t in range(400):
+        y[t] = x
+        for _ in range(20):
+            x += 0.005 * (-0.8 * x - 0.6 * x**3 + u[t])
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+    values = np.column_stack([u, y + 1e-3 * rng.standard_normal(400)])
+    trace = Trace(name="record", sample_time=0.1, channels=channels, values=values)
+    grey = GreyBox(equations="dx/dt = k*x + net(x, neurons=3) + u; y = x", parameters={"k": 3})
+    quick = sysid.Training(starts=2, max_iterations=60)
+    found = fit_grey_box([trace], MAPPING, grey, quick, start=ESTIMATED)
+    assert found.status.usable
+    assert found.history["mse"][-1] < 0.01 * np.var(y)
+    assert any("found by multiple shooting" in note for note in found.notes)
+
+
 def exact(whole: EquationProvider, theta: np.ndarray) -> Record:
     form = whole.at(theta)
     output = form.run(whole.records[0].u, whole.begin(form, theta, 0))
