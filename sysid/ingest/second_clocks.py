@@ -110,7 +110,7 @@ def _said(column: RawColumn, first: RawColumn | None) -> str:
 
 
 def _by_one(values: NDArray[np.float64]) -> bool:
-    return len(values) > 2 and bool((np.diff(values) == 1.0).all())
+    return len(values) > 2 and bool(np.isfinite(values).all()) and bool((np.diff(values) == 1.0).all())
 
 
 def _is_even(values: NDArray[np.float64]) -> bool:

@@ -230,6 +230,8 @@ class RawTable:
 def by_length(columns: Sequence[RawColumn]) -> tuple[tuple[RawColumn, ...], tuple[RawColumn, ...]]:
     """Columns of the length of the time column, or else of the commonest length, and the others.
 
+    A time column that no other column is as long as says nothing.
+
     Args:
         columns: Columns of any lengths.
 
@@ -241,7 +243,8 @@ def by_length(columns: Sequence[RawColumn]) -> tuple[tuple[RawColumn, ...], tupl
     time = recognise_time(columns)
     sound = [column for column in columns if column.problem is None] or list(columns)
     lengths = Counter(len(column.values) for column in sound)
-    by_time = [len(column.values) for column in columns if column.name == time]
+    # A clock that stands alone, as the tout of a workspace may, is that of something else.
+    by_time = [n for column in columns if column.name == time and lengths[n := len(column.values)] > 1]
     usual = by_time[0] if by_time else max(lengths, key=lambda length: (lengths[length], length))
     alike = tuple(column for column in columns if len(column.values) == usual)
     return alike, tuple(column for column in columns if len(column.values) != usual)

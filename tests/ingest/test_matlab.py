@@ -229,3 +229,11 @@ def test_objects_that_hold_one_another_are_refused_not_walked_through(
     monkeypatch.setattr(matio, "load_from_mat", lambda *_, **__: {"Hd": one})
     with pytest.raises(ReaderError, match=r"(?s)Hd is a MATLAB object.*class dfilt\.df2sos"):
         read_table(tmp_path / "filter.mat")
+
+
+def test_a_clock_of_another_length_than_all_signals_is_not_theirs(tmp_path: Path) -> None:
+    """A workspace had a record of 6,717 samples, and the last thousand times of a simulation: no channel was left."""
+    mat("5", T=TIME, U=VOLT, Y=PIPE, tout=TIME[-20:])(tmp_path / "workspace.mat")
+    table = read_table(tmp_path / "workspace.mat")
+    assert {"T", "U", "Y"} <= set(table.names)
+    assert [column.name for column in table.others] == ["tout"]

@@ -48,5 +48,7 @@ def test_a_number_of_rows_is_no_channel_where_nothing_is_time(name: str) -> None
     counts = RawColumn(name=name, values=np.arange(1.0, 21.0))
     table = RawTable(source=Path("rig.csv"), reader="csv", columns=(counts, RawColumn(name="y", values=Y)), step=0.05)
     assert [column.aside for column in without_second_clocks(table, None).columns] == ["counts the rows", ""]
+    endless = replace(counts, values=np.r_[np.arange(18.0), np.inf, np.inf])  # of whose difference NumPy would warn
+    assert not without_second_clocks(replace(table, columns=(endless, table.columns[1])), None).columns[0].aside
     gaps = replace(counts, values=np.delete(np.arange(21.0), 7))
     assert not without_second_clocks(replace(table, columns=(gaps, table.columns[1])), None).columns[0].aside
