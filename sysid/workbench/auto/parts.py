@@ -188,7 +188,7 @@ def _held_out(traces: Sequence[Trace], start: Start, *, in_turn: bool) -> tuple[
         what = f"every {FOLDS}th estimation trace"
     else:
         blocks = {_blocks(trace, start) for trace in traces}
-        pairs = [_masked(traces, k, start) for k in range(FOLDS)]
+        pairs = [masked(traces, k, start) for k in range(FOLDS)]
         what = f"every {FOLDS}th of {max(blocks)} blocks of {'the' if len(traces) == 1 else 'each'} estimation trace"
     rule = f"No selection traces are declared, so that {what} chose"
     if in_turn or sum(map(len, traces)) <= SHORT:
@@ -207,10 +207,18 @@ def _beyond(pair: tuple[list[Trace], list[Trace]]) -> float:
     return float(over.max()) if over.max() > LITTLE_BEYOND else 0.0
 
 
-def _masked(traces: Sequence[Trace], fold: int, start: Start) -> tuple[list[Trace], list[Trace]]:
+def masked(traces: Sequence[Trace], fold: int, start: Start) -> tuple[list[Trace], list[Trace]]:
     """Traces whose every fourth block does not count, and the same of which nothing else does.
 
     Both run over the whole record from the same beginning, so that no block has an initial state of its own to guess.
+
+    Args:
+        traces: Estimation traces.
+        fold: Which blocks are held out, from 0 to 3.
+        start: How each run begins; samples that are seen first are in both parts, and scored in neither.
+
+    Returns:
+        What is fitted, and what chooses.
     """
     fitted, chooses = [], []
     for trace in traces:
