@@ -370,8 +370,8 @@ def excite(
     """Draw the inputs of an experiment: signals that stay within a range and hold the frequencies that are asked for.
 
     Args:
-        kind: ``prbs``, ``multisine``, ``noise``, ``chirp``, ``staircase``, ``aprbs``, ``ramps``, ``sine`` or ``pulses``;
-            or one with its options, as ``PRBS(clock=4)``.
+        kind: ``prbs``, ``multisine``, ``noise``, ``chirp``, ``staircase``, ``aprbs``, ``ramps``, ``sine`` or
+            ``pulses``; or one with its options, as ``PRBS(clock=4)``.
         sample_time: Seconds between samples.
         samples: Length, or
         duration: in seconds.

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
     from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
     from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
-    from sysid.estimation.linear.state_space.search import StateSpaceTraining
+    from sysid.estimation.linear.state_space.training import StateSpaceTraining
     from sysid.estimation.linear.transfer_function import fit_transfer_function
     from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
     from sysid.estimation.networks.cascade_fit import CascadeFit
@@ -75,7 +75,7 @@ _WHERE = {
     "sysid.estimation.linear.polynomial.fit": ("PolynomialTraining", "fit_polynomial"),
     "sysid.estimation.linear.state_space.fit": ("fit_state_space", "fit_vector_state_space"),
     "sysid.estimation.linear.state_space.orders": ("StateOrders", "state_orders"),
-    "sysid.estimation.linear.state_space.search": ("StateSpaceTraining",),
+    "sysid.estimation.linear.state_space.training": ("StateSpaceTraining",),
     "sysid.estimation.linear.transfer_function": ("fit_transfer_function",),
     "sysid.estimation.linear.transfer_function_training": ("TransferFunctionTraining",),
     "sysid.estimation.networks.cascade_fit": ("CascadeFit",),

@@ -14,7 +14,7 @@ from sysid.estimation.equilibrium import equilibrium_notes
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining
-from sysid.estimation.linear.state_space.search import StateSpaceTraining
+from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.linear_posteriors import LinearPosterior
 from sysid.estimation.networks.joint_options import JointTraining

@@ -28,7 +28,7 @@ from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
 from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
-from sysid.estimation.linear.state_space.search import StateSpaceTraining
+from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.linear_posteriors import (

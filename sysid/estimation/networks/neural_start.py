@@ -16,7 +16,8 @@ from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquard
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.regression import lagged
-from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
+from sysid.estimation.linear.state_space.search import search
+from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.networks.neural_integrators import summed
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.kernels import linear as linear_kernel

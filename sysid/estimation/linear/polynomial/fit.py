@@ -25,7 +25,7 @@ from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors
-from sysid.estimation.linear.state_space.search import flat_prior
+from sysid.estimation.linear.state_space.refinement import flat_prior
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import Mapping, Start

@@ -22,7 +22,8 @@ from scipy import linalg
 
 from sysid.errors import UserError
 from sysid.estimation.linear.segments import Segment, delayed_inputs
-from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
+from sysid.estimation.linear.state_space.search import search
+from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.subspace.projections import arx_orders, regress
 from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.subspace.yardstick import Yardstick

@@ -12,7 +12,8 @@ from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.delay_search import searched_delays
 from sysid.estimation.linear.segments import Segment
-from sysid.estimation.linear.state_space.search import StateSpaceTraining, quick_size
+from sysid.estimation.linear.state_space.search import quick_size
+from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.subspace.starts import ENOUGH
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
 from sysid.models import History, LinearStateSpace

@@ -17,7 +17,9 @@ from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, side_by_side
 from sysid.estimation.linear.state_space.dead_times import behind_dead_times, late
-from sysid.estimation.linear.state_space.search import METHODS, Found, StateSpaceTraining, around, search
+from sysid.estimation.linear.state_space.refinement import Found
+from sysid.estimation.linear.state_space.search import around, search
+from sysid.estimation.linear.state_space.training import METHODS, StateSpaceTraining
 from sysid.estimation.linear.state_space.uncertainty import coordinates_root, state_space_uncertainty
 from sysid.estimation.result import FitResult, Loop
 from sysid.models import (

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.linear.coloured_errors import sandwich
-from sysid.estimation.linear.state_space.search import Found
+from sysid.estimation.linear.state_space.refinement import Found
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import LinearStateSpaceModel, VectorStateSpaceModel
 from sysid.models.innovations import Innovations

@@ -5,7 +5,8 @@ import pytest
 from scipy import signal
 
 from sysid.estimation.linear.segments import Segment
-from sysid.estimation.linear.state_space.search import StateSpaceTraining, search
+from sysid.estimation.linear.state_space.search import search
+from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.subspace.starts import Subspace
 from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.subspace.yardstick import Yardstick, beyond_chance
