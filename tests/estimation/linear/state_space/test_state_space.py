@@ -154,6 +154,11 @@ def test_several_outputs_are_one_model_that_stores_and_predicts_itself() -> None
     u, y = two_outputs(2).columns("ab"), two_outputs(2).columns("yz")
     again = model_from_dict(json.loads(json.dumps(fit.model.to_dict())))
     np.testing.assert_array_equal(again.predict(u, y, steps=2), fit.model.predict(u, y, steps=2))
+    moved, x, K = np.zeros_like(y), np.zeros(3), fit.model.kalman_gain
+    moved[60:] = np.random.default_rng(0).normal(size=y[60:].shape)
+    for ahead, more in zip(fit.model.predict(u, y + moved) - fit.model.predict(u, y), moved, strict=True):
+        np.testing.assert_allclose(ahead, C @ x, atol=1e-8)  # the gain in units moves the state by what is new
+        x = A @ x + K @ (more - C @ x)
     e = (y - again.predict(u, y))[50:]
     np.testing.assert_allclose(np.std(e, axis=0), [3.0, 0.3], rtol=0.15)
     known = dict(zip(fit.uncertainty.names, fit.uncertainty.standard_deviations, strict=True))
