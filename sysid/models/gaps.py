@@ -41,7 +41,8 @@ def predicted(
     span = float(np.ptp(output[~gaps]))
     for _ in range(MOST_ROUNDS):
         ahead = model.predict(inputs, known, history)
-        change = float(np.abs(ahead[gaps] - known[gaps]).max())
+        with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
+            change = float(np.abs(ahead[gaps] - known[gaps]).max())
         if not np.isfinite(change) or change <= SETTLED * span:
             break
         known[gaps] = ahead[gaps]

@@ -1,11 +1,11 @@
 """Whether a free run forgets where it began.
 
 Of two runs over the same inputs one begins a third of the way on. Where they do not come together, what is put out
-hangs on a beginning that is long past. Some systems are so: what integrates, locks, or swings by itself. But a network
-that fits a record to the noise may also swing between two passages of it, or have a second place to stand. It stays
-within its bounds there, and looks like any other to whoever sees the record alone (convergent dynamics: Pavlov,
-Pogromsky, van de Wouw and Nijmeijer 2004, Systems and Control Letters 52; echo states: Jaeger 2001, GMD Report 148).
-So it is told, and a choice prefers, of models alike, one that forgets.
+hangs on a beginning that is long past. Some systems are so: what integrates, rings for long, locks, or swings by
+itself. But a network that fits a record to the noise may also swing between two passages of it, or have a second place
+to stand. It stays within its bounds there, and looks like any other to whoever sees the record alone (convergent
+dynamics: Pavlov, Pogromsky, van de Wouw and Nijmeijer 2004, Systems and Control Letters 52; echo states: Jaeger 2001,
+GMD Report 148). So it is told, and a choice prefers, of models alike, one that forgets.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ class Beginnings:
         return (
             f"What the free run puts out hangs on where it began, on {self.apart} of {self.sequences} random "
             f"sequences: a second run over the same inputs, begun later, stays more than {100.0 * APART:g} % of the "
-            "output's range away. A plant that swings or locks by itself is so. Of any other, take another start or "
-            "structure: this one may swing where the plant does not."
+            "output's range away. A plant that rings for long, that locks or swings by itself, is so. Of any other, "
+            "take another start or structure: this one may swing where the plant does not."
         )
 
 

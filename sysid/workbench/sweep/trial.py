@@ -392,10 +392,11 @@ def _case(
             runs["one_step_mse"] = gaps.predicted(model, inputs, target, history, counted)
         size = np.array([sizes[output] for output in model.mapping.outputs])
         n_samples += int(np.count_nonzero(counted)) * len(size)
-        for name, run in runs.items():
-            squared = ((run - target)[counted] ** 2).reshape(-1, len(size))
-            errors[name] += list(np.mean(squared, axis=0) / size)
-        left = ((runs["free_run_mse"] - target)[counted]).reshape(-1, len(size)) / np.sqrt(size)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a run that has left
+            for name, run in runs.items():
+                squared = ((run - target)[counted] ** 2).reshape(-1, len(size))
+                errors[name] += list(np.mean(squared, axis=0) / size)
+            left = ((runs["free_run_mse"] - target)[counted]).reshape(-1, len(size)) / np.sqrt(size)
         errors["parts"] += [parts_of(one) for one in left.T]
         seconds += _seconds(lambda m=model, u=inputs, h=history: m.simulate(u, h), repeats)  # type: ignore[misc]
     return errors, {"run_time_s": seconds, "n_samples": n_samples} if repeats else {}

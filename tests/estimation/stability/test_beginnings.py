@@ -11,8 +11,9 @@ from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.stability import StabilityOptions
 from sysid.estimation.stability.beginnings import Beginnings
 from sysid.estimation.stability.check import FreeRunCheck
+from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import Run, check_stability
-from sysid.estimation.stability.sequences import Excursions, InputSequence
+from sysid.estimation.stability.sequences import InputSequence
 from sysid.models import ARX, ARXModel, Mapping
 from sysid.traces import Channel, Trace
 
