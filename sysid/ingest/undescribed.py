@@ -64,12 +64,13 @@ def _as_proposed(path: Path, error: UserError) -> TraceSet:
         proposed = yaml.safe_load(propose_dataset(left))
     except UserError:
         raise error from None
-    described = check(DatasetDescription, {**proposed, "name": bare_stem(path), "provenance": str(path)}, where=path)
+    guesses = list(_guesses(found))
+    known = {"name": bare_stem(path), "provenance": str(path), "inferred": guesses}
+    described = check(DatasetDescription, {**proposed, **known}, where=path)
     try:
         traces = load_described(described, path, cache=False)
     except UserError as also:
         raise error if isinstance(error, TraceError) else also from None
-    guesses = list(_guesses(found))
     if guesses:
         told = f"{_told(path, guesses)}. {proposal_of(path)} writes this down, to be corrected"
         warnings.warn(told, GuessedWarning, stacklevel=4)
