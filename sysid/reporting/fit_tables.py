@@ -326,6 +326,7 @@ def data_table(results: Results) -> Table:
             )
             for name, case in results.data.cases.items()
         ),
+        note=" ".join(_sentence(text) for text in results.data.source.splitlines()),
     )
 
 

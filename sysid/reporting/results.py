@@ -232,6 +232,7 @@ class DataRecord(DataSetRecord):
     """The data set of fits."""
 
     sample_time: Number = Field(description="Seconds.")
+    source: str = Field(default="", description="Sentences on where it comes from, and what of it was guessed.")
     cases: dict[str, DataCaseRecord]
 
 
