@@ -27,7 +27,7 @@ class Other:
     Args:
         name: What it is called: by its pipeline, or by its folder.
         whole: It.
-        place: Where it lies, as the YAML has it.
+        place: Where it lies, as the YAML has it; nowhere if it was trained in the same run.
     """
 
     name: str
@@ -56,7 +56,8 @@ class Other:
     @property
     def sentence(self) -> str:
         """Its name, and which one it is."""
-        return f"{self.name} ({self.place}, {digest(strict(self.whole.to_dict()))[:12]}...)"
+        place = f"{self.place}, " if self.place else ""
+        return f"{self.name} ({place}{digest(strict(self.whole.to_dict()))[:12]}...)"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,6 +124,19 @@ class Beside:
         )
         return cls(doubt=doubt, doubting=doubting, mean=mean, averaged=averaged, outputs=tuple(outputs))
 
+    def and_trained(self, name: str, whole: Cascade) -> Beside:
+        """The same, with a whole more that is averaged: one that was trained in the same run.
+
+        Args:
+            name: What it is called.
+            whole: The whole.
+
+        Returns:
+            All of them.
+        """
+        other = Other(name=name, whole=whole, place="")
+        return replace(self, averaged=(*self.averaged, other))
+
     def check(self, whole: Cascade) -> None:
         """Refuse those that cannot stand beside a whole.
 
@@ -151,7 +165,7 @@ class Beside:
         Returns:
             The mean, with the spreads that leave it.
         """
-        if self.mean is None:
+        if self.mean is None or not self.averaged:
             return whole
         return committee(self._members(whole), mean=self.outputs).upstream_of([*self.outputs, *self.mean.spreads])
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from sysid.composite import Composite, TrainingPlan
+from sysid.composite import Composite, Member, TrainingPlan
 from sysid.errors import ConfigError
 from sysid.field_checks import FieldError
 from sysid.models import Limit
@@ -132,7 +132,7 @@ class AssemblyConfig(Words):
     def composite(self) -> Composite:
         """What stands in the whole, as it is trained."""
         return Composite(
-            members=tuple(one.member(self.seed, self.stability.options()) for one in self.members),
+            members=self._fitted,
             fixed=tuple(one.fixed() for one in self.fixed),
             rest=self.rest,
             limits={name: Limit(low=one.low, high=one.high) for name, one in self.limits.items()},
@@ -140,10 +140,25 @@ class AssemblyConfig(Words):
         )
 
     @property
+    def _fitted(self) -> tuple[Member, ...]:
+        return tuple(one.member(self.seed, self.stability.options()) for one in self.members)
+
+    @property
     def _limited_by(self) -> tuple[Parameter, ...]:
         """The parameters of limits, each once if it is declared alike."""
         known = (one for limit in self.limits.values() for one in parameters_from(limit.parameters))
         return tuple(dict.fromkeys(known))
+
+    def seeded(self, seed: int) -> AssemblyConfig:
+        """The same pipeline with another seed.
+
+        Args:
+            seed: The seed.
+
+        Returns:
+            The pipeline.
+        """
+        return self.model_copy(update={"seed": seed})
 
     @property
     def plan(self) -> TrainingPlan:
@@ -243,6 +258,23 @@ class AssemblyConfig(Words):
                 got=f"active_learning, data: {self.active_learning.data}",
                 remedy="name another pool",
             )
+        return self
+
+    @model_validator(mode="after")
+    def _check_seeds(self) -> AssemblyConfig:
+        taught = self.warm_start is None or self.together is not None
+        known = [self]
+        for seed in self.mean.seeds if self.mean else ():
+            again = self.seeded(seed)
+            if not taught or any((one._fitted, one.plan) == (again._fitted, again.plan) for one in known):
+                raise FieldError(
+                    f"seed {seed} would train the same whole again",
+                    expected="mean, seeds: others than seed, in a pipeline that trains with the seed it is given",
+                    got=f"seed: {self.seed}, seeds: {list(self.mean.seeds if self.mean else ())}"
+                    + ("" if taught else ", a warm_start, and nothing that is trained"),
+                    remedy="name other seeds; leave seed out of training, and together in where there is a warm_start",
+                )
+            known.append(again)
         return self
 
     @model_validator(mode="after")

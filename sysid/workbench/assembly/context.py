@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -47,6 +47,7 @@ class Context:
         run: Does the steps.
         digests: SHA-256 of every data set that was read, by name.
         cases: The cases that are scored, once they are loaded.
+        seed: With which the whole is trained once more; ``None`` the first time.
     """
 
     config: AssemblyConfig
@@ -55,6 +56,18 @@ class Context:
     run: Run
     digests: dict[str, str] = field(default_factory=dict)
     cases: list[TraceSet] = field(default_factory=list)
+    seed: int | None = None
+
+    def seeded(self, seed: int) -> Context:
+        """The same run, in which what is trained with another seed is kept apart.
+
+        Args:
+            seed: The seed.
+
+        Returns:
+            The run.
+        """
+        return replace(self, config=self.config.seeded(seed), seed=seed)
 
     @property
     def store(self) -> RunFolder:
@@ -146,12 +159,13 @@ class Context:
         return [one.value for one in done]
 
     def _kept(self, task: Task[Fit]) -> Done[Fit]:
-        key, form, name = _key(task.runs, task.terms), _FORMS[task.kind], task_slug(task.name)
+        key, form, of_seed = _key(task.runs, task.terms), _FORMS[task.kind], OfSeed(self.seed)
+        name = of_seed.name(task_slug(task.name))
         stamp, place = form.stamp.format(name=name), self.store.path / form.place.format(name=name)
         done = self.run.do(
             Step(
                 name=stamp,
-                title=task.title,
+                title=of_seed.title(task.title),
                 make=lambda work: task.make(work.watch(task.limit_s)),
                 key=lambda: key,
                 write=lambda fit: form.write(place, fit),
@@ -160,7 +174,7 @@ class Context:
                 final=is_final,
                 amount=lambda: task.amount,
                 how_long=lambda: _how_long(task.sample),
-                called=task.name,
+                called=of_seed.title(task.name),
                 export=self.export,
             )
         )
@@ -195,7 +209,9 @@ class Context:
         Returns:
             JSON values.
         """
-        file, key = self.store.path / "steps" / f"{slug(decision.name)}.json", _key(decision.runs, decision.terms)
+        key, of_seed = _key(decision.runs, decision.terms), OfSeed(self.seed)
+        name = of_seed.name(slug(decision.name))
+        file = self.store.path / "steps" / f"{name}.json"
 
         def write(values: dict[str, Any]) -> list[Path]:
             write_json(file, values)
@@ -203,8 +219,8 @@ class Context:
 
         return self.run.do(
             Step(
-                name=slug(decision.name),
-                title=decision.title,
+                name=name,
+                title=of_seed.title(decision.title),
                 make=lambda work: dict(json.loads(json.dumps(strict(decision.make(work.say))))),
                 key=lambda: key,
                 write=write,
@@ -247,6 +263,25 @@ class Context:
             What came of it.
         """
         return self.run.do(Step(name=step.name, title=step.title, make=make, outcome=outcome)).value
+
+
+@dataclass(frozen=True)
+class OfSeed:
+    """What is trained once more with another seed is called by it.
+
+    Args:
+        seed: The seed; ``None`` for what is trained the first time.
+    """
+
+    seed: int | None
+
+    def name(self, name: str) -> str:
+        """Of a step and its files."""
+        return name if self.seed is None else f"{name}-seed-{self.seed}"
+
+    def title(self, title: str) -> str:
+        """As people read it."""
+        return title if self.seed is None or not title else f"{title}, seed {self.seed}"
 
 
 def new_runs_of(asked: ActiveLearningConfig, beside: Path) -> ExperimentData:

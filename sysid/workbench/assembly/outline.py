@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from sysid.composite.candidates import CHOOSING, CHOOSING_TITLE, candidate_name, candidate_title
 from sysid.names import slug, task_slug
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.context import new_runs_outlined
+from sysid.workbench.assembly.context import OfSeed, new_runs_outlined
 from sysid.workbench.assembly.estimates import RoundEstimates
 from sysid.workbench.assembly.evaluation import DOUBT, INTERPOLATION, MEMBERS, MONTE_CARLO, SCORING, WHOLE, export_step
 from sysid.workbench.fits.data import unmade_data
@@ -28,7 +29,15 @@ def outline(config: AssemblyConfig, beside: Path, estimates: RoundEstimates) -> 
     Returns:
         The steps in order; active learning may end before its last round.
     """
-    return [*_data(config, beside), *_training(config, beside, estimates), *_proof(config, beside), REPORT]
+    seeds = config.mean.seeds if config.mean else ()
+    again = [_again(one, seed) for seed in seeds for one in _training(config, beside, estimates)]
+    return [*_data(config, beside), *_training(config, beside, estimates), *again, *_proof(config, beside), REPORT]
+
+
+def _again(one: Outlined, seed: int) -> Outlined:
+    """A step of the training with another seed; new runs are those of the first."""
+    apart = OfSeed(None if one.name.startswith("new-runs") else seed)
+    return replace(one, name=apart.name(one.name), title=apart.title(one.title), called=apart.title(one.called))
 
 
 def _data(config: AssemblyConfig, beside: Path) -> list[Outlined]:

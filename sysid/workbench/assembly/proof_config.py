@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Annotated
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -151,6 +152,7 @@ class MeanConfig(BaseModel):
     """The mean of several wholes answers: of the one that is trained here and of others, for every scored output.
 
     Args:
+        seeds: Seeds with which the whole is trained again, each time through all that the pipeline says.
         beside: Bundles of wholes that were trained apart, or runs that left one, seen from the folder of the YAML.
         spread: Outputs whose spread, the largest answer less the smallest, is an output of what is exported too:
             ``BC_spread`` of ``BC``.
@@ -158,8 +160,20 @@ class MeanConfig(BaseModel):
 
     model_config = STRICT
 
-    beside: tuple[str, ...] = Field(min_length=1)
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = ()
+    beside: tuple[str, ...] = ()
     spread: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> MeanConfig:
+        if (not self.seeds and not self.beside) or len(set(self.seeds)) < len(self.seeds):
+            raise FieldError(
+                "that is no mean of several wholes",
+                expected="seeds to train the whole again with, each once, or bundles beside it",
+                got=f"seeds {list(self.seeds)}, beside {list(self.beside)}",
+                remedy="write for example seeds: [1, 2], or beside: [../reports/other/bundle]",
+            )
+        return self
 
     @property
     def spreads(self) -> tuple[str, ...]:

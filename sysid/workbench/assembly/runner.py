@@ -81,8 +81,14 @@ def _run(context: Context, estimates: RoundEstimates) -> AssemblyResults:
         beside.check(stand_in(config.composite, data.data.estimation[0]))  # not when all is trained
     given = {member.mapping.output: swept(context, member) for member in config.members}
     trained = train(config.composite, config.plan, data.data, begin=begin, given=given, keeper=context)
-    said = [one for one in [beside.sentence()] if one]
-    finish = Evaluating(context=context, trained=trained, beside=beside, notes=(*notes, *trained.notes, *said))
+    notes += trained.notes
+    for seed in config.mean.seeds if config.mean else ():
+        other = config.seeded(seed)
+        again = train(other.composite, other.plan, data.data, begin=begin, given=given, keeper=context.seeded(seed))
+        notes += [f"Seed {seed}: {note}" for note in again.notes]
+        beside = beside.and_trained(f"seed {seed}", again.model)
+    notes += [one for one in [beside.sentence()] if one]
+    finish = Evaluating(context=context, trained=trained, beside=beside, notes=tuple(notes))
     results = finish.results(cases, data)
     page = context.run.report(results)
     context.run.then(lambda: finish.track(results, page.value))

@@ -118,6 +118,14 @@ def _averaged(path: Path, into: Path, formats: Sequence[str] | None, mean: Path,
 
     old = read_bundle(path)
     outputs, averaged = [str(one["name"]) for one in old.outputs], check(MeanConfig, read_yaml(mean), where=mean)
+    if averaged.seeds:
+        raise ConfigError(
+            "a bundle is not trained again",
+            where=mean,
+            expected="beside: bundles of wholes that were trained",
+            got=f"seeds: {list(averaged.seeds)}",
+            remedy="say mean, seeds in the pipeline that trained it",
+        )
     asked = None if doubt is None else check(DoubtConfig, read_yaml(doubt), where=doubt)
     names = dict.fromkeys([*outputs, *averaged.spread, *([] if asked is None else [asked.output])])
     whole, others = Other.of_bundle(old, str(path)), Beside.read(asked, averaged, names, mean.parent)

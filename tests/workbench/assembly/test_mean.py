@@ -151,11 +151,35 @@ def test_a_result_of_a_run_is_exported_as_the_mean_that_it_is(workspace: Path, b
     assert both
 
 
+def test_the_mean_of_seeds_is_that_of_runs_with_these_seeds(workspace: Path, both: dict[str, Path]) -> None:
+    text = UNSEEN.replace("seed: 4", "seed: 3") + "mean: {seeds: [4]}\n"
+    (workspace / "pipelines" / "further.yaml").write_text(text, encoding="utf-8")
+    shutil.rmtree(workspace / "runs" / "further")
+    told = CliRunner().invoke(app, ["run", "further", "--dry-run"])
+    assert told.exit_code == 0, told.output
+    assert "Training end to end, seed 4" in " ".join(told.output.split())
+    folder = run(workspace, "further", text)
+    wholes = [read_assembly(both[name]) for name in ("tanks", "plain")]
+    by_hand = committee(wholes, mean=["upper", "lower"]).upstream_of(["upper", "lower"])
+    assert as_json(read_assembly(folder)) == as_json(by_hand)
+    assert assembly_results(folder).mean[1] == "seed 4"
+    stored = folder / "together-seed-4.json"
+    stamp = stored.stat().st_mtime_ns
+    run(workspace, "further", text)
+    assert stored.stat().st_mtime_ns == stamp
+    named = ["export", "further", "--fit", "upper -> lower 0, seed 4", "--out", str(workspace / "member")]
+    told = CliRunner().invoke(app, named)
+    assert told.exit_code == 0, told.output
+    assert read_bundle(workspace / "member").model.mapping.output == "lower"
+
+
 @pytest.mark.parametrize(
     ("changed", "complaint"),
     [
         (("beside: [../runs/tanks/bundle]", "beside: []"), "beside"),
         (("beside: [../runs/tanks/bundle]", "beside: [../runs/nobody]"), "nobody"),
+        (("spread: [lower]", "seeds: [3]"), "seed 3 would train the same whole again"),
+        (("spread: [lower]", "seeds: [5, 5]"), "no mean of several wholes"),
         (("spread: [lower]", "spread: [middle]"), "mean, spread names middle"),
         (("data: calm", "data: calm, beside: [../runs/tanks/bundle]"), "doubted by the spread"),
     ],
