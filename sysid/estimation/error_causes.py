@@ -143,7 +143,7 @@ def _standing(y: Array, s: Array, usable: Mask) -> str:
     return ""
 
 
-def _of_inputs(groups: dict[str, Array], target: Array, usable: Mask) -> str:
+def _of_inputs(groups: dict[str, list[Array]], target: Array, usable: Mask) -> str:
     """A sentence where the inputs explain a signal, on halves of the record that did not choose how."""
     found = {kind: _explained(columns, target, usable) for kind, columns in groups.items()}
     most = max(found.values())
@@ -162,7 +162,7 @@ def _of_inputs(groups: dict[str, Array], target: Array, usable: Mask) -> str:
     return f"{share}{how} starts. (Or {{inputs}} is fed back from {{name}}.)"
 
 
-def _explained(columns: Array, target: Array, usable: Mask) -> float:
+def _explained(columns: list[Array], target: Array, usable: Mask) -> float:
     """The part of a signal that some of the columns explain on the half of a record that did not choose them.
 
     Both are taken less what the signal's own last sample says of it, as two things that wander explain each other; or
@@ -182,34 +182,33 @@ def _explained(columns: Array, target: Array, usable: Mask) -> float:
     return best
 
 
-def _news(signals: Array, part: float, rows: NDArray[np.int64]) -> Array:
-    """Signals at the samples after some, less a part of these and their mean."""
-    news: Array = signals[rows + 1]
-    now, before = np.atleast_2d(news.T), np.atleast_2d(signals.T)
-    for j in range(len(now)):  # one after the other: of a long record each copy of all is many MB
-        now[j] -= part * before[j][rows]
-    news -= news.mean(axis=0)
-    return news
+def _news(signal: Array, part: float, rows: NDArray[np.int64]) -> Array:
+    """A signal at the samples after some, less a part of these and their mean."""
+    news = signal[rows + 1] - part * signal[rows]
+    return np.asarray(news - news.mean(), dtype=np.float64)
 
 
-def _of_half(columns: Array, target: Array, part: float, here: NDArray[np.int64], there: NDArray[np.int64]) -> float:
-    chosen, weights, _ = _pursued(_news(columns, part, here), _news(target, part, here))
+def _of_half(
+    columns: list[Array], target: Array, part: float, here: NDArray[np.int64], there: NDArray[np.int64]
+) -> float:
+    chosen, weights, _ = _pursued([_news(column, part, here) for column in columns], _news(target, part, here))
     other = _news(target, part, there)
-    left = other - _news(columns[:, chosen], part, there) @ weights
+    left = other - np.column_stack([_news(columns[j], part, there) for j in chosen]) @ weights
     return 1.0 - float(left @ left) / max(float(other @ other), 1e-300)
 
 
-def _pursued(columns: Array, target: Array) -> tuple[list[int], Array, Array]:
+def _pursued(columns: list[Array], target: Array) -> tuple[list[int], Array, Array]:
     """The few columns that explain a signal best (orthogonal matching pursuit), their weights, and what they leave."""
-    lengths, chosen = np.maximum(np.sqrt(np.einsum("ij,ij->j", columns, columns)), TINY), list[int]()
+    lengths, chosen = np.array([max(float(np.sqrt(one @ one)), TINY) for one in columns]), list[int]()
     weights: Array = np.empty(0, dtype=np.float64)
     left: Array = target
-    for _ in range(min(TERMS, columns.shape[1])):
-        products = np.abs(columns.T @ left) / lengths
+    for _ in range(min(TERMS, len(columns))):
+        products = np.abs([one @ left for one in columns]) / lengths
         products[chosen] = 0.0
         chosen.append(int(np.argmax(products)))
-        weights = np.asarray(np.linalg.lstsq(columns[:, chosen], target, rcond=None)[0], dtype=np.float64)
-        left = target - columns[:, chosen] @ weights
+        few = np.column_stack([columns[j] for j in chosen])
+        weights = np.asarray(np.linalg.lstsq(few, target, rcond=None)[0], dtype=np.float64)
+        left = target - few @ weights
     return chosen, weights, left
 
 
@@ -230,7 +229,7 @@ def _moves_with(y: Array, s: Array, usable: Mask, parameters: int) -> bool:
     return by_chance(share, used, max(1, len(new) - used)) < BY_CHANCE
 
 
-def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[str, Array], usable: Mask) -> str:
+def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[str, list[Array]], usable: Mask) -> str:
     y, s = signals
     if not float(np.std((y - s)[usable])) > FAR or _moves_with(y, s, usable, model.n_parameters):
         return ""
@@ -243,18 +242,16 @@ def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[st
     )
 
 
-def _drift(groups: dict[str, Array], y: Array, usable: Mask, name: str) -> str:
+def _drift(groups: dict[str, list[Array]], y: Array, usable: Mask, name: str) -> str:
     """A sentence where a straight line in time is what the inputs leave of the output."""
-    columns, target = groups[CURVES][usable], y[usable] - y[usable].mean()
-    columns -= columns.mean(axis=0)
+    target = y[usable] - y[usable].mean()
+    columns = [column - column.mean() for column in (of_all[usable] for of_all in groups[CURVES])]
     line = np.linspace(-0.5, 0.5, len(y))[usable]
     line = (line - line.mean()) / np.linalg.norm(line - line.mean())
     *_, without = _pursued(columns, target)
     flat = target - line * (line @ target)
-    along = line @ columns
-    for j, part in enumerate(along):
-        columns[:, j] -= line * part
-    chosen, weights, within = _pursued(columns, flat)
+    along = np.array([line @ column for column in columns])
+    chosen, weights, within = _pursued([one - line * part for one, part in zip(columns, along, strict=True)], flat)
     if not within @ within < STRAIGHT * (without @ without) or not np.std(without) > WORTH:
         return ""
     slope = float(line @ target - along[chosen] @ weights) * float(np.ptp(line))

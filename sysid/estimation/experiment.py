@@ -128,7 +128,7 @@ class Experiment:
         weights = None if usable.all() else usable.astype(np.float64)
         if trace.weights is not None:
             weights = usable * trace.weights[n:]
-        counts = np.ones(len(usable)) if trace.weights is None else trace.weights[n:]
+        counts = np.ones(1) if trace.weights is None else trace.weights[n:]
         return cls(
             inputs=inputs[n:],
             output=bridged(output, whole if each is None else each)[n:],

@@ -23,7 +23,7 @@ WIDTHS = (0.1, 0.2, 0.35)
 MOST_INPUTS = 4
 
 
-def features(inputs: Array, simulated: Array) -> dict[str, Array]:
+def features(inputs: Array, simulated: Array) -> dict[str, list[Array]]:
     """Signals that a model of some inputs may have left out.
 
     Args:
@@ -31,7 +31,8 @@ def features(inputs: Array, simulated: Array) -> dict[str, Array]:
         simulated: Free run of one output, shape ``(n_samples,)``, for curves behind it.
 
     Returns:
-        By kind the columns of it and of all simpler kinds before it, shape ``(n_samples, n)``: of one array.
+        By kind those of it and of all simpler kinds before it, each of shape ``(n_samples,)``: apart, as a hundred of
+        them side by side are more memory in one piece than a process has free.
     """
     u = inputs[:, :MOST_INPUTS]
     u = (u - u.mean(axis=0)) / np.maximum(u.std(axis=0), np.finfo(np.float64).tiny)
@@ -51,14 +52,11 @@ def features(inputs: Array, simulated: Array) -> dict[str, Array]:
             linear.append(slow)
         curves += [_slowed(bent, memory), *(_curves(one) for one in _slowed(u, memory).T)]
         plays += [_slowed(held, memory)]
-    ends = np.cumsum([sum(part.shape[1] for part in parts) for parts in (linear, curves, plays)])
-    whole, at = np.empty((len(u), ends[-1])), 0
-    for parts in (linear, curves, plays):
-        while parts:  # none stands there twice for longer than it is copied
-            part = parts.pop(0)
-            whole[:, at : at + part.shape[1]] = part
-            at += part.shape[1]
-    return {kind: whole[:, :end] for kind, end in zip((LINEAR, CURVES, PLAYS), ends, strict=True)}
+    found, kinds = list[Array](), dict[str, list[Array]]()
+    for kind, parts in ((LINEAR, linear), (CURVES, curves), (PLAYS, plays)):
+        found = found + [np.ascontiguousarray(column) for part in parts for column in part.T]
+        kinds[kind] = found
+    return kinds
 
 
 def _late(x: Array) -> Array:

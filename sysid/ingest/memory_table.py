@@ -78,7 +78,8 @@ def _digest(columns: Mapping[str, NDArray[Any]]) -> str:
     sha = hashlib.sha256()
     for key, array in columns.items():
         sha.update(key.encode(errors="replace"))
-        sha.update(np.ascontiguousarray(array).tobytes() if array.dtype.kind != "O" else repr(array.tolist()).encode())
+        plain = array.dtype.kind != "O"
+        sha.update(np.ascontiguousarray(array).view(np.uint8).data if plain else repr(array.tolist()).encode())
     return sha.hexdigest()[:16]
 
 

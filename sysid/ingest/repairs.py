@@ -301,8 +301,10 @@ def repeated_values(record: Record, repairs: RepairOptions) -> Record:
         ConfigError: If a repair is asked for a channel that is not there.
     """
     _check_names(record, repairs)
+    if not repairs.repeats:
+        return record
     marked = record.marked.copy()
-    for name in repairs.repeats or {}:
+    for name in repairs.repeats:
         at = record.names.index(name)
         column = record.values[:, at]
         again = np.r_[False, column[1:] == column[:-1]]
@@ -326,8 +328,10 @@ def drifts(record: Record, repairs: RepairOptions) -> Record:
         ConfigError: If a repair is asked for a channel that is not there.
     """
     _check_names(record, repairs)
+    if not repairs.drift:
+        return record
     values = record.values.copy()
-    for name in repairs.drift or {}:
+    for name in repairs.drift:
         at = record.names.index(name)
         column, seen = values[:, at], ~record.marked[:, at]
         if np.ptp(record.stamps[seen]) if seen.any() else False:
@@ -335,7 +339,7 @@ def drifts(record: Record, repairs: RepairOptions) -> Record:
             slope = float(away[seen] @ (column[seen] - column[seen].mean()) / (away[seen] @ away[seen]))
             column -= slope * away
             record = record.noted(f"{name}: a straight line of {slope:.6g} a second taken off, its mean left")
-    return replace(record, values=values) if repairs.drift else record
+    return replace(record, values=values)
 
 
 def _check_names(record: Record, repairs: RepairOptions) -> None:

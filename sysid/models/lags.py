@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -136,7 +137,7 @@ class Lags:
         """Number of regressors."""
         return sum(len(lags) for lags in self.inputs) + len(self.output)
 
-    @property
+    @cached_property
     def depth(self) -> int:
         """Past samples needed before the first step."""
         return max([0, *self.output, *(lag for lags in self.inputs for lag in lags)])

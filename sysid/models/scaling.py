@@ -94,11 +94,15 @@ class Scaling:
 
     def scale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in the model's numbers, any shape."""
-        return (output - self.output_offset) / self.output_scale
+        scaled = output - self.output_offset
+        scaled /= self.output_scale  # in place, as above
+        return scaled
 
     def unscale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in the channel's unit, any shape."""
-        return output * self.output_scale + self.output_offset
+        values = output * self.output_scale
+        values += self.output_offset
+        return values
 
     def unscale_columns(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled outputs, shape ``(n_samples, 1)``, in the channel's unit and without that axis."""
@@ -147,15 +151,21 @@ class VectorScaling:
 
     def scale_inputs(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Inputs in the model's numbers, shape ``(n_samples, n_inputs)``."""
-        return np.ascontiguousarray((inputs - np.array(self.input_offset)) / np.array(self.input_scale))
+        scaled = np.ascontiguousarray(inputs - np.array(self.input_offset))
+        scaled /= np.array(self.input_scale)  # in place: of a long record each copy is many MB
+        return scaled
 
     def scale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in the model's numbers, the last axis that of the outputs."""
-        return np.asarray((output - np.array(self.output_offset)) / np.array(self.output_scale))
+        scaled = np.asarray(output - np.array(self.output_offset))
+        scaled /= np.array(self.output_scale)
+        return scaled
 
     def unscale_output(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in the channels' units, the last axis that of the outputs."""
-        return np.asarray(output * np.array(self.output_scale) + np.array(self.output_offset))
+        values = np.asarray(output * np.array(self.output_scale))
+        values += np.array(self.output_offset)
+        return values
 
     def unscale_columns(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled outputs, shape ``(n_samples, n_outputs)``, in the channels' units."""

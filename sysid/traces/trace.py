@@ -256,7 +256,7 @@ class Trace:
         """SHA-256 over everything that a fit can see: time, channels, values, mask and weights."""
         head = [self.start_time, self.sample_time, [[c.name, c.unit, c.reference.value] for c in self.channels]]
         sha = hashlib.sha256(json.dumps(head).encode())
-        sha.update(self.values.tobytes())
+        sha.update(self.values.data.cast("B"))  # of itself: a long record is not copied
         mask = self.usable_samples if self.usable is None else self.usable  # of channels it has more bits
         sha.update(np.packbits(mask).tobytes())
         if self.weights is not None:

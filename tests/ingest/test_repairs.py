@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from sysid.errors import ConfigError, TraceError, UserError
 from sysid.ingest import RepairOptions
+from sysid.ingest.memory_table import table_of
+from sysid.ingest.repairs import Record, drifts, repeated_values
 from tests.ingest.one_channel import EVEN, NAN, Done, N, Refused, check_done, check_refused, make, ramp
 
 GAP = EVEN[:5] + EVEN[8:]
@@ -259,3 +261,14 @@ def test_a_jittered_line_resampled_is_the_line(
     slack = 3.0 * 0.011 * sample_time
     assert error.min() >= -slack
     assert error.max() <= lag + slack
+
+
+@pytest.mark.parametrize("repair", [drifts, repeated_values])
+def test_samples_of_which_nothing_is_asked_are_not_copied(repair: Any) -> None:
+    values, stamps = np.arange(6.0).reshape(3, 2), np.arange(3.0)
+    columns = {"u": values[:, 0], "y": values[:, 1]}
+    marked = np.zeros((3, 2), dtype=np.bool_)
+    record = Record(
+        table=table_of(columns, name="record"), stamps=stamps, names=("u", "y"), values=values, marked=marked
+    )
+    assert repair(record, RepairOptions()) is record

@@ -317,8 +317,9 @@ class LevenbergMarquardt:
             if gain > MIN_GAIN:
                 at = provider.linearise(trial) if self._asks(state.iteration + 1) else provider.without_news(trial)
                 if at.finite:
-                    state = replace(state, theta=trial, at=at, damping=damping.accepted(gain))
-                    return self._with_evidence(replace(state, iteration=state.iteration + 1), provider)
+                    damping, further = damping.accepted(gain), state.iteration + 1
+                    state = replace(state, theta=trial, at=at, damping=damping, iteration=further)
+                    return self._with_evidence(state, provider)
             damping = damping.rejected()
         return replace(state, damping=damping, iteration=state.iteration + 1)
 

@@ -65,8 +65,8 @@ def left_on(
     """
 
     def lost(inputs: NDArray[np.float64], history: History | None) -> bool:
-        scaled = model.scaling.scale_output(model.simulate(inputs, history))
-        return not bool(np.all(np.abs(scaled) < model.clamp * (1.0 - 1e-9)))
+        scaled = np.asarray(model.scaling.scale_output(model.simulate(inputs, history)))
+        return not max(float(scaled.max()), -float(scaled.min())) < model.clamp * (1.0 - 1e-9)  # without a copy
 
     return tuple(dict.fromkeys(name for name, run in zip(names, runs, strict=True) if lost(*run)))
 

@@ -188,12 +188,17 @@ class NeuralProvider(AbstractProvider):
         """Half the weighted sum of squared residuals; see the base class."""
         total = 0.0
         for record in self._records:
-            y = np.empty(record.target.shape)
-            kernel.free_run(record.u, self._begin(record, theta), *self.template.arguments(theta), y)
-            residual = record.weighted(y - record.target)
+            residual = record.weighted(self._error(record, theta))
             with np.errstate(over="ignore", invalid="ignore"):  # a free run that explodes has no loss
                 total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
+
+    def _error(self, record: _Record, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The free run less what was measured, in one array: a long record's is many MB."""
+        y = np.empty(record.target.shape)
+        kernel.free_run(record.u, self._begin(record, theta), *self.template.arguments(theta), y)
+        y -= record.target
+        return y
 
     def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
@@ -267,10 +272,13 @@ class NeuralProvider(AbstractProvider):
         """
         total, counted = np.zeros(self.template.sizes.outputs), np.zeros(self.template.sizes.outputs)
         for record in self._records:
-            y = np.empty(record.target.shape)
-            kernel.free_run(record.u, self._begin(record, theta), *self.template.arguments(theta), y)
-            weights = np.ones((len(y), 1)) if record.root_weights is None else record.root_weights**2
-            total += np.sum(weights * (y - record.target) ** 2, axis=0)
+            squares = self._error(record, theta)
+            squares *= squares
+            if record.root_weights is None:
+                total, counted = total + np.sum(squares, axis=0), counted + len(squares)
+                continue
+            weights = record.root_weights**2
+            total += np.sum(weights * squares, axis=0)
             counted += weights.sum(axis=0)  # with the weights of outputs, which thus are none
         return np.asarray(total / counted)
 
