@@ -39,6 +39,8 @@ from sysid.traces import Channel, Trace
 STARTING_S = 120.0
 """Seconds that loading a reference may take."""
 TOO_LONG = "it was not done after"
+FROM_OUTSIDE = ("by signal SIGTERM", "by signal SIGINT", "by signal SIGHUP")
+"""How a run ends that a batch system, a container or a person has ended: that says nothing of the experiment."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -120,14 +122,18 @@ class _Process:
             raise TimeoutError from None
         return dict(json.loads(line)) if line else None
 
-    def end(self) -> str:
-        """End it and all that it started; gives how it ended, in words."""
-        code = self.process.poll()
+    def kill(self) -> None:
+        """Kill it and all that it started; who waits for its answer hears that it has ended."""
         if hasattr(os, "killpg"):
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(self.process.pid, signal.SIGKILL)
         else:
             self.process.kill()
+
+    def end(self) -> str:
+        """End it and all that it started; gives how it ended, in words."""
+        code = self.process.poll()
+        self.kill()
         code = self.process.wait() if code is None else code
         self.errors.seek(0)
         said = self.errors.read()[-2000:].decode(errors="replace").strip().splitlines()[-1:]
@@ -161,6 +167,8 @@ class ReferenceRuns:
     folder: Path = field(default_factory=default_cache_folder)
     fresh: bool = False
     _idle: list[_Process] = field(default_factory=list, repr=False)
+    _at_work: set[_Process] = field(default_factory=set, repr=False)
+    _stopped: threading.Event = field(default_factory=threading.Event, repr=False)
     _digest: str = field(default="", repr=False)
 
     def __enter__(self) -> ReferenceRuns:
@@ -280,8 +288,12 @@ class ReferenceRuns:
                     if progress is not None:
                         progress(one.case.name, len(found), len(cases))
             except BaseException:
+                # Leaving the pool waits for what runs, be that an hour: it is ended, and none of it is kept.
+                self._stopped.set()
                 for begun in waiting:
                     begun.cancel()
+                for process in list(self._at_work):
+                    process.kill()
                 raise
         # Those that gave no record too: a reference that hangs in one of ten takes as long as that.
         made = [one for one in found.values() if not one.stored]
@@ -301,18 +313,30 @@ class ReferenceRuns:
         return self._made(case)
 
     def _one(self, case: Case, until: float) -> Outcome | None:
-        if time.monotonic() > until:
+        if self._stopped.is_set() or time.monotonic() > until:
             return None
         key = self.key(case)
         kept = None if self.fresh else self._kept(case, key)
         if kept is not None:
             return kept
         outcome = self._made(case)
-        self._keep(key, outcome)
+        if self._stopped.is_set():
+            return None
+        if not any(how in (outcome.reason or "") for how in FROM_OUTSIDE):
+            self._keep(key, outcome)
         return outcome
 
     def _made(self, case: Case) -> Outcome:
         process = self._worker()
+        self._at_work.add(process)
+        if self._stopped.is_set():  # while it was started
+            process.kill()
+        try:
+            return self._answered(process, case)
+        finally:
+            self._at_work.discard(process)
+
+    def _answered(self, process: _Process, case: Case) -> Outcome:
         began = time.perf_counter()
         with _exchange() as (given, made):
             np.save(given, case.inputs, allow_pickle=False)

@@ -198,6 +198,13 @@ def crashes(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
     return inputs[:, :1]
 
 
+def ends_itself(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """Is ended by a signal, as if somebody had sent it."""
+    os.kill(os.getpid(), int(parameters["signal"]))
+    clock.sleep(60.0)
+    return inputs[:, :1]
+
+
 def leaves_numbers(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """Is not a number from 10 s on where the input goes above 1."""
     y = inputs[:, 0].copy()

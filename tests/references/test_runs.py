@@ -225,6 +225,32 @@ sys.exit(3 if how == "three" else 0)
 what it does beside that."""
 
 
+def test_who_stops_a_study_does_not_wait_for_the_run_that_is_made_and_nothing_of_it_is_kept(tmp_path: Path) -> None:
+    config = reference("hangs", time_limit=600.0)
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    began = time.monotonic()
+    with ReferenceRuns(config=config, folder=tmp_path, workers=2) as runs:
+        _ = runs.digest
+        with pytest.raises(KeyboardInterrupt):
+            runs.run(CASES[:2], stop)  # the second hangs for ten minutes
+        assert time.monotonic() - began < 300.0
+        assert runs.kept(CASES[:2]) == 1
+
+
+@pytest.mark.parametrize(("name", "kept"), [("SIGTERM", 0), ("SIGABRT", 1)])
+def test_a_run_that_is_ended_from_outside_says_nothing_of_its_experiment(name: str, kept: int, tmp_path: Path) -> None:
+    """As by a container that stops, which tells every process of it."""
+    config = reference("ends_itself", parameters={"signal": {"range": [1, 20]}})
+    case = Case(name="a", inputs=np.ones((5, 1)), parameters={"signal": float(getattr(signal, name))})
+    with ReferenceRuns(config=config, folder=tmp_path, workers=1) as runs:
+        (one,) = runs.run([case])
+        assert f"it ended its process by signal {name}" in str(one.reason)
+        assert runs.kept([case]) == kept
+
+
 ENDS = {
     "well": None,
     "minutes": None,

@@ -64,4 +64,6 @@ def inverse_of(factor: NDArray[np.float64]) -> NDArray[np.float64]:
     Returns:
         The same shape.
     """
+    if not len(factor):  # LAPACK prints that it has an illegal value
+        return factor
     return np.asarray(lapack.dtrtrs(factor, np.eye(len(factor)), lower=1)[0])

@@ -1,13 +1,15 @@
 """Find in records what is linear from sample to sample and reset at events, as a ball that bounces.
 
 Samples that one linear map leads to are the flow; the others are events. An event is told by a level that a reference
-which looks for it so many times a sample reaches at every event, and at no other sample. What it sets the outputs to is
-seen by running the flow backwards from the sample behind it. A reference without noise fits exactly or not at all: what
-is not near enough is no such thing, and is left to the search.
+which looks for it so many times a sample reaches at every event, and at no other sample: of an output, an input, or the
+difference of both; of a relay with two levels, while its output is at one of its two values. What it sets the outputs
+to is seen by running the flow backwards from the sample behind it. A reference without noise fits exactly or not at
+all: what is not near enough is no such thing, and is left to the search.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +19,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.estimation.resets.reset_map import Array, Guard, ResetMap, Rest, features
+from sysid.estimation.resets.quotients import ratios_of
+from sysid.estimation.resets.reset_map import Armed, Array, Guard, ResetMap, Rest, features, quantity, with_ratios
 
 STEPS: Final = (1, 2, 4, 5, 8, 10, 16, 20)
 """Times in a sample that a reference may look for events."""
@@ -32,6 +35,8 @@ STANDS: Final = 1e-9
 """Share of the range within which an output stands."""
 DRAWS, LOOKED = 400, 4000
 """Times that samples are drawn at random to find what most of them follow, and samples on which that is seen."""
+MOST_BEGINS: Final = 8
+"""Records whose beginning is tried for that of all."""
 SAMPLES: Final = 40_000
 """Of all records, at most."""
 
@@ -60,6 +65,7 @@ def found_resets(records: Sequence[tuple[Array, Array]], *, seed: int = 0) -> Re
 
     Returns:
         The map that has fewest looks for events a sample among those that fit best; ``None`` where there is none.
+        Quotients by inputs that stand still over a record are looked for where there is none without.
 
     Example:
         >>> h, v, fall = 1.0, 0.0, []
@@ -71,19 +77,57 @@ def found_resets(records: Sequence[tuple[Array, Array]], *, seed: int = 0) -> Re
         >>> found.steps, found.guards[0].level, found.guards[0].reset.round(6).tolist()
         (1, 0.0, [[0.0, 0.0], [0.0, -0.8], [0.0, 0.0]])
     """
+    found = _found(records, seed)
+    ratios = ratios_of([u for u, _ in records]) if found is None else ()
+    if not ratios:
+        return found
+    found = _found([(with_ratios(u, ratios), y) for u, y in records], seed)
+    return None if found is None else replace(found, ratios=ratios)
+
+
+def switches(outputs: Array) -> list[Armed]:
+    """Outputs that have two values, as a relay has.
+
+    Args:
+        outputs: Of all records, shape ``(n_samples, n_outputs)``.
+
+    Returns:
+        Of each where it is at the lower one, and where at the higher.
+
+    Example:
+        >>> [(one.output, one.sign, one.level) for one in switches(np.array([[0.1, 0.0], [0.2, 1.0], [0.3, 1.0]]))]
+        [(1, 1, 0.5), (1, -1, 0.5)]
+    """
+    found = []
+    for k, column in enumerate(outputs.T):
+        low, high = column.min(), column.max()
+        if low < high and bool(((column == low) | (column == high)).all()):
+            found += [Armed(output=k, sign=sign, level=float(low + high) / 2.0) for sign in (1, -1)]
+    return found
+
+
+def _found(records: Sequence[tuple[Array, Array]], seed: int) -> ResetMap | None:
     steps, rng = _steps_of(records), np.random.default_rng(seed)
     if steps is None:
         return None
+    two = sorted({one.output for one in switches(np.vstack([steps.before, steps.after]))})
+    own = [k for k in range(len(steps.span)) if k not in two]
+    moves = ~_within(steps.after[:, own] - steps.before[:, own], steps.span[own], STANDS)
     for near in NEAR:
-        moves = ~_still(steps)
-        flow = _common(steps.terms, steps.after, steps.span, near, rng=rng, among=moves)
-        if flow is None:
+        flow = np.eye(steps.terms.shape[1])[:, : len(steps.span)]  # of a relay, between its events
+        found = _common(steps.terms, steps.after[:, own], steps.span[own], near, rng=rng, among=moves) if own else None
+        if own and found is None:
             continue
+        flow[:, own] = flow[:, own] if found is None else found
         led = _within(steps.terms @ flow - steps.after, steps.span, near)
-        if led[moves].mean() < FLOWS or led.all():
+        if (own and led[moves].mean() < FLOWS) or led.all():
             continue
         best = max(
-            (_with_events(steps, flow.T, led, n, near=near, rng=rng) for n in STEPS),
+            (
+                _with_events(steps, flow.T, led, n, looks_first=first, near=near, rng=rng)
+                for n in STEPS
+                for first in (False, True)
+            ),
             key=lambda one: 0.0 if one is None else one[0],
         )
         if best is not None and best[0] >= RESETS:
@@ -187,25 +231,27 @@ def _plain(found: Array, terms: Array, values: Array, span: Array, near: float) 
 
 
 def _with_events(
-    steps: _Steps, flow: Array, led: NDArray[np.bool_], n: int, *, near: float, rng: np.random.Generator
-) -> tuple[float, ResetMap] | None:
+    steps: _Steps, flow: Array, led: NDArray[np.bool_], n: int, *, looks_first: bool, near: float,
+    rng: np.random.Generator,
+) -> tuple[float, ResetMap] | None:  # fmt: skip
     """The map where the reference looks for events so often, and the share of the events that it leads through."""
     part = _root(flow, n)
-    if part is None:
+    # What a flow forgets within a step cannot be seen by running it backwards.
+    if part is None or np.linalg.matrix_rank(part[:, : len(part)]) < len(part):
         return None
-    path, at = [], steps.terms.T
+    path, at = [steps.before.T], steps.terms.T
     for _ in range(n):
         at = np.vstack([part @ at, at[len(part) :]])
         path.append(at[: len(part)])
-    runs, open_ = np.array(path), ~led  # runs: (n, n_outputs, samples)
+    runs, open_ = np.array(path[:-1] if looks_first else path[1:]), ~led  # runs: (n, n_outputs, samples)
+    left = np.arange(n, 0, -1) - (0 if looks_first else 1)  # steps from each look to the sample behind
     still, guards, through = _still(steps), [], 0
     for _ in range(MOST_GUARDS):
-        found = _guard(runs, led, open_)
+        found = _guard(steps, runs, led, open_)
         if found is None:
             break
-        output, sign, level = found
-        here = open_ & (sign * runs[:, output] <= sign * level).any(axis=0)
-        guard, led_through = _reset(steps, part, runs, here & ~still, (output, sign, level), near=near, rng=rng)
+        here = open_ & _reached(found, steps, runs).any(axis=0)
+        guard, led_through = _reset(steps, part, runs, here & ~still, found, left=left, near=near, rng=rng)
         open_ = open_ & ~here
         if guard is not None:
             guards.append(guard)
@@ -213,8 +259,14 @@ def _with_events(
     events = int((~led & ~still).sum())
     if not guards or not events:
         return None
-    rest = _rest(steps, runs, guards, ~led, still)
-    return through / events, ResetMap(flow=part, steps=n, guards=tuple(guards), rest=rest, begin=steps.before[0])
+    rest, begin = _rest(steps, runs, guards, ~led, still), steps.before[0]
+    made = ResetMap(flow=part, steps=n, guards=tuple(guards), rest=rest, begin=begin, looks_first=looks_first)
+    return through / events, made
+
+
+def _reached(guard: Guard, steps: _Steps, runs: Array) -> NDArray[np.bool_]:
+    """At which look of each sample it is the event, shape ``(n, samples)``."""
+    return guard.reached(runs.swapaxes(0, 1), steps.inputs.T[:, np.newaxis])
 
 
 def _root(flow: Array, n: int) -> Array | None:
@@ -230,18 +282,29 @@ def _root(flow: Array, n: int) -> Array | None:
     return np.where(np.abs(part[:p]) < 1e-14 * np.abs(part[:p]).max(), 0.0, part[:p]) if near else None
 
 
-def _guard(runs: Array, led: NDArray[np.bool_], open_: NDArray[np.bool_]) -> tuple[int, int, float] | None:
-    """The output and the level that most of the open events reach, and no sample of the flow."""
-    best, most = None, FEWEST - 1
-    for output in range(runs.shape[1]):
-        for sign in (1, -1):
-            least = (sign * runs[:, output]).min(axis=0)
-            edge = least[led].min()
-            reach = open_ & (least < edge)
+def _guard(steps: _Steps, runs: Array, led: NDArray[np.bool_], open_: NDArray[np.bool_]) -> Guard | None:
+    """The level that most of the open events reach, and no sample of the flow; it has yet to be seen what it does."""
+    best, most, outputs = None, FEWEST - 1, runs.swapaxes(0, 1)
+    rows, none = _rows(len(outputs), steps.inputs.shape[1]), np.zeros((0, 0))
+    for some, armed in itertools.product(rows, (None, *switches(steps.before))):
+        counts = np.ones(len(led), dtype=bool) if armed is None else armed(steps.before.T)
+        flows, events = led & counts, open_ & counts
+        if not flows.any() or events.sum() <= most:
+            continue
+        for row, sign in itertools.product(some, (1, -1)):
+            least = (sign * quantity(row, outputs, steps.inputs.T[:, np.newaxis])).min(axis=0)
+            edge = least[flows].min()
+            reach = events & (least < edge)
             if reach.sum() > most:
-                low = float(least[reach].max())
-                most, best = int(reach.sum()), (output, sign, sign * simplest(low, float(edge)))
+                level = sign * simplest(float(least[reach].max()), float(edge))
+                most, best = int(reach.sum()), Guard(row=row, sign=sign, level=level, reset=none, armed=armed)
     return best
+
+
+def _rows(p: int, m: int) -> tuple[list[Array], list[Array]]:
+    """What a level may be of: an output or an input; an output beside an input."""
+    own = np.eye(p + m)
+    return list(own), [own[j] - own[p + k] for j in range(p) for k in range(m)]
 
 
 def simplest(low: float, high: float) -> float:
@@ -269,23 +332,22 @@ def simplest(low: float, high: float) -> float:
 
 
 def _reset(
-    steps: _Steps, part: Array, runs: Array, here: NDArray[np.bool_], guard: tuple[int, int, float], *, near: float,
-    rng: np.random.Generator,
+    steps: _Steps, part: Array, runs: Array, here: NDArray[np.bool_], guard: Guard, *, left: NDArray[np.int64],
+    near: float, rng: np.random.Generator,
 ) -> tuple[Guard | None, int]:  # fmt: skip
     """What an event sets the outputs to, and in how many of these samples it does."""
-    output, sign, level = guard
     places = np.flatnonzero(here)
     if len(places) < FEWEST:
         return None, 0
-    first = (sign * runs[:, output, places] <= sign * level).argmax(axis=0)
+    first = _reached(guard, steps, runs)[:, places].argmax(axis=0)
     met, inputs = runs[first, :, places].T, steps.inputs[places].T
     terms = features(met, inputs)
-    set_to = _backwards(steps, part, places, len(runs) - 1 - first)
+    set_to = _backwards(steps, part, places, left[first])
     some = _common(terms, set_to, steps.span, 10.0 * near, rng=rng, among=np.ones(len(places), dtype=bool))
     if some is None:
         return None, 0
     led = _within(terms @ some - set_to, steps.span, 10.0 * near)
-    return Guard(output=output, sign=sign, level=level, reset=some), int(led.sum())
+    return replace(guard, reset=some), int(led.sum())
 
 
 def _backwards(steps: _Steps, part: Array, places: NDArray[np.int64], by: NDArray[np.int64]) -> Array:
@@ -310,7 +372,7 @@ def _rest(
     ends = events & _within(steps.after - values, steps.span, STANDS)
     to, told = np.full((runs.shape[1], runs.shape[2]), np.nan), np.zeros(runs.shape[2], dtype=bool)
     for guard in guards[::-1]:
-        hit = guard.sign * runs[:, guard.output] <= guard.sign * guard.level
+        hit = _reached(guard, steps, runs)
         own = hit.any(axis=0) & events
         met = runs[hit.argmax(axis=0), :, np.arange(runs.shape[2])].T
         set_to = (features(met, steps.inputs.T) @ guard.reset).T
@@ -347,7 +409,10 @@ def _begin(records: Sequence[tuple[Array, Array]], found: ResetMap) -> Array | N
     far = np.linalg.matrix_power(whole, found.steps)
     begins = np.array([np.linalg.solve(far, np.concatenate([y[0], u[0], [1.0]]))[:p] for u, y in records])
     span = np.ptp(np.concatenate([y for _, y in records]), axis=0)
-    if not (np.ptp(begins, axis=0) <= 1e-6 * span).all():
-        return None
-    begin = np.median(begins, axis=0)
-    return np.where(np.abs(begin) < 1e-12 * max(1.0, float(np.abs(begin).max())), 0.0, begin)
+    # Backwards through an event it is another place: some begin without one, and from there all are led.
+    for begin in (np.median(begins, axis=0), *begins[:MOST_BEGINS]):
+        clean = np.where(np.abs(begin) < 1e-12 * max(1.0, float(np.abs(begin).max())), 0.0, begin)
+        placed = replace(found, begin=clean)
+        if all((np.abs(placed.run(u[:1])[0] - y[0]) <= 1e-6 * span).all() for u, y in records):
+            return clean
+    return None

@@ -10,6 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Ratio = tuple[int | None, int]
+"""A quotient of two inputs, by their numbers; ``None`` over an input is its inverse."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Armed:
+    """Where an event counts: while an output that has two values is at one of them.
+
+    Args:
+        output: Its number.
+        sign: 1 where it is at the lower one, -1 where at the higher.
+        level: Half-way between both.
+    """
+
+    output: int
+    sign: int
+    level: float
+
+    def __call__(self, outputs: Array) -> NDArray[np.bool_]:
+        """Whether it counts; outputs of shape ``(n_outputs, ...)``."""
+        return np.asarray(self.sign * outputs[self.output] <= self.sign * self.level)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -17,27 +38,31 @@ class Guard:
     """An event, and what it does.
 
     Args:
-        output: Number of the output whose level it is.
+        row: Of what the level is: factors of the outputs and of the inputs, shape ``(n_outputs + n_inputs,)``.
         sign: 1 where the event is at the level or below it, -1 where at the level or above.
-        level: In the output's unit.
+        level: In the unit of that.
         reset: What the outputs are then, from :func:`features` of what they were; shape ``(n_features, n_outputs)``.
+        armed: Where it counts; ``None`` for everywhere.
     """
 
-    output: int
+    row: Array
     sign: int
     level: float
     reset: Array
+    armed: Armed | None = None
 
-    def reached(self, outputs: Array) -> NDArray[np.bool_]:
+    def reached(self, outputs: Array, inputs: Array) -> NDArray[np.bool_]:
         """Whether it is the event.
 
         Args:
             outputs: Shape ``(n_outputs, ...)``.
+            inputs: Shape ``(n_inputs, ...)``, as far as they go.
 
         Returns:
             Shape ``(...)``.
         """
-        return np.asarray(self.sign * outputs[self.output] <= self.sign * self.level)
+        there = self.sign * quantity(self.row, outputs, inputs) <= self.sign * self.level
+        return np.asarray(there if self.armed is None else there & self.armed(outputs))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,7 +86,10 @@ class ResetMap:
 
     Args:
         flow: From outputs, inputs and 1 to the outputs a step later; shape ``(n_outputs, n_outputs + n_inputs + 1)``.
+            Inputs are those of the records and their :attr:`ratios`, here and in the guards.
         steps: From sample to sample: the reference looks for events so often.
+        ratios: Quotients of inputs that count as inputs.
+        looks_first: Whether it looks before it moves, as what switches by what it has measured; else behind.
         guards: The events; the first that is reached counts.
         rest: Where they end; ``None`` where they do not.
         begin: Outputs before the first sample, shape ``(n_outputs,)``.
@@ -72,6 +100,8 @@ class ResetMap:
     guards: Sequence[Guard]
     rest: Rest | None
     begin: Array
+    ratios: tuple[Ratio, ...] = ()
+    looks_first: bool = False
 
     @cached_property
     def n_outputs(self) -> int:
@@ -90,7 +120,7 @@ class ResetMap:
         found = np.empty((len(inputs), self.n_outputs))
         with np.errstate(all="ignore"):
             at = self.begin
-            for k, u in enumerate(inputs):
+            for k, u in enumerate(with_ratios(inputs, self.ratios)):
                 for _ in range(self.steps):
                     at = self.step(at, u)
                 found[k] = at
@@ -101,17 +131,56 @@ class ResetMap:
 
         Args:
             outputs: Shape ``(n_outputs,)``.
-            inputs: Shape ``(n_inputs,)``.
+            inputs: With the quotients, shape ``(n_inputs,)``.
 
         Returns:
             Shape ``(n_outputs,)``.
         """
-        at = self.flow @ np.concatenate([outputs, inputs, [1.0]])
+        if self.looks_first:
+            return self._flown(self._looked(outputs, inputs), inputs)
+        return self._looked(self._flown(outputs, inputs), inputs)
+
+    def _flown(self, outputs: Array, inputs: Array) -> Array:
+        return np.asarray(self.flow @ np.concatenate([outputs, inputs, [1.0]]))
+
+    def _looked(self, at: Array, inputs: Array) -> Array:
         for guard in self.guards:
-            if guard.reached(at):
+            if guard.reached(at, inputs):
                 at = features(at[:, np.newaxis], inputs[:, np.newaxis])[0] @ guard.reset
                 return at if self.rest is None or abs(at[self.rest.output]) >= self.rest.below else self.rest.values
-        return np.asarray(at)
+        return at
+
+
+def with_ratios(inputs: Array, ratios: Sequence[Ratio]) -> Array:
+    """Inputs and their quotients.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``.
+        ratios: Which.
+
+    Returns:
+        Shape ``(n_samples, n_inputs + n_ratios)``.
+    """
+    if not ratios:
+        return inputs
+    with np.errstate(all="ignore"):
+        more = [(1.0 if above is None else inputs[:, above]) / inputs[:, below] for above, below in ratios]
+    return np.column_stack([inputs, *more])
+
+
+def quantity(row: Array, outputs: Array, inputs: Array) -> Array:
+    """A sum of outputs and inputs.
+
+    Args:
+        row: Its factors, shape ``(n_outputs + n_inputs,)``.
+        outputs: Shape ``(n_outputs, ...)``.
+        inputs: Shape ``(n_inputs, ...)``.
+
+    Returns:
+        Shape ``(...)``.
+    """
+    p = len(outputs)
+    return np.asarray(np.tensordot(row[:p], outputs, axes=1) + np.tensordot(row[p:], inputs, axes=1))
 
 
 def features(outputs: Array, inputs: Array) -> Array:

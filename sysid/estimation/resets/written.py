@@ -28,6 +28,7 @@ def grey_box_of(found: ResetMap, mapping: Mapping, others: Dict[str, Array] | No
     derived = others or {}
     names = _quoted([name for name in mapping.outputs if name not in derived])
     inputs = _quoted(mapping.inputs)
+    inputs += [f"({'1' if above is None else inputs[above]}/{inputs[below]})" for above, below in found.ratios]
     before = [f"before_{k}" for k in range(len(names))]
     lines, now = list[str](), before
     for step in range(found.steps):
@@ -49,15 +50,29 @@ def _quoted(names: Sequence[str]) -> list[str]:
 
 
 def _step(found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str], step: int) -> Iterator[str]:
-    falls = [f"on_{step}_{k}" for k in range(len(now))]
-    for name, row in zip(falls, found.flow, strict=True):
+    between = [f"on_{step}_{k}" for k in range(len(now))]
+    if found.looks_first:
+        yield from _looked(found, now, between, inputs, step)
+        yield from _flown(found, between, after, inputs)
+    else:
+        yield from _flown(found, now, between, inputs)
+        yield from _looked(found, between, after, inputs, step)
+
+
+def _flown(found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str]) -> Iterator[str]:
+    for name, row in zip(after, found.flow, strict=True):
         yield f"{name} = {_sum(row, [*now, *inputs, ''])}"
-    value = list(falls)
+
+
+def _looked(
+    found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str], step: int
+) -> Iterator[str]:
+    value = list(now)
     for number, guard in reversed(list(enumerate(found.guards))):
         event = f"event_{step}_{number}"
-        yield f"{event} = {falls[guard.output]} {'<=' if guard.sign > 0 else '>='} {_number(guard.level)}"
+        yield f"{event} = {_event(guard, now, inputs)}"
         set_to = [f"set_{step}_{number}_{k}" for k in range(len(now))]
-        yield from _set(guard, falls, inputs, set_to)
+        yield from _set(guard, now, inputs, set_to)
         value = [
             f"where({event}, {one}, {other})" for one, other in zip(_resting(found.rest, set_to), value, strict=True)
         ]
@@ -65,8 +80,18 @@ def _step(found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Seq
         yield f"{name} = {one}"
 
 
-def _set(guard: Guard, falls: Sequence[str], inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    own = [*falls, ""]
+def _event(guard: Guard, now: Sequence[str], inputs: Sequence[str]) -> str:
+    said = f"{_sum(guard.row, [*now, *inputs])} {_side(guard.sign)} {_number(guard.level)}"
+    armed = guard.armed
+    return said if armed is None else f"{said} and {now[armed.output]} {_side(armed.sign)} {_number(armed.level)}"
+
+
+def _side(sign: int) -> str:
+    return "<=" if sign > 0 else ">="
+
+
+def _set(guard: Guard, now: Sequence[str], inputs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
+    own = [*now, ""]
     terms = [*own, *(f"{one}*{other}" if one else other for other in inputs for one in own)]
     for name, column in zip(names, guard.reset.T, strict=True):
         yield f"{name} = {_sum(column, terms)}"

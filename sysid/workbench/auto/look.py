@@ -12,7 +12,7 @@ from sysid.advice.dynamics import INTEGRATES
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
 from sysid.estimation.output_ends import found_ends
-from sysid.estimation.resets import derived_from, found_resets, grey_box_of
+from sysid.estimation.resets import derived_from, found_resets, grey_box_of, switches
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind, VectorGreyBox
 from sysid.reporting.advice_record import AdviceRecord
 from sysid.reporting.advice_words import lines
@@ -123,9 +123,11 @@ def resets_of(traces: Sequence[Trace], mapping: Mapping) -> VectorGreyBox | None
     Returns:
         The equations, with no parameter that is left to estimate; ``None`` where nothing jumps, or not so.
     """
-    if not jumps_of(traces, mapping) or any(trace.usable is not None for trace in traces):
+    outputs = np.concatenate([trace.columns(mapping.outputs) for trace in traces])
+    # A relay that answers an input alone jumps only where that moves.
+    if not (jumps_of(traces, mapping) or switches(outputs)) or any(trace.usable is not None for trace in traces):
         return None
-    others = derived_from(np.concatenate([trace.columns(mapping.outputs) for trace in traces]))
+    others = derived_from(outputs)
     own = [name for k, name in enumerate(mapping.outputs) if k not in others]
     found = found_resets([(trace.columns(mapping.inputs), trace.columns(own)) for trace in traces])
     derived = {mapping.outputs[k]: row for k, row in others.items()}

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.estimation import FitResult
+from sysid.estimation import FitResult, Status
 from sysid.estimation.tolerance import outside, spans_of
 from sysid.traces import Role, Trace
 from sysid.validation import case_results
@@ -56,7 +56,9 @@ def refitted(
     ours, theirs = (_error(one, judging, config, tolerance) for one in (again, chosen))
     better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs[1]))
     found = again if better else whole()
-    return replace(found, notes=(*found.notes, taken if better else left))
+    # What was interrupted is made again by who goes on later, whichever of both is shown until then.
+    status = again.status if again.status is Status.INTERRUPTED else found.status
+    return replace(found, status=status, notes=(*found.notes, taken if better else left))
 
 
 def _error(

@@ -92,12 +92,14 @@ class Searched:
         results: The contents of ``results.json``: what was chosen, and the best linear model beside it.
         told: What a reader has to know: what chose, and what is wrong with the record.
         hurried: Of that, that there was no search, as the time was up before structures were compared; empty elsewhere.
+        needs_s: Seconds that a search takes at least, where there was no time for one; 0 elsewhere.
     """
 
     record: SweepRecord
     results: Results
     told: tuple[str, ...]
     hurried: str
+    needs_s: float = 0.0
 
 
 def auto_of(config: AutoConfig, *, load: Callable[[], Data] | None = None, page: bool = True) -> Auto:
@@ -263,7 +265,9 @@ class _AutoSteps:
         )  # fmt: skip
         run.then(lambda: run.tell(ready))
         told = list(dict.fromkeys(told))
-        return Searched(record=found.record, results=results, told=tuple(told), hurried=found.hurried)
+        return Searched(
+            record=found.record, results=results, told=tuple(told), hurried=found.hurried, needs_s=found.needs_s
+        )  # fmt: skip
 
     @property
     def _estimate(self) -> Estimate:

@@ -96,6 +96,7 @@ class Found:
         slowed: Seconds by the clock that a second of training takes.
         told: What a reader has to know.
         hurried: Of that, that there was no search, as the time was up before structures were compared; empty elsewhere.
+        needs_s: Seconds that a search takes at least, where there was no time for one; 0 elsewhere.
         done_now: Trials that this session has done itself.
     """
 
@@ -109,6 +110,7 @@ class Found:
     slowed: float
     told: tuple[str, ...]
     hurried: str
+    needs_s: float
     done_now: int
 
     def last_fits_s(self, spent_s: float, samples: int) -> dict[str, float]:
@@ -274,7 +276,8 @@ class Search:
             plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance,
             goes_on=lambda trial: self.parts.trained_on and trains_on(structure_from_dict(trial.structure)),
         )  # fmt: skip
-        shown, hurried = {FOUND: choice.chosen}, _hurried(plan, choice.chosen, clock.total)
+        needs_s = _needs_s(plan, clock.total)
+        shown, hurried = {FOUND: choice.chosen}, _hurried(plan, choice.chosen, clock.total, needs_s)
         united = self._united(plan, choice.chosen, clock.total)
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear
@@ -299,6 +302,7 @@ class Search:
                 *(f"Look at the data: {one}" for one in self.looked.cautions),
             ),
             hurried=hurried,
+            needs_s=needs_s,
             done_now=trials.done_now,
         )
 
@@ -387,22 +391,29 @@ class Search:
         )
 
 
-def _hurried(plan: Plan, chosen: Trial, spent_s: float) -> str:
-    """That the time was up before there was anything to compare, and about how long a search takes; else nothing."""
-    if not plan.hurried:
-        return ""
+def _needs_s(plan: Plan, spent_s: float) -> float:
+    """About how long a search takes, where the time was up before there was anything to compare."""
     wall_s = plan.budget.wall_s
-    if wall_s is None:
-        return f"The budget was spent before structures were compared: {chosen.label} is the least that there is."
+    if not plan.hurried or wall_s is None:
+        return 0.0
     # What was seen on a busy machine says nothing of the same data on another day: it is reckoned as if it were quiet.
     slowed = plan.budget.slowed
     need = spent_s / slowed / max(1.0 - MOST_KEPT - plan.budget.refit, LEAST_SHARE)
-    need = max(need, 2.0 * wall_s / slowed)
+    return max(need, 2.0 * wall_s / slowed)
+
+
+def _hurried(plan: Plan, chosen: Trial, spent_s: float, needs_s: float) -> str:
+    """That the time was up before there was anything to compare, and about how long a search takes; else nothing."""
+    if not plan.hurried:
+        return ""
+    wall_s, slowed = plan.budget.wall_s, plan.budget.slowed
+    if wall_s is None:
+        return f"The budget was spent before structures were compared: {chosen.label} is the least that there is."
     busy = f" on a quiet machine (a second of work takes {slowed:.1f} s now)" if slowed >= BUSY else ""
     return (
         f"The time was up before structures were compared: {chosen.label} is the least that there is, fitted once, "
         f"whatever it is worth. Of {span(wall_s)}, looking at the record and one fit took {span(spent_s)}, and scores, "
-        f"export and report are still to come; a search that compares takes {span(need)} at least{busy}."
+        f"export and report are still to come; a search that compares takes {span(needs_s)} at least{busy}."
     )
 
 

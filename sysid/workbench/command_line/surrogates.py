@@ -46,7 +46,10 @@ def surrogate(  # noqa: PLR0917 - one parameter an option, by name on the comman
     sample_time: SampleTime = None,
     duration: Duration = None,
     proof: Annotated[
-        int | None, typer.Option(min=1, help="New experiments of the proof; 1000, or as many as there is time for.")
+        int | None,
+        typer.Option(
+            min=1, help="New experiments of the proof, beside --minutes; 1000, or as many as these have time for."
+        ),
     ] = None,
     rounds: Annotated[
         int | None, typer.Option(min=1, help="Rounds of experiments that are added where the surrogate is worst.")

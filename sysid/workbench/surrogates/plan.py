@@ -29,6 +29,8 @@ RUNNING = 0.2
 """Share of the time in which the reference is run for data; as much again for the proof."""
 SEARCHING = 0.4
 """Share of the time in which a model is looked for at least, whatever the rest takes."""
+BUSY = 1.5
+"""Seconds by the clock that a second of work takes from which on a busy machine is named as the reason."""
 TRIES = 3
 """Experiments that are run before any is asked for, at most: one, where that gives a record."""
 KNOWN = """\
@@ -158,17 +160,26 @@ class Times:
         spent: On experiments, and until they were there.
         proof: On the proof's experiments.
         finish: On scores, export and report.
+        apart: Whether the proof's experiments were asked for, and take their time beside the whole.
+        slowed: Seconds by the clock that a second of work takes, as busy as the machine is.
     """
 
     whole: float
     spent: float
     proof: float
     finish: float
+    apart: bool = False
+    slowed: float = 1.0
+
+    @property
+    def asked(self) -> float:
+        """What was asked for, with what the proof takes beside it."""
+        return self.whole + (self.proof if self.apart else 0.0)
 
     @property
     def search(self) -> float:
         """What a model is looked for: all that the rest does not take, but a share of the whole in any case."""
-        return max(SEARCHING * self.whole, self.whole - self.spent - self.proof - self.finish)
+        return max(SEARCHING * self.whole, self.asked - self.spent - self.proof - self.finish)
 
     def sentence(self, experiments: int, most: int | None = None) -> str:
         """What is about to be done, for who waits for it.
@@ -180,20 +191,36 @@ class Times:
         Returns:
             One sentence; another where it takes longer than was asked for.
         """
-        said = (
-            f"Time: {span(self.spent)} so far, {span(self.search)} for a model, {span(self.finish)} for "
-            f"scores, export and report, {span(self.proof)} for {experiments:,} experiments of the proof"
+        proof = (
+            f"and, on top of them, {span(self.proof)} for the {experiments:,} experiments that --proof asks for"
+            if self.apart
+            else f"{span(self.proof)} for {experiments:,} experiments of the proof"
             f"{' or more' if most is not None and most > experiments else ''}"
         )
+        said = (
+            f"Time: {span(self.spent)} so far, {span(self.search)} for a model, {span(self.finish)} for "
+            f"scores, export and report, {proof}"
+        )
         whole = self.spent + self.search + self.proof + self.finish
-        if whole <= 1.05 * self.whole:
-            return f"{said}."
-        less = "Fewer experiments of the proof (--proof) take less"
-        helps = less if self.proof > 0.05 * self.whole else "There is room for it in more --minutes"
-        return f"{said}: about {span(whole)} in all, more than the {span(self.whole)} that were asked for. {helps}."
+        if whole <= 1.05 * self.asked:
+            return f"{said}: about {span(whole)} in all." if self.apart else f"{said}."
+        given = f"the {span(self.whole)} that were asked for"
+        return f"{said}: about {span(whole)} in all, more than {given}. {self._helps}."
+
+    @property
+    def _helps(self) -> str:
+        """What makes it shorter: what takes most says so."""
+        if self.proof >= self.finish and not self.apart:
+            return "Fewer experiments of the proof (--proof) take less"
+        if self.slowed >= BUSY:
+            return f"The machine is busy: a second of work takes {self.slowed:.2g} s now"
+        return "There is room for it in more --minutes"
 
 
-def times(each: float, *, minutes: float, spent: float, experiments: int, workers: int, finish: float) -> Times:
+def times(
+    each: float, *, minutes: float, spent: float, experiments: int, workers: int, finish: float, apart: bool = False,
+    slowed: float = 1.0,
+) -> Times:  # fmt: skip
     """How the time of a surrogate is spent, once its experiments are there.
 
     Args:
@@ -203,6 +230,8 @@ def times(each: float, *, minutes: float, spent: float, experiments: int, worker
         experiments: Of the proof.
         workers: Processes.
         finish: Seconds of scores, export and report.
+        apart: Whether these experiments were asked for, and take their time beside the minutes.
+        slowed: Seconds by the clock that a second of work takes.
 
     Returns:
         The times.
@@ -214,4 +243,5 @@ def times(each: float, *, minutes: float, spent: float, experiments: int, worker
         >>> times(6.0, minutes=5.0, spent=60.0, experiments=1000, workers=2, finish=35.0).search
         120.0
     """
-    return Times(whole=60.0 * minutes, spent=spent, proof=experiments * each / workers, finish=finish)
+    proof = experiments * each / workers
+    return Times(whole=60.0 * minutes, spent=spent, proof=proof, finish=finish, apart=apart, slowed=slowed)

@@ -44,7 +44,7 @@ def surrogate(
         sample_time: Seconds; as an FMU says by default.
         duration: Seconds of an experiment; as an FMU says by default.
         minutes: Time for all.
-        proof: New random experiments that teach nothing; 1,000, or as many as there is time for.
+        proof: New random experiments that teach nothing, beside the minutes; 1,000, or as many as these have time for.
         iterations: In place of the search's time: the same result on every machine.
         rounds: Rounds of experiments that are added where the surrogate is worst, in place of those of the pipeline.
         workers: Processes; as the pipeline says, and two of a reference, by default.

@@ -70,38 +70,40 @@ def unlike(folder: Path) -> list[str]:
     return []
 
 
-def poor(shown: Proof, minutes: float) -> list[str]:
+def poor(shown: Proof, minutes: float, needs_s: float = 0.0) -> list[str]:
     """That a surrogate is not good enough, and what helps; nothing of one that is.
 
     Args:
         shown: How it does on new experiments.
         minutes: Time that was asked for.
+        needs_s: Seconds that a search takes at least, where there was no time for one.
 
     Returns:
         A sentence, or none.
     """
     if shown.share >= GOOD:
         return []
+    more = max(2.0 * minutes, np.ceil(needs_s / 60.0))
     worst = int(np.argmax(np.median(np.nan_to_num(shown.errors, nan=np.inf, posinf=np.inf), axis=0)))
     median = float(np.median(shown.errors[:, worst]))
     how = f"{100.0 * median:.2g} % of its range off in half of them" if np.isfinite(median) else "without bound in half"
     return [
         f"this surrogate is poor: {100.0 * shown.share:.0f} % of the new experiments are within "
         f"{100.0 * shown.tolerance:g} %, and {shown.outputs[worst]} is {how}. What helps: more time (--minutes "
-        f"{2.0 * minutes:g} or more: more experiments, and more structures are tried), experiments where it is worst "
+        f"{more:g} or more: more experiments, and more structures are tried), experiments where it is worst "
         "(--rounds 4), narrower ranges, or equations where you know them (docs/how/events.md)"
     ]
 
 
-def short_of_time(shown: Proof, plan: Times, count: int, *, took: float, asked: bool) -> list[str]:
-    """What was left out for want of time, and how much longer it took; nothing where what is done was asked for."""
+def short_of_time(shown: Proof, plan: Times, count: int, *, took: float) -> list[str]:
+    """What was left out for want of time, and how much longer it took than that and a proof that was asked for."""
     notes, run = [], len(shown.errors) + shown.failed
     if run < PROOF:
         why = f", not of {count:,}, as the time was up" if run < count else ""
         notes.append(f"the proof is of {run} experiments{why}; --proof 1000 makes it of 1,000")
-    if took > (1.0 + OVERRUN) * plan.whole and not asked:
+    if took > (1.0 + OVERRUN) * plan.asked:
         notes.append(
-            f"it took {span(took)}, {span(took - plan.whole)} more than was asked for: experiments, a few fits, export "
+            f"it took {span(took)}, {span(took - plan.asked)} more than was asked for: experiments, a few fits, export "
             f"and report come to that here, where a second of work takes {slowness():.2g} s"
         )
     return notes

@@ -29,7 +29,7 @@ from sysid.reporting.records import write_record
 from sysid.reporting.report import write_report
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import drawn_in, finish_s, page_s, span
+from sysid.workbench.auto.finish import drawn_in, finish_s, page_s, slowness, span
 from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import resets_of, span_of
 from sysid.workbench.auto.run import Searched, auto_of
@@ -141,7 +141,8 @@ class Work:
     ) -> tuple[Times, int, int]:
         """How the time is spent, of how many experiments the proof is for certain, and if it has time of how many."""
         whole = None if self.iterations else 60.0 * minutes
-        workers, finish = self.config.workers, finish_s(len(found.traces), len(self.mapping.outputs), whole)
+        workers, slowed = self.config.workers, slowness()
+        finish = finish_s(len(found.traces), len(self.mapping.outputs), whole, slowed=slowed)
         with ReferenceRuns(config=self.reference) as runs:
             each = runs.seconds_each()[0]
         each = self.reference.time_limit if each is None else max(each, 1e-3)
@@ -151,7 +152,10 @@ class Work:
             proof or int(np.clip(min(RUNNING * 60.0 * minutes, seconds) * workers / each, FEWEST, PROOF))
             for seconds in (max(left, 0.0), inf)
         )
-        plan = times(each, minutes=minutes, spent=spent, experiments=planned, workers=workers, finish=finish)
+        plan = times(
+            each, minutes=minutes, spent=spent, experiments=planned, workers=workers, finish=finish,
+            apart=proof is not None, slowed=slowed,
+        )  # fmt: skip
         return plan, planned, most
 
     def _jumps(self, traces: Sequence[Trace]) -> list[str]:
@@ -166,18 +170,18 @@ class Work:
 
     def modelled(
         self, found: Experimented, minutes: float, proving: Proving, *, whole: float
-    ) -> tuple[Path, list[str]]:
-        """The folder of the model, searched or of the fits that are asked for, and what is to be said of it."""
+    ) -> tuple[Path, list[str], float]:
+        """The folder of the model, what is to be said of it, and how long a search takes where there was no time."""
         place = self.folder / "model"
         if self.config.fits:
             self.fitted(found, minutes)
-            return place, []
+            return place, [], 0.0
         searched = self.searched(found, minutes, partial(proving, place) if self.growth is None else None, whole=whole)
         said = [searched.hurried] if searched.hurried else []
         if self.growth is not None:
             place, brought = self.grown(found, searched, seconds=None if self.iterations else GROWING * 60.0 * whole)
             said.append(brought)
-        return place, said
+        return place, said, searched.needs_s
 
     def grown(self, found: Experimented, searched: Searched, *, seconds: float | None) -> tuple[Path, str]:
         """The folder of the surrogate once its data have grown, and what that brought."""

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import FrameType
 from typing import Any, cast
 
 import numpy as np
@@ -143,7 +146,7 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
     try:
         with threadpool_limits(1), processor_time() if bench.processor_time else nullcontext():
             watch = _watch(bench, job)
-            trained_models = train(bench, job, before, watch)
+            trained_models = _trained(bench, job, before, watch)
             trained = watch.checkpoints.earlier_s + time.perf_counter() - began
             fits = [fit for fit, _ in trained_models]
             worst = next((fit for fit in fits if not fit.status.usable), fits[0])
@@ -170,6 +173,46 @@ def run_job(bench: Bench, job: Job, before: Mapping[str, Any] | None) -> dict[st
         trained = time.perf_counter() - began
         outcome |= {"status": FAILED, "usable": False, "reason": str(error)}
     return outcome | {"seconds": trained, "cpu_s": time.process_time() - cpu}
+
+
+def _trained(
+    bench: Bench, job: Job, before: Mapping[str, Any] | None, watch: Watch
+) -> list[tuple[FitResult, Checkpoint | None]]:
+    """Train one point; however it is stopped, where it stands is kept, and what was stopped is no result.
+
+    At Ctrl-C a fit ends with the best so far, for who wants that. A trial that is cut short is stored and never trained
+    again, and would be chosen or not by how soon somebody pressed a key.
+    """
+    try:
+        with _pressed() as pressed:
+            found = train(bench, job, before, watch)
+        if pressed:
+            raise KeyboardInterrupt
+    except (KeyboardInterrupt, SystemExit):
+        watch.checkpoints.flush()
+        raise
+    return found
+
+
+@contextmanager
+def _pressed() -> Iterator[list[int]]:
+    """Each Ctrl-C meanwhile, whatever part of a fit took it for the end of its own work."""
+    pressed: list[int] = []
+    if threading.current_thread() is not threading.main_thread() or (
+        signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
+        yield pressed
+        return
+
+    def note(number: int, frame: FrameType | None) -> None:
+        pressed.append(number)
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 NOT_DONE = "it was not done when the time of the search was up"

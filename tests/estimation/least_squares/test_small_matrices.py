@@ -18,6 +18,12 @@ def test_factor_solution_and_inverse_are_those_of_scipy(n):
     np.testing.assert_array_equal(inverse_of(factor), linalg.solve_triangular(factor, np.eye(n), lower=True))
 
 
+def test_of_nothing_the_inverse_is_nothing_and_nothing_is_printed(capfd):
+    """Equations of which nothing is left to estimate are a fit too."""
+    assert inverse_of(np.zeros((0, 0))).shape == (0, 0)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_the_lower_half_is_read_and_nothing_is_written():
     matrix = np.array([[4.0, 77.0], [2.0, 5.0]])
     before = matrix.copy()

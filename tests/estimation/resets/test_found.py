@@ -57,6 +57,56 @@ def between_walls(inputs: Array) -> Array:
     return np.array(found)
 
 
+def thermostat(looks: int, *, first: bool) -> Reference:
+    """Heats from half a degree below the second input to half a degree above it; looks before it moves, or behind."""
+
+    def run(inputs: Array) -> Array:
+        temp, on, found = 18.0, 0.0, []
+
+        def switched(off: float) -> float:
+            return 1.0 if off < -0.5 else 0.0 if off > 0.5 else on
+
+        for outside, wanted in inputs:
+            for _ in range(looks):
+                on = switched(temp - wanted) if first else on
+                temp += (0.02 * (outside - temp) + 0.7 * on) / looks
+                on = on if first else switched(temp - wanted)
+            found.append((temp, on))
+        return np.array(found)
+
+    return run
+
+
+def relay(inputs: Array) -> Array:
+    """Goes on above 2 and off below 1 of its input; it has no other state."""
+    on, found = 0.0, []
+    for u in inputs[:, 0]:
+        on = 1.0 if u > 2.0 else 0.0 if u < 1.0 else on
+        found.append((on,))
+    return np.array(found)
+
+
+def flushed(inputs: Array) -> Array:
+    """Two tanks, the upper of which is flushed at a level into the lower, the less the wider that is."""
+    upper, lower, found = 0.0, 0.0, []
+    for pump, area in inputs:
+        upper, lower = upper + 0.05 * (pump - 0.4 * upper), lower + 0.05 * (0.4 * upper - 0.3 * lower)
+        upper, lower = (0.2, lower + 0.3 / area) if upper >= 1.0 else (upper, lower)
+        found.append((upper, lower))
+    return np.array(found)
+
+
+def beside(low: float, high: float, *, stands: bool) -> Callable[[np.random.Generator, Array], Array]:
+    """A second input: it stands over a record, or begins at 18 as in all of them, and is held from place to place."""
+
+    def with_other(rng: np.random.Generator, inputs: Array) -> Array:
+        if stands:
+            return np.hstack([inputs, np.full((len(inputs), 1), rng.uniform(low, high))])
+        return np.vstack([[inputs.mean(), 18.0], np.hstack([inputs, held(rng, low, high, 15)])[1:]])
+
+    return with_other
+
+
 def held(rng: np.random.Generator, low: float, high: float, each: int, n: int = 300) -> Array:
     return np.repeat(rng.uniform(low, high, (n // each, 1)), each, axis=0)
 
@@ -66,14 +116,27 @@ REFERENCES = {
     "ball, ten times a sample": (ball(10), 0.6, 0.9, 300),
     "neuron": (neuron, 0.5, 3.0, 20),
     "between walls": (between_walls, -12.0, 12.0, 15),
+    "thermostat, by the sample": (thermostat(1, first=False), -5.0, 10.0, 15),
+    "thermostat, ten times a sample, looks first": (thermostat(10, first=True), -5.0, 10.0, 15),
+    "relay": (relay, 0.0, 3.0, 10),
+    "flushed by a quotient": (flushed, 0.3, 1.0, 15),
 }
+
+
+OTHERS = {
+    "thermostat, by the sample": beside(16.0, 24.0, stands=False),
+    "thermostat, ten times a sample, looks first": beside(16.0, 24.0, stands=False),
+    "flushed by a quotient": beside(1.0, 2.0, stands=True),
+}
+"""Second inputs."""
 
 
 def of(name: str) -> tuple[ResetMap | None, list[tuple[Array, Array]]]:
     """What is found in twelve records, and twenty others."""
     run, low, high, each = REFERENCES[name]
     rng = np.random.default_rng(0)
-    records = [(u, run(u)) for u in (held(rng, low, high, each) for _ in range(32))]
+    inputs = [OTHERS.get(name, lambda _, u: u)(rng, held(rng, low, high, each)) for _ in range(32)]
+    records = [(u, run(u)) for u in inputs]
     return found_resets(records[:12]), records[12:]
 
 
@@ -91,14 +154,13 @@ def test_what_is_found_runs_as_the_reference_does(name: str) -> None:
 def test_its_equations_run_as_it_does(name: str) -> None:
     found, others = of(name)
     assert found is not None
-    mapping = Mapping(inputs=("u",), outputs=tuple(f"y {k}" for k in range(found.n_outputs)))
     u, y = others[0]
-    record = sysid.data(
-        {"r": (u[:, 0], y)}, inputs="u", outputs=mapping.outputs, sample_time=0.01, split=["estimation"]
-    )
+    names = tuple(f"u {k}" for k in range(u.shape[1]))
+    mapping = Mapping(inputs=names, outputs=tuple(f"y {k}" for k in range(found.n_outputs)))
+    record = sysid.data({"r": (u, y)}, inputs=names, outputs=mapping.outputs, sample_time=0.01, split=["estimation"])
     rest = dict(zip(mapping.outputs, found.begin.tolist(), strict=True))
     fit = sysid.fit(record, mapping, grey_box_of(found, mapping), start=Start(), rest_output=rest)
-    np.testing.assert_allclose(np.reshape(fit.simulate(u[:, 0]), y.shape), found.run(u), atol=1e-9)
+    np.testing.assert_allclose(np.reshape(fit.simulate(u), y.shape), found.run(u), atol=1e-9)
 
 
 def test_the_events_are_those_of_the_reference() -> None:
@@ -106,13 +168,40 @@ def test_the_events_are_those_of_the_reference() -> None:
     assert found is not None
     assert found.rest is not None
     (guard,) = found.guards
-    assert (found.steps, guard.output, guard.sign, guard.level) == (10, 0, 1, 0.0)
+    assert (found.steps, guard.row.tolist(), guard.sign, guard.level) == (10, [1.0, 0.0, 0.0], 1, 0.0)
     assert (found.rest.output, found.rest.below, found.rest.values.tolist()) == (1, 0.1, [0.0, 0.0])
     np.testing.assert_allclose(found.begin, [1.0, 0.0], atol=1e-12)
     walls, _ = of("between walls")
     assert walls is not None
-    assert sorted((one.output, one.level) for one in walls.guards) == [(0, -1.0), (0, 2.0)]
+    assert sorted((*one.row.tolist(), one.level) for one in walls.guards) == [
+        (1.0, 0.0, 0.0, -1.0),
+        (1.0, 0.0, 0.0, 2.0),
+    ]
     assert walls.rest is None
+
+
+def test_a_relay_is_its_two_levels_each_while_its_output_is_at_the_other_value() -> None:
+    found, _ = of("thermostat, ten times a sample, looks first")
+    assert found is not None
+    assert (found.steps, found.looks_first) == (10, True)
+    told = {
+        (one.sign, one.level): (one.row.tolist(), one.armed and (one.armed.output, one.armed.sign))
+        for one in found.guards
+    }
+    assert told == {(1, -0.5): ([1.0, 0.0, 0.0, -1.0], (1, 1)), (-1, 0.5): ([1.0, 0.0, 0.0, -1.0], (1, -1))}
+    alone, _ = of("relay")
+    assert alone is not None
+    assert sorted((one.sign, one.level, *one.row.tolist()) for one in alone.guards) == [
+        (-1, 2.0, 0.0, 1.0),
+        (1, 1.0, 0.0, 1.0),
+    ]
+
+
+def test_a_quotient_is_looked_for_by_what_stands_still_in_each_record() -> None:
+    found, _ = of("flushed by a quotient")
+    assert found is not None
+    assert found.ratios == ((None, 1), (0, 1))
+    assert of("ball, by the sample")[0].ratios == ()  # type: ignore[union-attr]
 
 
 def test_an_output_in_another_unit_is_written_beside_the_others() -> None:

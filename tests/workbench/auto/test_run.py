@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import signal
+import threading
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,11 +19,13 @@ import pytest
 import sysid
 from sysid.errors import ConfigError
 from sysid.estimation import estimators
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.ingest import write_csv
 from sysid.models import NeuralStateSpace
 from sysid.reporting.results import read_results
 from sysid.reporting.sweep_record import Trial
 from sysid.traces import Role
+from sysid.workbench.auto import run
 from sysid.workbench.auto.budget import REFIT, Budget, price
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.parts import ENSEMBLE, UNITED
@@ -239,6 +244,49 @@ def test_a_search_that_was_killed_comes_to_the_same(first: tuple[Path, Searched]
     assert tried(again) == tried(first[1])
     ours, theirs = (json.loads((one / "fits" / "best-found" / "fit.json").read_text()) for one in (tmp_path, first[0]))
     assert ours["model"] == theirs["model"]
+
+
+@pytest.mark.parametrize(
+    ("at", "by"), [(at, by) for at in ("a trial", "the last fit") for by in (KeyboardInterrupt, SystemExit)]
+)
+def test_a_search_that_is_stopped_while_it_trains_comes_to_the_same(
+    first: tuple[Path, Searched], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: str, by: type[BaseException]
+) -> None:
+    """At Ctrl-C a fit ends with its best so far; of a trial that was kept as its end, and the search went on."""
+    known = data(record("a", 150), others={Role.TEST: record("test", 80, seed=1)})
+    left, step, last = [30 if at == "a trial" else -1], LevenbergMarquardt._step, run.refitted
+    sent: list[int] = []
+
+    def stopping(*words: Any) -> Any:
+        # The last fit itself trains in threads; what it begins from is made before, and is made anew.
+        left[0] -= at == "a trial" or threading.current_thread() is not threading.main_thread()
+        if left[0] == 0 and not sent:
+            sent.append(signal.SIGINT if by is KeyboardInterrupt else signal.SIGTERM)
+            os.kill(os.getpid(), sent[0])
+        return step(*words)
+
+    def begun(*words: Any, **more: Any) -> Any:
+        left[0] = 5 if at == "the last fit" else left[0]
+        return last(*words, **more)
+
+    def end(*_: object) -> None:
+        raise by
+
+    usual = signal.signal(signal.SIGTERM, end)
+    with monkeypatch.context() as patch:
+        patch.setattr(LevenbergMarquardt, "_step", stopping)
+        patch.setattr(run, "refitted", begun)
+        if at == "the last fit" and by is KeyboardInterrupt:  # what there is of it is used now
+            assert searched(tmp_path, known).results.fits[0].status == "INTERRUPTED"
+        else:
+            with pytest.raises(by):
+                searched(tmp_path, known)
+    signal.signal(signal.SIGTERM, usual)
+    assert sent
+    again = searched(tmp_path, known)
+    assert tried(again) == tried(first[1])
+    ours, theirs = (json.loads((one / "fits" / "best-found" / "fit.json").read_text()) for one in (tmp_path, first[0]))
+    assert (ours["model"], ours["status"]) == (theirs["model"], theirs["status"])
 
 
 def test_another_seed_is_another_search(first: tuple[Path, Searched], known: Data, tmp_path: Path) -> None:

@@ -169,6 +169,20 @@ def test_a_search_has_the_time_that_experiments_proof_and_report_leave_and_what_
     assert "about 52.9 min in all, more than the 5.0 min that were asked for. Fewer experiments" in slow.sentence(1000)
     little = times(0.001, experiments=20, **{**given, "minutes": 0.5})
     assert little.sentence(20).endswith("that were asked for. There is room for it in more --minutes.")
+    busy = times(0.001, experiments=20, slowed=12.0, **{**given, "minutes": 0.5})
+    assert busy.sentence(20).endswith("The machine is busy: a second of work takes 12 s now.")
+
+
+def test_a_proof_that_was_asked_for_takes_its_time_beside_the_minutes_and_is_told_before() -> None:
+    given = {"minutes": 1.0, "spent": 5.0, "workers": 1, "finish": 15.0, "apart": True}
+    plan = times(0.05, experiments=1000, **given)
+    assert (plan.proof, plan.search, plan.asked) == (50.0, 40.0, 110.0)
+    assert plan.sentence(1000).endswith(
+        "15 s for scores, export and report, and, on top of them, 50 s for the 1,000 experiments that --proof asks "
+        "for: about 1.8 min in all."
+    )
+    late = times(0.05, experiments=1000, **{**given, "spent": 60.0})
+    assert "about 2.5 min in all, more than the 60 s that were asked for. There is room" in late.sentence(1000)
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -288,10 +302,11 @@ def test_a_proof_leaves_time_for_the_runs_of_the_surrogate(monkeypatch: pytest.M
 
 def test_what_takes_longer_than_was_asked_for_is_told(proven: tuple[Bundle, Proof, JudgementRecord]) -> None:
     plan = times(0.03, minutes=1.0, spent=5.0, experiments=40, workers=1, finish=30.0)
-    short, over = short_of_time(proven[1], plan, 40, took=90.0, asked=False)
+    short, over = short_of_time(proven[1], plan, 40, took=90.0)
     assert "of 12 experiments, not of 40, as the time was up" in short
     assert "it took 1.5 min, 30 s more than was asked for" in over
-    assert len(short_of_time(proven[1], plan, 40, took=90.0, asked=True)) == 1
+    asked = replace(plan, apart=True, proof=40.0)  # which took the rest
+    assert len(short_of_time(proven[1], asked, 40, took=90.0)) == 1
 
 
 @pytest.mark.parametrize(("minutes", "count"), [(0.5, 16), (1.0, 24), (60.0, 60)])
@@ -311,6 +326,8 @@ def test_a_poor_surrogate_is_said_to_be_poor_with_what_helps(proven: tuple[Bundl
     (said,) = poor(replace(proven[1], errors=np.full((12, 1), 0.3)), 1.0)
     assert said.startswith("this surrogate is poor: 0 % of the new experiments are within 1 %, and y is 30 % of its")
     assert "--minutes 2 or more" in said
+    (said,) = poor(replace(proven[1], errors=np.full((12, 1), 0.3)), 1.0, needs_s=316.0)
+    assert "--minutes 6 or more" in said, "no less than a search takes"
     (said,) = poor(replace(proven[1], errors=np.full((12, 1), np.inf)), 1.0)
     assert "y is without bound in half" in said
 
