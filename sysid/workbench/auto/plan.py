@@ -133,7 +133,8 @@ class Plan:
             points = [self._point(one) for one in tries]
             taken = self.budget.take(points)
             if self.budget.most < 1.0 and self.budget.wall_s is not None:
-                self.left_out += [point.structure.label for point in points if point not in taken]
+                late = [point.structure for point in points if point not in taken]
+                self.left_out += [one.label for one in late if estimator_of(one).linear]
             elif len(taken) < len(points):
                 self.ended = "the budget is spent"
             self._points |= {point.number: point for point in taken}
@@ -314,7 +315,10 @@ class Plan:
                 if share == 1.0:
                     self.ended = self.ended or "everything next to the best was tried"
                 return
+            # A round of large networks on a busy machine may last for all of the time that there is.
+            self.budget.most = share
             yield wanted
+            self.budget.most = 1.0
             gained = math.sqrt(self.least()) < (1.0 - GAIN) * math.sqrt(before) or self._least_outside() < outside
             stale = 0 if gained else stale + 1
         if share == 1.0:

@@ -344,6 +344,27 @@ def test_what_is_held_at_ends_leaves_time_for_other_kinds_however_long_it_gains(
     assert plan.ended == "the budget is spent"
 
 
+def test_no_round_of_what_is_held_at_ends_lasts_for_all_of_the_time() -> None:
+    """As one of large networks does on a busy machine."""
+    spent = [0.0]
+    budget = Budget(
+        wall_s=600.0, iterations=None, clock=lambda: spent[0], is_stored=lambda _: False, side_by_side=2
+    )  # fmt: skip
+    looked = replace(LOOKED, ends=True, all_end=True)
+    plan, when = Plan(looked=looked, budget=budget, error=error, training={"max_time_s": 90.0}), dict[str, float]()
+    while points := plan.ask():
+        found = []
+        for point in points:
+            held = "limits found" in point.structure.label
+            when.setdefault(point.structure.label, spent[0])
+            told = {"seconds": 80.0 if held else 2.0, "cpu_s": 80.0 if held else 2.0}
+            found.append(trial(point, 0.9**point.number if held else 1.0).model_copy(update=told))
+        spent[0] += sum(one.seconds for one in found) / 2
+        plan.tell(found)
+    assert when["SS 2 without noise model"] < (FIRST + 0.1) * 600.0
+    assert plan.left_out == []
+
+
 def test_where_some_of_several_outputs_end_one_network_has_all_of_them() -> None:
     for all_end in (False, True):
         _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, ends=True, all_end=all_end, n_outputs=2))
