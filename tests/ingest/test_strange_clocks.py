@@ -98,3 +98,19 @@ def write(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "b.csv"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def test_u_and_y_once_with_each_letter_are_two_records(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"ue": U[:30], "ye": Y[:30], "uv": U[30:], "yv": Y[30:], "Ts": 0.1})
+    found = {case.name: case.role for case in inspect_file(tmp_path / "a.mat").cases}
+    assert found == {"estimation": "estimation", "validation": "validation"}
+
+
+def test_varnames_beside_a_matrix_name_its_columns(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    names = np.array(["time", "pump", "level"], dtype=object)
+    savemat(tmp_path / "a.mat", {"data": np.column_stack([np.arange(N) / 10, U, Y]), "varnames": names})
+    assert [column.name for column in inspect_file(tmp_path / "a.mat").channels] == ["pump", "level"]

@@ -226,7 +226,9 @@ def _by_word(table: RawTable, found: list[Found]) -> list[RecordChoice]:
         tags = _agreeing(tags)
         lengths = [{len(item.column.values) for item in members.values()} for members in tags.values()]
         differ = len({frozenset(own) for own in lengths}) > 1
-        if len(tags) > 1 and all(len(own) == 1 for own in lengths) and (differ or not needs_lengths):
+        # Of like length, u and y once with each letter are two records; other names may be one of four channels.
+        told = tag_of is _short_tag and any({"u", "y"} == set(members) for members in tags.values())
+        if len(tags) > 1 and all(len(own) == 1 for own in lengths) and (differ or told or not needs_lengths):
             return [_column_record(table, tag, members) for tag, members in tags.items()]
     return []
 

@@ -27,7 +27,7 @@ from sysid.ingest.time_columns import recognise_time
 
 _DEEPEST = 40
 _NAMES = {"names", "channels", "columns", "labels", "signals", "variables", "fields", "header"}
-_NAMES |= {f"{one}{mark}names" for one in ("channel", "column", "signal", "variable") for mark in ("", "_")}
+_NAMES |= {f"{one}{mark}names" for one in ("channel", "column", "signal", "variable", "var") for mark in ("", "_")}
 
 
 def table_of(
