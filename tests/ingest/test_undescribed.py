@@ -51,7 +51,7 @@ def test_what_the_file_leaves_out_is_guessed_as_it_is_proposed_and_told(text: st
     with pytest.warns(GuessedWarning) as warned:
         bare = sysid.load(path)
     assert told in str(warned[0].message)
-    assert f"Inferred: {told.split(';')[0]}" in bare.source  # which the report shows
+    assert f"Inferred: {told.split(';', maxsplit=1)[0]}" in bare.source  # which the report shows
     (path.parent / "dataset.yaml").write_text(propose_dataset(inspect_file(path)))
     described = load_dataset(path.parent)
     assert [trace.digest for trace in bare.traces] == [trace.digest for trace in described.traces]
