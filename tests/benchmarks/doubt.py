@@ -17,6 +17,8 @@
 * With ``--perturb=`` psi each of them with itself, what its relay reads of the pipe moved up and down by so much.
 * With ``--mean=1`` each of them, and the committee that answers with the mean of all: of all samples the share with an
   error over ``--error=`` psi, on the calibration and the unseen sequences, and how many of these its spread doubts.
+* With ``--look=1`` nothing of that, but each stretch of over 3 s in which a whole, or the mean of all, is off by more
+  than ``--error=``: by how much at most, and the median error of cylinder, pipe and reservoir in it.
 * With ``--cost=1`` what a doubt costs: size and run time of the files of each whole, alone and as a committee's first.
 
 Making the traces takes some 2 s of processor time each, once.
@@ -82,6 +84,9 @@ def main(unseen: dict[str, list[Trace]], known: dict[str, list[Trace]], error: f
     for name in named():
         model = read_bundle(REPORTS / name / "bundle").model
         wholes[name] = model if isinstance(model, Cascade) else Cascade(models=(model,))
+    if option("look", 0.0):
+        look(wholes, unseen, error)
+        return
     every = [trace for traces in unseen.values() for trace in traces]
     for name, whole in wholes.items():
         found = run_monte_carlo(whole, every, OUTPUT, 1.0)
@@ -132,6 +137,22 @@ def mean(
     )
 
 
+def look(wholes: dict[str, Cascade], unseen: dict[str, list[Trace]], error: float) -> None:
+    """Print where wholes and their mean are wrong, and what else is wrong there."""
+    channels = ("BC", "BP", "AR")
+    for trace in [one for traces in unseen.values() for one in traces]:
+        alone = {name: whole.simulate_trace(trace) for name, whole in wholes.items()}
+        off = {name: np.array([run[one] - trace[one] for one in channels]) for name, run in alone.items()}
+        for name, errors in {**off, "their mean": np.mean(list(off.values()), axis=0)}.items():
+            edges = np.flatnonzero(np.diff(np.abs(np.pad(errors[0], 1)) > error))
+            for begin, end in edges.reshape(-1, 2):
+                if (end - begin) * trace.sample_time > 3.0:
+                    part = errors[:, begin:end]
+                    told = ", ".join(f"{c} {v:+.2f}" for c, v in zip(channels, np.median(part, axis=1), strict=True))
+                    span = f"{begin * trace.sample_time:.0f} to {end * trace.sample_time:.0f} s"
+                    print(f"{trace.name} {name}, {span}: {np.abs(part[0]).max():.2f} at most; median {told}")
+
+
 def report(of: dict[str, DoubtFigures], unseen: Sequence[str]) -> None:
     """Print how much is wrong, and in doubt, by kind."""
     for kind, figures in {**of, "all unseen": together([of[kind] for kind in unseen])}.items():
@@ -174,7 +195,9 @@ if __name__ == "__main__":
         fresh("abdx-kinds-unseen", number, begins)
         if begins
         else sequences("abdx-kinds-unseen", UNSEEN, int(option("first", 100)), number),
-        sequences("abdx-kinds-calibration", CALIBRATION, 0, int(option("calibrate", 10))),
+        {}
+        if option("look", 0.0)
+        else sequences("abdx-kinds-calibration", CALIBRATION, 0, int(option("calibrate", 10))),
         option("error", 1.0),
         option("perturb", 0.0),
     )

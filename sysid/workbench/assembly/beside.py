@@ -195,7 +195,7 @@ class Beside:
 
         Args:
             trained: What was trained.
-            data: What it was trained on, with what the fixed submodels say.
+            data: What it was trained on.
             config: The pipeline.
 
         Returns:
@@ -209,7 +209,8 @@ class Beside:
         others = {name: one.of(self.outputs) for name, one in zip(self._names, self.averaged, strict=True)}
         name = f"the mean of {1 + len(others)}"
         more = others | {name: self.answering(trained.model)}
-        scores = {stage: whole_score(whole, data.choosing, config.plan.outputs) for stage, whole in more.items()}
+        choosing = data.with_fixed(config.composite).choosing
+        scores = {stage: whole_score(whole, choosing, config.plan.outputs) for stage, whole in more.items()}
         networks |= {stage: [f"{len(whole.models)} models of {stage}"] for stage, whole in others.items()}
         return Judged(
             stages=stages | more,

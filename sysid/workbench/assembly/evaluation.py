@@ -101,7 +101,7 @@ class Evaluating:
     def _outcome(self, cases: TraceSet, data: AssemblyData) -> Outcome:
         """Every stage scored, one chosen by the selection traces, proven and exported."""
         config = self.context.config
-        judged = self.beside.judged(self.trained, data.data.with_fixed(config.composite), config)
+        judged = self.beside.judged(self.trained, data.data, config)
         scored = self._scored(cases, judged.stages)
         scores = scored["scores"]
         whole = self._chosen(judged)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sysid.composite import train
+from sysid.composite import train, with_fixed
 from sysid.composite.round_times import stand_in
 from sysid.errors import ConfigError
 from sysid.export.exporters import wanted_formats
@@ -78,7 +78,8 @@ def _run(context: Context, estimates: RoundEstimates) -> AssemblyResults:
         begin, begun = read_whole(context.beside / config.warm_start)
         notes.append(begun)
     if beside.doubting or beside.averaged:
-        beside.check(stand_in(config.composite, data.data.estimation[0]))  # not when all is trained
+        like = next(iter(with_fixed(config.composite.fixed, data.data.estimation[:1])))
+        beside.check(stand_in(config.composite, like))  # not when all is trained
     given = {member.mapping.output: swept(context, member) for member in config.members}
     trained = train(config.composite, config.plan, data.data, begin=begin, given=given, keeper=context)
     notes += trained.notes

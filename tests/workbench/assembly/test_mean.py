@@ -20,7 +20,7 @@ from sysid.workbench.assembly.runner import read_assembly
 from sysid.workbench.cli import app
 from sysid.yaml_files import parse_yaml, yaml_text
 from tests.workbench.assembly.conftest import assembly_results, write_tanks
-from tests.workbench.assembly.test_warm_start import FIRST, first_whole, run, trained  # noqa: F401
+from tests.workbench.assembly.test_warm_start import FIRST, KNOWN, first_whole, run, trained  # noqa: F401
 
 MEAN = "mean: {beside: [../runs/tanks/bundle], spread: [lower]}\n"
 DOUBT = "doubt: {output: lower, error: 0.05, data: calm}\n"
@@ -204,7 +204,8 @@ def test_a_whole_of_another_question_is_named_with_what_was_expected(workspace: 
     write_tanks(workspace / "datasets" / "small")
     file = workspace / "datasets" / "small" / "dataset.yaml"
     file.write_text(file.read_text(encoding="utf-8").replace("unit: cm", "unit: mm"), encoding="utf-8")
-    text = FIRST.replace("name: tanks", "name: third", 1).replace("data: tanks", "data: small") + MEAN
+    text = FIRST.replace("name: tanks", "name: third", 1).replace("data: tanks", "data: small") + MEAN + KNOWN
+    text = text.replace("mapping: upper -> lower", "mapping: upper+LH -> lower")  # what is declared stands in no trace
     with pytest.raises(ConfigError) as told:
         run(workspace, "third", text.replace("training: tanks", "training: small"))
     said = str(told.value)
