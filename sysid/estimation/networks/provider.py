@@ -34,7 +34,6 @@ the mask as they stand in the record.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -56,8 +55,6 @@ from sysid.models.lagged_form import NOT_KEPT, opened, side_by_side
 BLOCK = 1024
 """Rows of the Jacobian that are alive at a time: 1024 rows of 300 parameters are 2.4 MB, which the second-level
 cache holds until the normal equations have used them. Memory does not grow with the length of the records."""
-AGAIN = 2**20
-"""Numbers of a run's hidden layer, over all records, up to which it is held for the rows of an accepted step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,36 +121,13 @@ class RecursionProvider(AbstractProvider):
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
-        total, held = 0.0, list[_Pass]()
+        total = 0.0
         for record in self._records:
-            passed = self._pass(record, theta, keep=self._is_held)
-            held += [passed] if self._is_held else []
-            residual = self._residual(record, passed)
+            residual = self._residual(record, self._pass(record, theta, keep=False))
             residual = residual if record.root_weights is None else residual * record.root_weights
             residual = residual[:: self.stride]
             total += 0.5 * float(residual @ residual)
-        if held:
-            self._held[threading.get_ident()] = theta.copy(), held
         return total if np.isfinite(total) else np.inf
-
-    @cached_property
-    def _is_held(self) -> bool:
-        """Whether the runs of a loss are held: a step that is accepted is linearised where it was just run."""
-        return sum(len(record.target) for record in self._records) * max(1, self.template.neurons) <= AGAIN
-
-    @cached_property
-    def _held(self) -> dict[int, tuple[NDArray[np.float64], list[_Pass]]]:
-        """The runs of the last loss, by the thread that asked: starts that train side by side share the provider."""
-        return {}
-
-    def _passes(self, theta: NDArray[np.float64]) -> Iterator[tuple[_Record, _Pass]]:
-        """Every record with its run at some parameters."""
-        held = self._held.pop(threading.get_ident(), None)
-        if held is not None and np.array_equal(held[0], theta):
-            yield from zip(self._records, held[1], strict=True)
-            return
-        for record in self._records:
-            yield record, self._pass(record, theta)
 
     def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
@@ -168,7 +142,8 @@ class RecursionProvider(AbstractProvider):
         gradient = np.zeros(n_p)
         matrix = np.zeros((n_p, n_p))
         loss, correlated = 0.0, 0.0
-        for record, passed in self._passes(theta):
+        for record in self._records:
+            passed = self._pass(record, theta)
             residual = self._residual(record, passed)
             residual = residual if record.root_weights is None else residual * record.root_weights
             if correlation:
