@@ -112,12 +112,12 @@ def with_fixed(
 
     def one(trace: Trace) -> Trace:
         units = {name: member.unit_in(trace) for member in fixed for name in member.outputs}
+        _check_units(trace, {name: unit for name, unit in units.items() if name in trace.channel_names})
         first = [(member, fixed_model(member, trace, units, values)) for member in fixed]
         declared = tuple(placed(member, model, there) for member, model in first for there in member.instances)
         run = Cascade(models=declared, limits=bounds).simulate_trace(trace)
         # What is measured stays as measured: the whole is held against it, and the others are fitted to it.
         new = {name: unit for name, unit in units.items() if name not in trace.channel_names}
-        _check_units(trace, {name: unit for name, unit in units.items() if name not in new})
         return replace(
             trace,
             channels=(*trace.channels, *(Channel(name=name, unit=unit) for name, unit in new.items())),

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import sysid
-from sysid.code_digest import code_digest
 from sysid.errors import SysidError
 from sysid.plugins import find_entry
 from sysid.traces import Channel, Trace
@@ -111,6 +110,8 @@ def _own_version(generate: Callable[..., Trace]) -> str:
     declared = getattr(sys.modules.get(generate.__module__), "GENERATOR_VERSION", None)
     if declared is not None:
         return str(declared)
+    from sysid.code_digest import code_digest  # who reads a file asks for no generator
+
     try:
         return code_digest(generate if hasattr(generate, "__qualname__") else type(generate))[:16]
     except (LookupError, OSError, SyntaxError, ValueError):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import yaml
 
-from sysid.errors import TraceError, UserError
+from sysid.errors import ReaderError, UnitError, UserError
 from sysid.field_checks import check
 from sysid.ingest.dataset import load_described
 from sysid.ingest.description import DatasetDescription
@@ -64,13 +64,17 @@ def _as_proposed(path: Path, error: UserError) -> TraceSet:
         proposed = yaml.safe_load(propose_dataset(left))
     except UserError:
         raise error from None
+    # What was measured is not lost: a column in which words stand is said to be one, or to be left out, by a person.
+    lost = any(column.problem and not column.unit_guessed for column in found.columns)
+    if isinstance(error, ReaderError) and (lost or {"states", "missing"} & found.guessed):
+        raise error
     guesses = list(_guesses(found))
     known = {"name": bare_stem(path), "provenance": str(path), "inferred": guesses}
     described = check(DatasetDescription, {**proposed, **known}, where=path)
     try:
         traces = load_described(described, path, cache=False)
     except UserError as also:
-        raise error if isinstance(error, TraceError) else also from None
+        raise also if isinstance(error, UnitError) else error from None
     if guesses:
         told = f"{_told(path, guesses)}. {proposal_of(path)} writes this down, to be corrected"
         warnings.warn(told, GuessedWarning, stacklevel=4)
@@ -94,8 +98,8 @@ def guessed_time(table: RawTable, files: FileOptions, *, sample_time: float) -> 
     Warns:
         GuessedWarning: If something was guessed.
     """
-    said = table.step is not None or (table.time is not None and table.find(table.time).unit is not None)
-    if said or files.time != TimeOptions():
+    # The unit of a column that is called time is told by the sample time that is asked for.
+    if table.step is not None or table.time is not None or files.time != TimeOptions():
         return files
     found = inspect_file(table.source, files=files)
     if not found.time_guessed or found.cases:

@@ -107,10 +107,10 @@ def test_simulate_guesses_the_time_of_a_file_and_has_the_models_where_there_is_n
     from sysid.ingest import FileOptions, read_table
     from sysid.ingest.undescribed import guessed_time
 
-    stamped = write("stamped.csv", lines("clock,u", lambda k: f"{100 * k},{k % 7}"))
-    with pytest.warns(GuessedWarning, match="clock in ms"):
+    stamped = write("stamped.csv", lines("stamps,u", lambda k: f"{100 * k},{k % 7}"))
+    with pytest.warns(GuessedWarning, match="stamps in ms"):
         found = guessed_time(read_table(stamped), FileOptions(), sample_time=0.5)
-    assert (found.time.column, found.time.unit) == ("clock", "ms")
+    assert (found.time.column, found.time.unit) == ("stamps", "ms")
     bare = write("bare.csv", lines("u,w", lambda k: f"{k % 7},{k * k % 11}"))
     with pytest.warns(GuessedWarning, match="no time stamps, 0.5 s between them"):
         assert guessed_time(read_table(bare), FileOptions(), sample_time=0.5).time.step == 0.5
