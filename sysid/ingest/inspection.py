@@ -106,19 +106,11 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
             notes if time.step != said[1] or table.step else (*notes, f"sample time {step:g} s, from column {said[0]}")
         )
     columns = tuple(_column(column) for column in told_apart if column.name != clock) + others
-    channels = [column for column in columns if not column.problem and not column.aside]
-    blanks = {
-        column.name: np.isin(found.values, marks_in(found.values)) | ~np.isfinite(found.values)
-        for column in channels
-        for found in (table.find(column.name),)
-    }
     needed = {
         "ragged": repairs.ragged,
         "stamps": "drop" if unstamped else None,
         **needs,
-        "marks": "missing" if any(blanks[c.name].sum() > c.missing for c in channels) else None,
-        "nan": _nan({n: np.where(b, np.nan, table.find(n).values) for n, b in blanks.items() if b.any()}),
-        "constant": "accept" if any(column.constant for column in channels) else None,
+        **_repairs_of_values(table, [column for column in columns if not column.problem and not column.aside]),
     }
     return FileFinding(
         path=table.source,
@@ -138,6 +130,20 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         guessed=attempt.guessed,
         notes=notes,
     )
+
+
+def _repairs_of_values(table: RawTable, channels: Sequence[ColumnFinding]) -> dict[str, object]:
+    """The repairs that the values of channels need: of marks, of what is missing, of what never changes."""
+    blanks = {
+        column.name: np.isin(found.values, marks_in(found.values)) | ~np.isfinite(found.values)
+        for column in channels
+        for found in (table.find(column.name),)
+    }
+    return {
+        "marks": "missing" if any(blanks[c.name].sum() > c.missing for c in channels) else None,
+        "nan": _nan({n: np.where(b, np.nan, table.find(n).values) for n, b in blanks.items() if b.any()}),
+        "constant": "accept" if any(column.constant for column in channels) else None,
+    }
 
 
 def _distinct(known: NDArray[np.float64], timing: Timing) -> int:

@@ -16,6 +16,7 @@ from sysid.errors import ConfigError, TraceError, shortened
 from sysid.estimation.clock import now
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.stability.beginnings import TWICE, Beginnings
 from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability
 from sysid.estimation.stability.sequences import AbstractSequences, InputSequence, TraceSequences
@@ -277,6 +278,7 @@ class FreeRunCheck(AbstractStabilityCheck):
         status = fit.status if found.stable else _unstable(fit.status)
         attempts = tuple(replace(one, stable=found.stable) if one.chosen else one for one in fit.attempts)
         told = () if found.forgets or found.beginnings is None else (found.beginnings.sentence,)
+        fit = _unchecked(fit)
         notes, warnings = (*fit.notes, found.sentence, *told), (*fit.warnings, *told)
         return replace(fit, status=status, stability=found.to_dict(), attempts=attempts, notes=notes, warnings=warnings)
 
@@ -346,6 +348,20 @@ def _follows(model: AbstractModel, trace: Trace, start: Start) -> bool:
     target = output[begun.first :][counted]
     error = float(np.linalg.norm(run[counted] - target))
     return error <= FOLLOWS * float(np.linalg.norm(target - target.mean()))
+
+
+def _unchecked(fit: FitResult) -> FitResult:
+    """A fit without what was said of a check before."""
+    if fit.stability is None:
+        return fit
+    said = {fit.stability["text"]}
+    if apart := fit.stability.get("apart"):
+        said.add(Beginnings(sequences=min(TWICE, fit.stability["sequences"]), apart=apart).sentence)
+    return replace(
+        fit,
+        notes=tuple(one for one in fit.notes if one not in said),
+        warnings=tuple(one for one in fit.warnings if one not in said),
+    )
 
 
 def _unstable(status: Status) -> Status:

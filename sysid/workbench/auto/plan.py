@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from statistics import median_high
 from typing import Any
-
-import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training
@@ -19,6 +16,7 @@ from sysid.workbench.auto.budget import LARGER, LINEAR, Budget, size_of
 from sysid.workbench.auto.families import FAMILIES, Family, Try, suggested
 from sysid.workbench.auto.look import Looked
 from sysid.workbench.auto.parts import ENSEMBLE
+from sysid.workbench.auto.worth import Rank, ranked_by, scatter, with_repeats
 from sysid.workbench.runner.store import digest
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import NOT_DONE
@@ -39,40 +37,12 @@ FINALISTS, AGAIN = 5, 2
 owes something to luck, and the chosen one is trained from other starts too."""
 ENSEMBLES = 3
 """Of them those whose starts are united, too, where that can be."""
-SCATTER = 0.1
-"""Standard deviation of the logarithm of a network's error over its starts, on the same held-out parts, beyond which it
-says as much of the start as of the structure: what is fitted in the end is then the mean of several starts."""
 ALIKE = 0.03
 """Part of the least error within which another one counts as no worse; of those the smallest is chosen."""
 
 
 MET = "what is linear between its events stays within the tolerance on every trace that chooses"
 """Why a search ends that has found a model of events."""
-
-
-Rank = Callable[[Trial], tuple[float, float, int]]
-"""Sorting key of a trial, the best first: the share of what chooses that it does not stay within the tolerance on, its
-error, its number."""
-
-
-def ranked_by(error: Callable[[Trial], float], tolerance: float | None) -> Rank:
-    """What chooses.
-
-    Args:
-        error: A mean square; infinite for what cannot be used.
-        tolerance: Where how many of the traces that choose stay within it comes before the error: a mean hides one
-            trace that fails behind others that are far better than they need to be. ``None`` for the error alone.
-
-    Returns:
-        The sorting key; what cannot be used is last.
-    """
-
-    def rank(trial: Trial) -> tuple[float, float, int]:
-        usable = math.isfinite(error(trial))
-        outside = 0.0 if tolerance is None or not usable else 1.0 - trial.within(tolerance)
-        return outside if usable else math.inf, error(trial), trial.number
-
-    return rank
 
 
 TAPS = 10
@@ -438,36 +408,3 @@ class Plan:
             training["max_time_s"] = round(training["max_time_s"] / n, 3)  # a model an output, one after the other
         values = {"structure": one.structure.label, **one.training}
         return Point(number=self._asked, structure=one.structure, training=training, values=values)
-
-
-def scatter(trials: Sequence[Trial]) -> float:
-    """How far the errors of one point from several starts are apart, on the same parts.
-
-    Args:
-        trials: From each of the starts.
-
-    Returns:
-        Standard deviation of the errors' logarithm over the starts, as a root of a mean square over the parts; 0 where
-        fewer than two have come to errors on all of them.
-    """
-    some = [one.selection_rms_shares for one in trials if one.in_full]
-    errors = np.array([one for one in some if one and len(one) == len(max(some, key=len))])
-    if len(errors) < 2 or not (np.isfinite(errors) & (errors > 0.0)).all():
-        return 0.0
-    return float(np.sqrt(np.mean(np.var(np.log(errors), axis=0, ddof=1))))
-
-
-def with_repeats(trial: Trial, repeats: Sequence[Trial]) -> Trial:
-    """A trial whose error is the median of its own and those of others of the same point, the upper one of two.
-
-    Args:
-        trial: The trial.
-        repeats: The others; one that was dropped or cannot be used counts as without bound.
-
-    Returns:
-        The trial; not usable where the median is without bound.
-    """
-    errors = [trial.selection_free_run_mse, *(r.selection_free_run_mse if r.in_full else math.inf for r in repeats)]
-    middle = median_high(errors)
-    times = {name: getattr(trial, name) + sum(getattr(one, name) for one in repeats) for name in ("seconds", "cpu_s")}
-    return trial.model_copy(update={"selection_free_run_mse": middle, **times})

@@ -21,8 +21,8 @@ from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import RACE
 from sysid.workbench.auto.parts import FURTHER
-from sysid.workbench.auto.plan import Rank
 from sysid.workbench.auto.ripe import gone_on
+from sysid.workbench.auto.worth import Rank
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.search_space import Point
 

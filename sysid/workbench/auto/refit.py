@@ -16,6 +16,7 @@ from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.steps import Work
+from sysid.workbench.sweep.checks import NEAR
 
 BETTER, KEPT = (
     "Fitted once more, to all of the record, after it was chosen on a part of it.",
@@ -54,11 +55,17 @@ def refitted(
     judging = (data.selection if further else ()) or data.estimation
     taken, left = (GONE_ON, ENOUGH) if further else (BETTER, KEPT)
     ours, theirs = (_error(one, judging, config, tolerance) for one in (again, chosen))
-    better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs[1]))
+    led_back = _strays(chosen) and not _strays(again) and ours[1] <= (1.0 + NEAR) ** 2 * theirs[1]
+    better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs[1]) or led_back)
     found = again if better else whole()
     # What was interrupted is made again by who goes on later, whichever of both is shown until then.
     status = again.status if again.status is Status.INTERRUPTED else found.status
     return replace(found, status=status, notes=(*found.notes, taken if better else left))
+
+
+def _strays(fit: FitResult) -> bool:
+    """Whether the free run leaves its bounds, or hangs on where it began."""
+    return fit.status is Status.UNSTABLE or bool((fit.stability or {}).get("apart"))
 
 
 def _error(

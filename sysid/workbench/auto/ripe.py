@@ -13,7 +13,7 @@ from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import Budget
 from sysid.workbench.auto.parts import FURTHER
-from sysid.workbench.auto.plan import Rank
+from sysid.workbench.auto.worth import Rank
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.search_space import Point
 

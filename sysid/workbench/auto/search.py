@@ -8,21 +8,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, AbstractStructure
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import SweepRecord, Trial
-from sysid.workbench.auto.budget import FINAL, GOING_ON, RACE, REFIT, TRIAL, TRIAL_OF_MANY, Budget, price
+from sysid.workbench.auto.budget import FINAL, RACE, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.finish import MOST_KEPT, finish_s, span
+from sysid.workbench.auto.last_fit import LAST_FITS, LINEAR_LAST, RIPENING, LastFit, refit_share
 from sysid.workbench.auto.look import Looked, look
-from sysid.workbench.auto.parts import ENSEMBLE, LAST, UNITED, Parts, part
-from sysid.workbench.auto.plan import AGAIN, FINALISTS, SCATTER, Plan, Rank, ranked_by
+from sysid.workbench.auto.parts import Parts, part
+from sysid.workbench.auto.plan import AGAIN, Plan
 from sysid.workbench.auto.race import Race, trains_on
 from sysid.workbench.auto.ripe import Ripening, young_told
 from sysid.workbench.auto.trials import Trials
 from sysid.workbench.auto.words import Choice, choose, sentence
+from sysid.workbench.auto.worth import Rank, error, ranked_by
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.fit_steps import GivenFit
@@ -44,11 +45,6 @@ APART = (
     "end is the mean of several starts."
 )
 """What is said where that is so."""
-LAST_FITS, LINEAR_LAST, RIPENING = 0.9, 0.25, 3
-"""Share of the time that is left which the last fits may train, as they do more than that; of it, that of the best
-linear model; and iterations of a network below which it is not begun."""
-SURE, LEAST_LAST = 2.0, 0.05
-"""Times what the last fits are expected to take that is kept for them, and share of the time that is in any case."""
 LEAST_SHARE = 0.1
 """Share of the time of a search in which trials can be made at least."""
 CHECKED = 50
@@ -67,18 +63,6 @@ def stand_in(config: AutoConfig) -> AbstractStructure:
     """
     m = len(config.mapping.inputs)
     return ARX(na=1, nb=(1,) * m, nk=(1,) * m)
-
-
-def refit_share(parts: Parts) -> float:
-    """Share of the time that is kept for the last fit.
-
-    Args:
-        parts: What is fitted and what chooses.
-
-    Returns:
-        More where the chosen network goes on from where its trial had ended.
-    """
-    return GOING_ON if parts.trained_on else REFIT
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -249,7 +233,7 @@ class Search:
         while points := plan.ask():
             found = trials.run(points)
             plan.tell(ripening(points, found) if self.parts.trained_on else found)
-            budget.refit = self._kept_for_the_last(plan)
+            budget.refit = self._last.kept(plan)
         if not math.isfinite(plan.least()):
             raise ConfigError(
                 "nothing that was tried can be used",
@@ -271,14 +255,15 @@ class Search:
             )  # fmt: skip
             plan.trials[:], spent = race.run(plan.trials)
             kept, raced = kept - spent, len(race.in_it)
-        checks = Checks(driver=first, bench=self.bench.fold(0))
+        whole = () if self.data.selection else self.data.estimation
+        checks = Checks(driver=first, bench=self.bench.fold(0), whole=whole)
         choice = choose(
             plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance,
             goes_on=lambda trial: self.parts.trained_on and trains_on(structure_from_dict(trial.structure)),
         )  # fmt: skip
         needs_s = _needs_s(plan, clock.total)
         shown, hurried = {FOUND: choice.chosen}, _hurried(plan, choice.chosen, clock.total, needs_s)
-        united = self._united(plan, choice.chosen, clock.total)
+        united = self._last.united(plan, choice.chosen, clock.total)
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear
         return Found(
@@ -306,45 +291,9 @@ class Search:
             done_now=trials.done_now,
         )
 
-    def _united(self, plan: Plan, chosen: Trial, spent_s: float) -> Mapping[str, Any]:
-        """How the last fit is trained where it is the mean of several starts, as of one alone it would say little."""
-        row = estimator_of(structure_from_dict(chosen.structure))
-        apart = "ensemble" in chosen.values or plan.scattered.get(chosen.number, 0.0) > SCATTER
-        if self.parts.trained_on or not row.unites or not apart:
-            return {}
-        # As many starts as there is time for: halfway trained, none of them says anything.
-        left = LAST_FITS * (plan.budget.ends_s - spent_s)
-        return next((way for way in (UNITED, ENSEMBLE) if self._last_s(plan, chosen, way) <= left), {})
-
-    def _last_s(self, plan: Plan, trial: Trial, way: Mapping[str, Any]) -> float:
-        """How long a last fit takes by the clock, as its trial tells; NaN where it does not."""
-        structure = structure_from_dict(trial.structure)
-        more = sum(map(len, self.data.estimation)) / sum(map(len, self.parts.folds[0].fitted))
-        slowed = 1.0 if self.config.wall_s is None else plan.budget.slowed
-        if estimator_of(structure).linear:
-            return slowed * trial.cpu_s * more / len(self.parts.folds)
-        if estimator_of(structure).training is not Training:
-            return math.nan
-        point = plan.points[trial.number]
-        models = 1 if structure.for_outputs(self._n_outputs).several_outputs else self._n_outputs
-        longer = replace(point, training={**point.training, **way})
-        return slowed * trial.iteration_s * price(longer) * more * models
-
-    def _kept_for_the_last(self, plan: Plan) -> float:
-        """Share of the time that is kept for the last fits: no more than those of the best take, and as much again.
-
-        On a short record that is a few seconds, where a fifth of the time had been kept.
-        """
-        most, wall_s = refit_share(self.parts), self.config.wall_s
-        usable = [one for one in sorted(plan.trials, key=self._rank) if math.isfinite(error(one))]
-        kinds = {one.number: estimator_of(structure_from_dict(one.structure)) for one in usable}
-        best = [one for one in usable if not kinds[one.number].linear][:FINALISTS]
-        if wall_s is None or self.parts.trained_on or not best:
-            return most
-        need = [self._last_s(plan, one, UNITED if kinds[one.number].unites else LAST) for one in best]
-        need += [self._last_s(plan, one, {}) / LINEAR_LAST for one in usable if kinds[one.number].linear][:1]
-        told = max(need) if all(map(math.isfinite, need)) else math.inf
-        return min(most, max(LEAST_LAST, SURE * told / wall_s))
+    @property
+    def _last(self) -> LastFit:
+        return LastFit(config=self.config, data=self.data, parts=self.parts)
 
     @property
     def _rank(self) -> Rank:
@@ -431,19 +380,6 @@ def _left_out(plan: Plan) -> list[str]:
     """What was not tried for want of time."""
     some = ", ".join(plan.left_out)
     return [f"Linear models that would have taken the time of nonlinear ones were left out: {some}."] if some else []
-
-
-def error(trial: Trial) -> float:
-    """What chooses.
-
-    Args:
-        trial: A trial.
-
-    Returns:
-        The mean square of its free run over what chooses; infinite for what cannot be used.
-    """
-    value = float(trial.selection_free_run_mse)
-    return value if trial.in_full and math.isfinite(value) else math.inf
 
 
 def _progress(event: events.Event, plan: Plan) -> events.Event:

@@ -10,7 +10,8 @@ from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.numbers import number, quantity
 from sysid.reporting.sweep_record import Trial
 from sysid.validation.resolution import tied
-from sysid.workbench.auto.plan import ALIKE, RIVAL, ranked_by
+from sysid.workbench.auto.plan import ALIKE, RIVAL
+from sysid.workbench.auto.worth import ranked_by
 from sysid.workbench.sweep.trial import FAILED
 
 Error = Callable[[Trial], float]

@@ -15,7 +15,7 @@ from sysid.estimation import FitResult, Loop, Status, Training
 from sysid.estimation.estimators import estimator_of, with_stability
 from sysid.estimation.networks.choosing import VETTED
 from sysid.reporting.sweep_record import Trial
-from sysid.traces import Role
+from sysid.traces import Role, Trace
 from sysid.workbench.fits.fit_steps import GivenFit
 from sysid.workbench.runner.steps import Work
 from sysid.workbench.runner.store import digest, strict
@@ -40,10 +40,13 @@ class Checks:
     Args:
         driver: Has the trials.
         bench: Traces and conditions.
+        whole: The estimation traces where trials have seen pieces of them alone: sequences that are made of pieces are
+            too short for a run to lose its way on them.
     """
 
     driver: Driver
     bench: Bench
+    whole: Sequence[Trace] = ()
     found: dict[int, list[FitResult]] = field(default_factory=dict)
     """Fits that were checked, by the trial's number."""
 
@@ -123,14 +126,17 @@ class Checks:
             terms = {
                 "job": self.driver.last[trial.number].key,
                 "stability": self.bench.stability.terms,
+                **({"whole": [trace.digest for trace in self.whole]} if self.whole else {}),
             }
             key = digest(strict(terms))
             outcome = store.read(key)
             if outcome is None:
-                estimation = self.bench.traces.with_role(Role.ESTIMATION)
+                estimation = self.whole or self.bench.traces.with_role(Role.ESTIMATION)
                 # A trial that chose between starts was checked as it did.
                 first, *further = [
-                    fit if fit.stability is not None else with_stability(fit, estimation, self.bench.stability)
+                    fit
+                    if fit.stability is not None and not self.whole
+                    else with_stability(fit, estimation, self.bench.stability)
                     for fit in self._stored(trial)
                 ]
                 outcome = {

@@ -81,3 +81,17 @@ def test_a_fit_that_does_not_forget_says_so_and_keeps_its_status(monkeypatch: py
     assert len(told.warnings) == 1
     assert "hangs on where it began, on 9 of 20 random sequences" in told.warnings[0]
     assert set(told.warnings) <= set(told.notes)
+
+
+def test_a_check_takes_the_place_of_what_one_before_it_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    check = FreeRunCheck.of(StabilityOptions(count=20), MAPPING, [record()])
+    fit = FitResult(model=model(), status=Status.CONVERGED, loop=Loop.CLOSED, history={}, train_time_s=0.0)
+    asked = check.finding(model())
+    assert asked is not None
+    swings = replace(asked, beginnings=Beginnings(sequences=20, apart=9))
+    with monkeypatch.context() as patched:
+        patched.setattr(FreeRunCheck, "finding", lambda *_, **__: swings)
+        told = check.applied(replace(fit, notes=("kept",), warnings=("kept",)))
+    again = check.applied(told)
+    assert again.notes == ("kept", asked.sentence)
+    assert again.warnings == ("kept",)

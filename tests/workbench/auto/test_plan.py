@@ -14,8 +14,8 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import FINAL, Budget, price
 from sysid.workbench.auto.look import Looked
 from sysid.workbench.auto.parts import ENSEMBLE
-from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, FIRST, MET, PATIENCE, Plan, scatter, with_repeats
-from sysid.workbench.auto.search import error
+from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, FIRST, MET, PATIENCE, Plan
+from sysid.workbench.auto.worth import error, scatter, with_repeats
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import NOT_DONE
 

@@ -10,9 +10,8 @@ import pytest
 
 from sysid.models import ARX, NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.plan import ranked_by
 from sysid.workbench.auto.race import FINALISTS, Race, behind
-from sysid.workbench.auto.search import error
+from sysid.workbench.auto.worth import error, ranked_by
 from sysid.workbench.sweep.search_space import Point
 from tests.workbench.auto.test_plan import trial
 

@@ -11,9 +11,8 @@ import pytest
 from sysid.models import NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import Budget
-from sysid.workbench.auto.plan import ranked_by
 from sysid.workbench.auto.ripe import LONGEST, RIPE, Ripening, is_young, young_told
-from sysid.workbench.auto.search import error
+from sysid.workbench.auto.worth import error, ranked_by
 from sysid.workbench.sweep.search_space import Point
 from tests.workbench.auto.test_plan import trial
 

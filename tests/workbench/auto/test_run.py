@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import signal
 import threading
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,29 +18,23 @@ from sysid.errors import ConfigError
 from sysid.estimation import estimators
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.ingest import write_csv
-from sysid.models import NeuralStateSpace
 from sysid.reporting.results import read_results
-from sysid.reporting.sweep_record import Trial
 from sysid.traces import Role
 from sysid.workbench.auto import run
-from sysid.workbench.auto.budget import REFIT, Budget, price
+from sysid.workbench.auto.budget import Budget
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.parts import ENSEMBLE, UNITED
-from sysid.workbench.auto.plan import SCATTER, ranked_by
 from sysid.workbench.auto.refit import ENOUGH, GONE_ON, _error
 from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto
-from sysid.workbench.auto.search import FOUND, LEAST_LAST, LINEAR, SURE, Search, error
+from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.events import Event, StepProgress
-from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.store import Clock, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
 from tests.workbench.auto.conftest import data, record, traces
-from tests.workbench.auto.test_plan import trial
 
 pytestmark = pytest.mark.usefixtures("small")
 
@@ -123,48 +114,11 @@ def test_where_its_starts_are_apart_the_last_fit_is_the_mean_of_several(
 ) -> None:
     """Of starts that fit a short record alike the one of most evidence was 0.61 V off on another, their mean 0.32 V."""
     for scatter, mean in ((-1.0, True), (10.0, False)):
-        monkeypatch.setattr("sysid.workbench.auto.search.SCATTER", scatter)
+        monkeypatch.setattr("sysid.workbench.auto.last_fit.SCATTER", scatter)
         found = searched(tmp_path / str(mean), known, iterations=SEVERAL)
         assert "ensemble" not in found.record.winning.values
         assert ("mean of" in found.results.fits[0].label) is mean
         assert ("the mean of several starts" in found.record.chosen_by) is mean
-
-
-NETWORK = NeuralStateSpace(states=2, neurons=3)
-POINT = Point(number=7, structure=NETWORK, training={"max_iterations": 100, "choose_by": "evidence"}, values={})
-
-
-def seen(known: Data, *, iteration_s: float, **budget: float) -> tuple[Any, Any, Trial]:
-    """A search of ten minutes that has tried one network: as far as it looks, its plan, and the trial."""
-    fold = SimpleNamespace(fitted=known.estimation)
-    parts = SimpleNamespace(trained_on=False, folds=[fold])
-    search: Any = SimpleNamespace(parts=parts, data=known, config=SimpleNamespace(wall_s=600.0), _n_outputs=1)
-    search._last_s, search._rank = partial(Search._last_s, search), ranked_by(error, None)
-    one = trial(POINT, 1.0).model_copy(update={"iteration_s": iteration_s})
-    plan: Any = SimpleNamespace(points={7: POINT}, trials=[one], budget=SimpleNamespace(slowed=1.0, **budget))
-    return search, plan, one
-
-
-@pytest.mark.parametrize(("left_s", "way"), [(1e9, UNITED), (50.0, ENSEMBLE), (5.0, {})])
-def test_as_many_starts_are_united_as_there_is_time_for(known: Data, left_s: float, way: dict[str, int]) -> None:
-    """Starts that are halfway trained say nothing."""
-    search, plan, one = seen(known, iteration_s=0.03, ends_s=100.0 + left_s)
-    plan.scattered = {7: 2.0 * SCATTER}
-    assert Search._united(search, plan, one, 100.0) == way
-    plan.scattered[7] = 0.5 * SCATTER
-    assert Search._united(search, plan, one, 100.0) == {}
-
-
-@pytest.mark.parametrize(
-    ("iteration_s", "share"), [(1e-4, LEAST_LAST), (0.02, SURE * 0.02 * 1632 / 600.0), (1.0, REFIT), (math.nan, REFIT)]
-)
-def test_no_more_is_kept_for_the_last_fit_than_it_takes(known: Data, iteration_s: float, share: float) -> None:
-    """On a short record a fifth of the time had been kept for what takes seconds: 12 trials in place of 17."""
-    search, plan, _ = seen(known, iteration_s=iteration_s)
-    assert price(replace(POINT, training={**POINT.training, **UNITED})) == 1632
-    assert Search._kept_for_the_last(search, plan) == pytest.approx(share)
-    plan.trials = []
-    assert Search._kept_for_the_last(search, plan) == REFIT
 
 
 def test_where_selection_traces_chose_it_is_trained_on_and_they_say_whether_for_the_better(tmp_path: Path) -> None:

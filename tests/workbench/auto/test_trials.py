@@ -11,8 +11,8 @@ import pytest
 
 from sysid.models import NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.search import error
 from sysid.workbench.auto.trials import HOPELESS, SEEN, Trials, together
+from sysid.workbench.auto.worth import error
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import NOT_DONE
 from tests.workbench.auto.test_plan import trial

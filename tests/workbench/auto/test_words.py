@@ -8,8 +8,8 @@ import numpy as np
 
 from sysid.models import ARX, NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.search import error
 from sysid.workbench.auto.words import choose, sentence
+from sysid.workbench.auto.worth import error
 from sysid.workbench.sweep.search_space import Point
 from tests.workbench.auto.test_plan import trial
 

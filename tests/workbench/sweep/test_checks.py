@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -48,3 +49,31 @@ def test_the_first_stable_one_and_of_those_alike_one_that_forgets(
     ranked: Any = [SimpleNamespace(number=n, selection_free_run_mse=mse) for n, mse in enumerate(errors)]
     winner, passed_over = checks(monkeypatch, found).first_stable(ranked)
     assert (winner.number, passed_over) == (chosen, refused)
+
+
+def test_a_trial_that_saw_pieces_is_checked_over_the_whole_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of pieces of 94 samples sequences are so short that a run lost its way on none; of the record, on 7 of 60."""
+    from sysid.workbench.sweep import checks as module
+
+    asked: list[Any] = []
+    fit = SimpleNamespace(status=Status.CONVERGED, stability={"apart": 0}, to_dict=lambda: {"of": "pieces"})
+
+    def checked(one: Any, estimation: Any, _: Any) -> Any:
+        asked.append(estimation)
+        return one
+
+    monkeypatch.setattr(module, "with_stability", checked)
+    monkeypatch.setattr(module.FitResult, "from_dict", lambda _: fit)
+    monkeypatch.setattr(Checks, "_stored", lambda *_: [fit])
+    bench: Any = SimpleNamespace(
+        stability=SimpleNamespace(terms={}), traces=SimpleNamespace(with_role=lambda _: ["pieces"])
+    )
+    driver: Any = SimpleNamespace(last={1: SimpleNamespace(key="k")}, store=SimpleNamespace(path=tmp_path))
+    one: Any = SimpleNamespace(number=1)
+    record: Any = SimpleNamespace(digest="d")
+    Checks(driver=driver, bench=bench)._checked(one)
+    assert asked == []  # as the trial was
+    Checks(driver=driver, bench=bench, whole=[record])._checked(one)
+    assert asked == [[record]]
