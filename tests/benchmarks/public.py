@@ -109,9 +109,9 @@ def benchmark(file: Path, seeds: list[int], minutes: float | None) -> None:
         read(name, digest)
     suffix = suffix_of(file)
     rows = ROWS[file.stem.removesuffix(suffix)]
-    by, declared = DECLARED.get(suffix, ("", "nothing"))
+    by, declared = DECLARED.get(suffix, ("by the search", "nothing"))
     by_clock = "" if minutes is None else f"; a search of {minutes:g} min by the clock"
-    named = f"{data.name} {by}".strip()
+    named = f"{data.name} {by}"
     errors: dict[str, list[float]] = {case: [] for case in rows}
     print(f"{data.name}: {read_yaml(file)['description']}")
     with tempfile.TemporaryDirectory() as scratch:
