@@ -11,7 +11,6 @@ from sysid.airbrake.flow import (
     flow_coefficient,
     flow_function,
     flow_table,
-    table_from_points,
 )
 from sysid.errors import StabilityError
 
@@ -65,29 +64,3 @@ def test_the_laminar_branch_is_linear_and_continuous() -> None:
 def test_a_laminar_branch_elsewhere_is_refused(laminar: float) -> None:
     with pytest.raises(StabilityError, match="laminar branch"):
         flow_table(laminar_ratio=laminar)
-
-
-def test_somebodys_own_points_are_taken() -> None:
-    ratio = 1.0 - np.linspace(1.0, 0.0, 3001) ** 2
-    table = table_from_points(ratio, flow_coefficient(ratio))
-    probe = np.linspace(0.0, 1.0, 777)
-    np.testing.assert_allclose(table(probe), flow_coefficient(probe), atol=2e-8)
-
-
-@pytest.mark.parametrize(
-    ("ratio", "coefficient", "said"),
-    [
-        ([0.0, 0.5, 0.99], [0.034, 0.03, 0.005], "does not cover"),
-        ([0.1, 0.5, 1.0], [0.034, 0.03, 0.0], "does not cover"),
-        ([0.0, 0.5, 1.0], [0.034, 0.03, 0.001], "zero flow"),
-        ([0.0, 0.5, 1.0], [0.034, -0.03, 0.0], "zero flow"),
-        ([0.0, 1.0, 0.5], [0.034, 0.0, 0.03], "not a table"),
-        ([0.0, 1.0], [0.034], "not a table"),
-    ],
-    ids=["short of r = 1", "starts late", "flow at r = 1", "negative", "unsorted", "shapes"],
-)
-def test_a_table_that_cannot_carry_a_simulation_is_refused(
-    ratio: list[float], coefficient: list[float], said: str
-) -> None:
-    with pytest.raises(StabilityError, match=said):
-        table_from_points(np.array(ratio), np.array(coefficient))

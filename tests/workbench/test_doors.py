@@ -23,10 +23,12 @@ from sysid.traces import Role, TraceSet
 from sysid.workbench.assembly.member_config import MemberConfig
 from sysid.workbench.fits.config import Pipeline, parse_pipeline
 from sysid.workbench.fits.record import read_fit
-from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.fits.run import program_of
+from sysid.workbench.runner.program import carry_out
 from sysid.workbench.runner.store import strict
 from sysid.workbench.sweep.config import SweepConfig
-from sysid.workbench.sweep.run import Sweep, run_sweep
+from sysid.workbench.sweep.run import Sweep
+from sysid.workbench.sweep.run import program_of as program_of_sweep
 from sysid.workbench.sweep.workers import InThisProcess
 from sysid.yaml_files import yaml_text
 
@@ -127,7 +129,7 @@ def in_a_pipeline(place: Path, *fits: dict[str, Any], shared: dict[str, Any] = S
     named = [{"name": f"fit {number}", **fit} for number, fit in enumerate(fits)]
     text = yaml_text({"name": "doors", **shared, "fits": named})
     pipeline = Pipeline(config=parse_pipeline(text), text=text, path=place / "pipelines" / "doors.yaml")
-    run_pipeline(pipeline, place / "runs" / "doors", command="")
+    carry_out(program_of(pipeline), place / "runs" / "doors", command="")
     return read_fit(place / "runs" / "doors" / "fits" / pipeline.config.fits[-1].slug)
 
 
@@ -135,7 +137,11 @@ def in_a_sweep(place: Path, structure: dict[str, Any], training: dict[str, Any] 
     fields = {"kind": "sweep", "name": "swept", **SHARED, "structure": structure, "training": training or {}, **more}
     config = check(SweepConfig, fields, where="here")
     sweep = Sweep(config=config, text=yaml_text(fields), path=place / "pipelines" / "swept.yaml")
-    run_sweep(sweep, place / "runs" / "swept", command="", find_workers=lambda bench, _: InThisProcess(bench))
+    carry_out(
+        program_of_sweep(sweep, find_workers=lambda bench, _: InThisProcess(bench)),
+        place / "runs" / "swept",
+        command="",
+    )
     return read_fit(place / "runs" / "swept" / "fits" / "sweep-winner")
 
 

@@ -354,8 +354,3 @@ def parse_pipeline(text: str, *, where: object = "text") -> PipelineConfig:
         'ARX [1; 1; 1]'
     """
     return check(PipelineConfig, parse_yaml(text, where=where), where=where)
-
-
-def json_schema() -> dict[str, Any]:
-    """The YAML's JSON schema, for editors that complete and check while one types."""
-    return PipelineConfig.model_json_schema()

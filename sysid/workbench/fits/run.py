@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,7 @@ from sysid.workbench.fits.choice import Choice
 from sysid.workbench.fits.config import Pipeline, read_pipeline
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
 from sysid.workbench.fits.table import table_of_fits, told_of_fits
-from sysid.workbench.runner import events
-from sysid.workbench.runner.program import Closing, Program, carry_out
+from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.store import write_bytes
 
 if TYPE_CHECKING:
@@ -55,37 +54,6 @@ def program_of(
         outline=work.outline,
         closing=closing,
     )
-
-
-def run_pipeline(
-    pipeline: Pipeline,
-    folder: Path,
-    *,
-    command: str,
-    fresh: bool = False,
-    watchers: Sequence[events.Watcher] = (),
-) -> Results:
-    """Run a pipeline; what an earlier run has finished is not done again.
-
-    Ctrl-C ends the fit that is running and keeps its best model so far; that fit is used now, and goes on in the next
-    run.
-
-    Args:
-        pipeline: What to do.
-        folder: The run folder.
-        command: The command that makes the run again, for the report.
-        fresh: Do everything again.
-        watchers: Told everything that happens, in order.
-
-    Returns:
-        The contents of ``results.json``.
-
-    Raises:
-        BusyError: If another run is at work in the folder.
-        UserError: If data or options cannot be used as they are.
-        ParityError: If an exported file differs from its model.
-    """
-    return carry_out(program_of(pipeline), folder, command=command, fresh=fresh, watchers=watchers)
 
 
 def closing(results: Results, folder: Path) -> Closing:

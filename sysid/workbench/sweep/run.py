@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysid.field_checks import check
 from sysid.workbench.fits.table import table_of_fits, told_of_fits
-from sysid.workbench.runner import events
-from sysid.workbench.runner.program import Closing, Program, carry_out
+from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.sweep_steps import Hire, Sweep, SweepSteps, Swept
@@ -96,37 +94,6 @@ def program_of(sweep: Sweep, *, find_workers: Hire = hire) -> Program[Swept]:
         closing=closing,
         verb="sweep",
     )
-
-
-def run_sweep(
-    sweep: Sweep,
-    folder: Path,
-    *,
-    command: str,
-    fresh: bool = False,
-    watchers: Sequence[events.Watcher] = (),
-    find_workers: Hire = hire,
-) -> Swept:
-    """Run a sweep; what an earlier session has finished is not done again, however that session ended.
-
-    Args:
-        sweep: What to do.
-        folder: The run folder.
-        command: The command that makes the run again, for the report.
-        fresh: Do everything again.
-        watchers: Told everything that happens, in order.
-        find_workers: Finds who does the jobs.
-
-    Returns:
-        Every trial, and the winner's results.
-
-    Raises:
-        BusyError: If another run is at work in the folder.
-        UserError: If data or options cannot be used as they are, or no trial can.
-        ParityError: If an exported file differs from its model.
-    """
-    done = program_of(sweep, find_workers=find_workers)
-    return carry_out(done, folder, command=command, fresh=fresh, watchers=watchers)
 
 
 def closing(swept: Swept, folder: Path) -> Closing:

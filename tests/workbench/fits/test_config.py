@@ -15,7 +15,7 @@ from sysid.estimation import Loop, Training
 from sysid.field_checks import check
 from sysid.models import NARX, StartKind
 from sysid.workbench.assembly.extending import read_joined
-from sysid.workbench.fits.config import find_pipeline, json_schema, parse_pipeline
+from sysid.workbench.fits.config import PipelineConfig, find_pipeline, parse_pipeline
 from sysid.workbench.kinds import kind_of, kinds
 
 GOOD = """\
@@ -144,12 +144,12 @@ def test_delays_for_three_inputs_of_two_are_named() -> None:
 
 
 def test_options_of_the_yaml_are_those_of_the_code() -> None:
-    properties = json_schema()["$defs"]["TrainingConfig"]["properties"]
+    properties = PipelineConfig.model_json_schema()["$defs"]["TrainingConfig"]["properties"]
     assert list(properties) == [field.name for field in dataclasses.fields(Training)]
 
 
 def test_schema_knows_the_structures() -> None:
-    fit = json_schema()["$defs"]["FitConfig"]["properties"]["structure"]
+    fit = PipelineConfig.model_json_schema()["$defs"]["FitConfig"]["properties"]["structure"]
     kinds = {choice["title"]: choice for choice in fit["oneOf"]}
     assert kinds["NARX"]["required"] == ["kind", "input_delays", "output_delays", "neurons"]
     assert set(kinds["ARX"]["properties"]) == {"kind", "na", "nb", "nk", "intercept"}

@@ -10,8 +10,9 @@ import pytest
 from sysid.reporting.results import Results
 from sysid.workbench.fits.config import read_pipeline
 from sysid.workbench.fits.record import read_fit
-from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner.events import Event, StepProgress
+from sysid.workbench.runner.program import carry_out
 from sysid.workbench.runner.store import RunFolder
 
 pytestmark = pytest.mark.usefixtures("quick_report")
@@ -36,7 +37,7 @@ class Watcher:
 
 def run(workspace: Path, name: str, watcher: Watcher, **options: Any) -> Results:
     read = read_pipeline(workspace / "pipelines" / "first.yaml")
-    return run_pipeline(read, workspace / name, command="sysid run first", watchers=[watcher], **options)
+    return carry_out(program_of(read), workspace / name, command="sysid run first", watchers=[watcher], **options)
 
 
 def parameters(workspace: Path, name: str) -> dict[str, Any]:

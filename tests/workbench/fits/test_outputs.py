@@ -21,11 +21,13 @@ from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import table
 from sysid.workbench.fits.config import Pipeline, parse_pipeline
 from sysid.workbench.fits.record import read_fit
-from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.fits.run import program_of
 from sysid.workbench.fits.table import table_of_fits
 from sysid.workbench.runner import events
+from sysid.workbench.runner.program import carry_out
 from sysid.workbench.sweep.config import SweepConfig
-from sysid.workbench.sweep.run import Sweep, run_sweep
+from sysid.workbench.sweep.run import Sweep
+from sysid.workbench.sweep.run import program_of as program_of_sweep
 from sysid.workbench.sweep.workers import InThisProcess
 
 DATASET = """\
@@ -83,7 +85,7 @@ def fill(folder: Path) -> None:
 def run(folder: Path, text: str = PIPELINE, watch: list[events.Event] | None = None) -> Results:
     pipeline = Pipeline(config=parse_pipeline(text), text=text, path=folder / "pipelines" / "both.yaml")
     heard = [] if watch is None else [watch.append]
-    return run_pipeline(pipeline, folder / "runs" / "both", command="sysid run both", watchers=heard)
+    return carry_out(program_of(pipeline), folder / "runs" / "both", command="sysid run both", watchers=heard)
 
 
 @pytest.fixture(scope="module")
@@ -228,7 +230,11 @@ def test_a_sweep_tries_all_outputs_of_a_point(place: Path, monkeypatch: pytest.M
         "structure": SWEPT, "training": {"max_iterations": 2}, "export": None, "stability": {"count": 0},
     }  # fmt: skip
     sweep = Sweep(config=check(SweepConfig, fields, where="here"), text="", path=place / "pipelines" / "swept.yaml")
-    found = run_sweep(sweep, place / "runs" / "swept", command="", find_workers=lambda bench, _: InThisProcess(bench))
+    found = carry_out(
+        program_of_sweep(sweep, find_workers=lambda bench, _: InThisProcess(bench)),
+        place / "runs" / "swept",
+        command="",
+    )
     assert [trial.label.split()[0] for trial in found.record.trials] == ["ARX", "ARX", "VectorNARX"]
     assert all(trial.usable for trial in found.record.trials), [trial.reason for trial in found.record.trials]
     # Errors count over the variances of their outputs: neither centimetres nor kelvins rule.
@@ -249,10 +255,14 @@ def test_a_state_space_of_several_outputs_is_one_through_every_door(
     fits = {"name": "both", **shared, "fits": [{"name": "SS", "structure": structure}]}
     text = yaml.safe_dump(fits)
     pipeline = Pipeline(config=parse_pipeline(text), text=text, path=place / "pipelines" / "ss.yaml")
-    run_pipeline(pipeline, place / "runs" / "ss", command="")
+    carry_out(program_of(pipeline), place / "runs" / "ss", command="")
     swept = {"kind": "sweep", "name": "swept", **shared, "structure": structure}
     sweep = Sweep(config=check(SweepConfig, swept, where="here"), text="", path=place / "pipelines" / "swept-ss.yaml")
-    run_sweep(sweep, place / "runs" / "swept-ss", command="", find_workers=lambda bench, _: InThisProcess(bench))
+    carry_out(
+        program_of_sweep(sweep, find_workers=lambda bench, _: InThisProcess(bench)),
+        place / "runs" / "swept-ss",
+        command="",
+    )
     traces = sysid.load(place / "datasets" / "tanks" / "dataset.yaml")
     python = sysid.fit(traces, "u+w -> level+heat", sysid.LinearStateSpace(states=2))
     assert isinstance(python, sysid.Fit)

@@ -26,8 +26,9 @@ from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import read_pipeline
 from sysid.workbench.fits.data import load_data
 from sysid.workbench.fits.record import read_fit, read_scores
-from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner import events, store
+from sysid.workbench.runner.program import carry_out
 from sysid.workbench.runner.store import RunFolder
 
 FITS = ("ARX", "open loop", "closed loop")
@@ -42,7 +43,9 @@ def run(workspace: Path, *, fresh: bool = False) -> tuple[Results, dict[str, boo
             stored[event.config.name] = event.stored
 
     read = read_pipeline(workspace / "pipelines" / "first.yaml")
-    return run_pipeline(read, workspace / "run", command="sysid run first", fresh=fresh, watchers=[watch]), stored
+    return carry_out(
+        program_of(read), workspace / "run", command="sysid run first", fresh=fresh, watchers=[watch]
+    ), stored
 
 
 def rewrite(workspace: Path, old: str, new: str) -> None:
@@ -246,7 +249,8 @@ from pathlib import Path
 import sysid.reporting.report
 from sysid.workbench.runner import store
 from sysid.workbench.fits.config import read_pipeline
-from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.fits.run import program_of
+from sysid.workbench.runner.program import carry_out
 
 replacing = store.replacing
 def dying(path):
@@ -254,7 +258,7 @@ def dying(path):
         os.kill(os.getpid(), signal.SIGKILL)
     return replacing(path)
 store.replacing = dying
-run_pipeline(read_pipeline(Path("pipelines/first.yaml")), Path("run"), command="sysid run first")
+carry_out(program_of(read_pipeline(Path("pipelines/first.yaml"))), Path("run"), command="sysid run first")
 """
 
 
@@ -336,7 +340,7 @@ def test_a_run_that_is_killed_early_leaves_results_of_what_is_finished(workspace
 
     read = read_pipeline(workspace / "pipelines" / "first.yaml")
     with pytest.raises(KeyboardInterrupt):
-        run_pipeline(read, workspace / "run", command="sysid run first", watchers=[stop])
+        carry_out(program_of(read), workspace / "run", command="sysid run first", watchers=[stop])
     left = read_results(workspace / "run")
     assert [fit.name for fit in left.fits] == ["ARX", "open loop"]
     assert left.best is None
@@ -356,7 +360,7 @@ def test_progress_of_several_starts_never_falls(workspace: Path) -> None:
             shares.append(event.fraction)
 
     read = read_pipeline(workspace / "pipelines" / "first.yaml")
-    run_pipeline(read, workspace / "run", command="", watchers=[watch])
+    carry_out(program_of(read), workspace / "run", command="", watchers=[watch])
     assert len(shares) > 10
     assert (np.diff(shares) >= 0.0).all()
     assert 0.0 <= shares[0] < shares[-1] <= 1.0

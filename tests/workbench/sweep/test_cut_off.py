@@ -15,10 +15,11 @@ from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquard
 from sysid.export import read_bundle
 from sysid.traces import Role, TraceSet
 from sysid.workbench.cli import run_cli
+from sysid.workbench.runner.program import carry_out
 from sysid.workbench.runner.store import RunFolder
 from sysid.workbench.sweep import trial
 from sysid.workbench.sweep.config import SweepConfig
-from sysid.workbench.sweep.run import Swept, read_sweep_file, run_sweep
+from sysid.workbench.sweep.run import Swept, program_of, read_sweep_file
 from sysid.workbench.sweep.store import TrialStore
 from sysid.workbench.sweep.trial import Bench, Job, forget_checkpoint
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
@@ -52,7 +53,9 @@ def here(bench: Bench, _: SweepConfig) -> AbstractWorkers:
 def run(workspace: Path, folder: str) -> Swept:
     file = workspace / "pipelines" / "tries.yaml"
     file.write_text(SWEEP, encoding="utf-8")
-    return run_sweep(read_sweep_file(file), workspace / "runs" / folder, command="sysid sweep tries", find_workers=here)
+    return carry_out(
+        program_of(read_sweep_file(file), find_workers=here), workspace / "runs" / folder, command="sysid sweep tries"
+    )
 
 
 def found(swept: Swept) -> str:

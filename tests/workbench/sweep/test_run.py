@@ -17,8 +17,9 @@ from sysid.reporting.results import read_results
 from sysid.reporting.sweep_record import read_sweep
 from sysid.workbench.cli import run_cli
 from sysid.workbench.runner.events import Event, StepProgress, Warned
+from sysid.workbench.runner.program import carry_out
 from sysid.workbench.sweep.config import SweepConfig
-from sysid.workbench.sweep.run import Swept, read_sweep_file, run_sweep
+from sysid.workbench.sweep.run import Swept, program_of, read_sweep_file
 from sysid.workbench.sweep.table import table_of_trials
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
@@ -57,12 +58,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory, write_rig: Callable[[Path],
 def run(place: Path, text: str = SWEEP, *watchers: object) -> Swept:
     file = place / "pipelines" / "tries.yaml"
     file.write_text(text, encoding="utf-8")
-    return run_sweep(
-        read_sweep_file(file),
+    return carry_out(
+        program_of(read_sweep_file(file), find_workers=here),
         place / "runs" / "tries",
         command="sysid sweep tries",
         watchers=watchers,
-        find_workers=here,
     )
 
 

@@ -20,7 +20,8 @@ from sysid.names import tracking_key
 from sysid.reporting.results import Results
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits.config import read_pipeline
-from sysid.workbench.fits.run import run_pipeline
+from sysid.workbench.fits.run import program_of
+from sysid.workbench.runner.program import carry_out
 from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_store as tracking
 from sysid.workbench.tracking import mlflow_views as views
@@ -34,7 +35,9 @@ def track(workspace: Path, name: str = "first", *, fresh: bool = False) -> tuple
     told: list[str] = []
     tracker = Tracker.of_workspace(workspace, told.append)
     read = read_pipeline(workspace / "pipelines" / f"{name}.yaml")
-    results = run_pipeline(read, workspace / "run", command=f"sysid run {name}", fresh=fresh, watchers=[tracker])
+    results = carry_out(
+        program_of(read), workspace / "run", command=f"sysid run {name}", fresh=fresh, watchers=[tracker]
+    )
     assert len(told) == len(tracker.failures)
     return tracker, results
 
