@@ -12,6 +12,7 @@ what a pipeline or a command names is run, never something that is found beside 
 ``events``     departures from the start as an excitation
 ``candidates`` new experiments, round by round, for active learning
 ``described``  what an FMU's model description proposes
+``guessed``    how far an input of an FMU may move where its description does not say: a guess
 ``hysteresis`` one of our own: the oscillator of Bouc and Wen
 =============  =====================================================================================
 

@@ -12,6 +12,7 @@ import numpy as np
 from sysid.errors import ConfigError, did_you_mean
 from sysid.references.fmu import read_fmu
 from sysid.references.fmu_variables import INTEGERS, declared_unit, is_number
+from sysid.references.guessed import GUESS, guessed, named_values, range_told
 
 TRUTH = {"false": "0", "true": "1"}
 UNBOUNDED = 1e30
@@ -139,6 +140,10 @@ def _input(variable: Any, wish: Wish, notes: list[str]) -> dict[str, Any]:
     elif str(variable.type) == "Boolean":
         found["range"] = [0.0, 1.0]
         notes.append(f"{variable.name}: 0 and 1, as it is a truth value")
+    elif (guess := guessed(variable, low, high, start)) is not None:
+        found["range"] = list(guess[:2])
+        told = f"; --range {variable.name}=LOW:HIGH says it" if GUESS in guess[2] else ""
+        notes.append(f"{range_told(variable.name, *guess[:2])} {guess[2]}{told}")
     if "range" in found:
         low, high = found["range"]
         if start is not None and low <= start <= high:
@@ -176,6 +181,8 @@ def _levels(variable: Any, low: float, high: float) -> dict[str, list[float]]:
     """The values of what is a whole number or a truth value; nothing of any other."""
     if str(variable.type) not in {*INTEGERS, "Boolean"}:
         return {}
+    if named := [one for one in named_values(variable) if low <= one <= high]:
+        return {"levels": named}
     return {"levels": [float(k) for k in range(int(np.ceil(low)), min(int(high), int(low) + 200) + 1)]}
 
 

@@ -231,8 +231,42 @@ def test_limits_are_those_of_the_type_where_a_variable_has_none(monkeypatch: pyt
     fields, _ = asked(monkeypatch, variable("u", declaredType=kind), variable("v", declaredType=kind, max="3"))
     assert [fields["inputs"][name]["range"] for name in "uv"] == [[-1.0, 5.0], [-1.0, 3.0]]
     no_limit = SimpleNamespace(min="-1.8e308", max="1e60", unit=None)
+    fields, told = asked(monkeypatch, variable("u", declaredType=no_limit))
+    assert fields["inputs"]["u"]["range"] == [-1.0, 1.0]
+    assert "u: -1 to 1 is a guess, as the model description says nothing of how far it goes; --range u=LOW:HIGH" in told
+
+
+OPTION = SimpleNamespace(items=[SimpleNamespace(value=str(k)) for k in (1, 2, 4)], min=None, max=None, unit=None)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said", "span", "why"),
+    [
+        ("Real", {"nominal": "50", "start": "20", "min": "0"}, [0, 70], "by its nominal value of 50 about its start"),
+        ("Real", {"start": "293.15", "unit": "K"}, [283.15, 303.15], "10 K about its start"),
+        ("Float64", {"start": "-4"}, [-8, 0], "by its start of -4"),
+        ("Float64", {"start": "0", "max": "0.5"}, [-1, 0.5], "says nothing of how far it goes"),
+        ("Int32", {"start": "0"}, [0, 1], "says nothing of how far it goes"),
+        ("UInt8", {"start": "3"}, [0, 6], "by its start of 3"),
+    ],
+)
+def test_a_range_that_nobody_says_is_guessed_and_told_to_be_a_guess(
+    kind: str, said: dict[str, str], span: list[float], why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fields, told = asked(monkeypatch, variable("u", kind, **said))
+    assert fields["inputs"]["u"]["range"] == pytest.approx(span)
+    assert "u: " in told
+    assert " is a guess, " in told
+    assert why in told
+    assert "is a guess" not in asked(monkeypatch, variable("u", kind, **said), ranges={"u": (0.0, 1.0)})[1]
+
+
+def test_named_values_are_no_guess_and_a_limit_at_the_start_leaves_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    fields, told = asked(monkeypatch, variable("u", "Enumeration", start="1", declaredType=OPTION))
+    assert (fields["inputs"]["u"]["range"], fields["inputs"]["u"]["levels"]) == ([1, 4], [1, 2, 4])
+    assert "guess" not in told
     with pytest.raises(ConfigError, match="does not say all"):
-        asked(monkeypatch, variable("u", declaredType=no_limit))
+        asked(monkeypatch, variable("u", min="1", max="1", start="1"))
 
 
 def test_a_start_that_cannot_be_is_told_and_that_of_a_truth_value_is_heeded(monkeypatch: pytest.MonkeyPatch) -> None:

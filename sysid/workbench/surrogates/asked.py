@@ -18,7 +18,7 @@ from sysid.references.sources import KINDS, TABLES, source_of
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.runner.events import Watcher
 from sysid.workbench.surrogates.make import Made, make_surrogate
-from sysid.workbench.surrogates.plan import written
+from sysid.workbench.surrogates.plan import guesses_of, written
 from sysid.workbench.surrogates.work import Perform
 from sysid.yaml_files import read_yaml
 
@@ -231,7 +231,9 @@ def surrogate_of(
         pipeline, folder, perform=perform, minutes=minutes, proof=proof, iterations=iterations, rounds=rounds,
         workers=workers, seed=seed, began=began, say=say, watch=watch,
     )  # fmt: skip
-    return replace(made, proposed=tuple(notes))
+    # It holds there alone, and whoever reads the end alone has to know it.
+    guesses = guesses_of(pipeline) if reference is not None else []
+    return replace(made, proposed=tuple(notes), notes=[*made.notes, *guesses])
 
 
 def _pipeline_of(source: str) -> Path | None:

@@ -15,6 +15,7 @@ from sysid.names import slug
 from sysid.references.config import ReferenceConfig
 from sysid.references.described import Wish
 from sysid.references.design import Counts, Design, drawn
+from sysid.references.guessed import GUESS, range_told
 from sysid.references.proposal import proposed
 from sysid.references.runs import ReferenceRuns
 from sysid.references.sources import Source
@@ -23,7 +24,7 @@ from sysid.workbench.auto.finish import span
 from sysid.workbench.auto.parts import searched_in
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.runner.store import write_bytes
-from sysid.yaml_files import yaml_text
+from sysid.yaml_files import read_yaml, yaml_text
 
 RUNNING = 0.2
 """Share of the time in which the reference is run for data; as much again for the proof."""
@@ -85,6 +86,21 @@ def written(
         content["experiment"]["runs"] = runs.model_dump()
     write_bytes(file, _text(source, content, found.notes).encode())
     return file, list(found.notes)
+
+
+def guesses_of(file: Path) -> list[str]:
+    """What of a pipeline is no more than a guess, as its first lines say, and was not written otherwise since.
+
+    Args:
+        file: The pipeline.
+
+    Returns:
+        A sentence for each input.
+    """
+    told = [line.removeprefix("# ") for line in file.read_text("utf-8-sig").splitlines() if line.startswith("# ")]
+    ports = (read_yaml(file).get("reference") or {}).get("inputs") or {}
+    ranges = [range_told(name, *port["range"]) for name, port in ports.items() if "range" in port]
+    return [one for one in told if any(one.startswith(f"{some} {GUESS}") for some in ranges)]
 
 
 def text_of(source: Source, wish: Wish, *, name: str, places: Mapping[str, str]) -> tuple[str, list[str]]:

@@ -55,6 +55,14 @@ REFUSED = {
 }  # fmt: skip
 
 
+GUESSED = """\
+# u: -1 to 1 is a guess, by its start of 1; --range u=LOW:HIGH says it
+# v: 0 to 4 is a guess, by its start of 2; --range v=LOW:HIGH says it
+kind: experiment
+reference: {inputs: {u: {range: [-1, 1]}, v: {range: [0, 3]}}}
+"""
+
+
 @pytest.fixture(autouse=True)
 def _place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "lag.py").write_text("def lag(time, u, p):\n    return u\n", encoding="utf-8")
@@ -72,7 +80,10 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 
     def written(source: Source, wish: object, folder: Path, **more: object) -> tuple[Path, list[str]]:
         found.append({"source": source, "wish": wish, "folder": folder, **more})
-        return folder / "experiment.yaml", ["u: 0 to 2, as was said"]
+        file = folder / "experiment.yaml"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(GUESSED, encoding="utf-8")
+        return file, ["u: 0 to 2, as was said"]
 
     def make(pipeline: Path, folder: Path, **more: object) -> None:
         ours = {name: value for name, value in more.items() if name not in {"perform", "began", "say", "watch"}}
@@ -113,12 +124,15 @@ def test_python_has_every_option_of_the_command() -> None:
     assert {other.get(name, name) for name in typed - {"no_tracking"}} == called - {"iterations"}
 
 
-def test_what_was_proposed_is_told_from_python_too(
+def test_what_was_proposed_is_told_from_python_too_and_what_was_guessed_at_the_end(
     begun: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = asked.Made(bundle=Path(), fmu=None, report=Path(), proof=SimpleNamespace(), notes=[], pipeline=Path())  # type: ignore[arg-type]
     monkeypatch.setattr(asked, "make_surrogate", lambda *_, **__: made)
-    assert sysid.surrogate("lag.py:lag").proposed == ("u: 0 to 2, as was said",)
+    found = sysid.surrogate("lag.py:lag")
+    assert found.proposed == ("u: 0 to 2, as was said",)
+    # The range of v was written otherwise since.
+    assert found.notes == ["u: -1 to 1 is a guess, by its start of 1; --range u=LOW:HIGH says it"]
     assert begun[0]["folder"] == Path("runs/surrogate-lag")
 
 
