@@ -7,6 +7,7 @@ line leaves with exit code 2), any other :class:`SysidError` is ours (exit code 
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 
 
@@ -174,19 +175,20 @@ class ChannelError(UserError):
           remedy:   did you mean BP?
     """
 
-    def __init__(self, missing: Sequence[str], available: Sequence[str], *, where: object = None) -> None:
-        self.missing = tuple(missing)
+    def __init__(self, missing: Sequence[object], available: Sequence[str], *, where: object = None) -> None:
+        names = tuple(map(str, missing))  # what is looked up may be anything: a number, a slice
+        self.missing = names
         self.available = tuple(available)
-        guesses = [near[0] for name in missing if (near := near_words(name, available))]
+        guesses = [near[0] for name in names if (near := near_words(name, available))]
         remedy = f"did you mean {', '.join(guesses)}?" if guesses else "name one of the channels that are there"
-        listed = [part.strip() for name in missing for part in name.split(",")]
-        if len(listed) > len(missing) and set(listed) <= set(available):
-            remedy = f"write {'+'.join(listed)}: channels of a mapping stand with + between them"
+        listed = [part.strip() for name in names for part in re.split("[,+]", name)]
+        if len(listed) > len(names) and set(listed) <= set(available):
+            remedy = f"write {'+'.join(listed)} in a mapping, {listed} where a list of channels is asked for"
         super().__init__(
-            f"missing channel {', '.join(missing)}",
+            f"missing channel {', '.join(names)}",
             where=where,
             expected=f"one of {', '.join(available)}",
-            got=", ".join(missing),
+            got=", ".join(names),
             remedy=remedy,
         )
 

@@ -78,16 +78,34 @@ def check(model: type[Model], data: Mapping[str, Any], *, where: object) -> Mode
         return model.model_validate(data)
     except ValidationError as error:
         origins = where if isinstance(where, Origins) else Origins(file=where)
-        raise _config_error(error, model, origins) from None
+        found = [{**one, "loc": _in_data(one["loc"], data)} for one in error.errors(include_url=False)]
+        raise _config_error(found, model, origins) from None
 
 
-def _config_error(error: ValidationError, model: type[BaseModel], origins: Origins) -> ConfigError:
+_FORM = re.compile(r"(str|int|float|bool|none)$|[a-z-]+\[")
+"""What pydantic calls the forms that a field may have: ``str``, ``dict[str,float]``."""
+
+
+def _in_data(loc: Loc, data: object) -> Loc:
+    """A pydantic location as it is in the data: without the form that was tried of a field that may have several."""
+    there: list[str | int] = []
+    for part in loc:
+        known = isinstance(data, Mapping) and part in data
+        if not known and isinstance(part, str) and _FORM.match(part):
+            continue
+        listed = isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
+        data = data[part] if known or listed else None  # type: ignore[index]
+        there.append(part)
+    return tuple(there)
+
+
+def _config_error(found: list[dict[str, Any]], model: type[BaseModel], origins: Origins) -> ConfigError:
     # A misspelt field usually causes the "missing" beside it: name the cause first.
-    found = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
-    first = found[0]
+    # What holds another, such as a list that is one too short without it, is not at fault itself.
+    found = [item for item in found if not any(_inside(other["loc"], item["loc"]) for other in found)]
+    first, *others = sorted(found, key=lambda item: item["type"] != "extra_forbidden")
     loc = first["loc"]
-    # What holds the first one, such as a list that is one too short without it, is not at fault itself.
-    others = [item for item in found[1:] if item["loc"] != loc[: len(item["loc"])]]
+    others = [item for item in others if item["loc"] != loc]
     what: str
     expected: object
     got: object
@@ -126,6 +144,10 @@ def _config_error(error: ValidationError, model: type[BaseModel], origins: Origi
     if others:
         remedy += f" (also at fault: {', '.join(sorted({_beside(loc, item['loc'], origins) for item in others}))})"
     return ConfigError(what, where=origins.place(loc), expected=expected, got=got, remedy=remedy)
+
+
+def _inside(loc: Loc, holder: Loc) -> bool:
+    return len(loc) > len(holder) and loc[: len(holder)] == holder
 
 
 def _counted(entries: object) -> str:

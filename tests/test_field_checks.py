@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
@@ -23,6 +23,7 @@ class Outer(BaseModel):
     name: str
     steps: tuple[Inner, ...] = ()
     models: dict[str, Inner | None] = {}
+    form: Literal["round", "square"] | dict[str, Literal["round", "square"]] = "round"
 
 
 class Few(BaseModel):
@@ -36,6 +37,8 @@ class Few(BaseModel):
         ({"name": "a", "steps": [{}, {"neuronz": 3}]}, "field steps[1].neuronz", "did you mean neurons?"),
         ({"name": "a", "models": {"m": {"delay": 3}}}, "field models.m.delay", "did you mean delays?"),
         ({"name": "a", "models": {"m": {"xyz": 3}}}, "field models.m.xyz", "remove it"),
+        ({"name": "a", "form": "squar"}, "field form", "did you mean square?"),
+        ({"name": "a", "form": {"u": "squar"}}, "field form.u", "did you mean square?"),
         ({"nam": "a"}, "field nam", "did you mean name? (also at fault: name)"),
         ({}, "field name", "add name: ..."),
     ],

@@ -17,7 +17,7 @@ from sysid.api.comparison import compare
 from sysid.api.given import TracesLike, traces_of
 from sysid.api.responses import Bode, Poles, StepResponse, bode, poles, step
 from sysid.api.saving import save
-from sysid.errors import ChannelError, TraceError
+from sysid.errors import ChannelError, TraceError, shortened
 from sysid.estimation import FitResult
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.grey_box.again import profile_again
@@ -85,10 +85,11 @@ class Fit(FitResult):
         inputs = self._inputs(u)
         history = self._history(inputs, initial)
         run = self.model.simulate(inputs, history)
-        if history is not None and not isinstance(initial, History | tuple):
+        if history is not None and len(history.output) == 1 and not isinstance(initial, History):
+            rests = History.at_rest(inputs=history.inputs[0], output=self.model.resting)
             other = not np.array_equal(history.output[0], self.model.resting)
-            if other and np.array_equal(run, self.model.simulate(inputs)):
-                raise unheeded(f"{initial}", model=self.model.label)
+            if other and np.array_equal(run, self.model.simulate(inputs, rests)):
+                raise unheeded(shortened(initial), model=self.model.label)
         return run
 
     def predict(self, y: Any, u: Any, *, steps: int = 1, initial: Initial = None) -> NDArray[np.float64]:
@@ -252,7 +253,15 @@ class Fit(FitResult):
     def _outputs(self, y: Any) -> NDArray[np.float64]:
         named = isinstance(y, Dict) or hasattr(y, "columns")
         output = inputs_of(y, self.model.mapping.outputs, units=self.model.ends.units) if named else as_array(y)
-        output = np.asarray(output, dtype=np.float64)
+        if output.dtype.kind not in "buif":
+            raise TraceError(
+                "the measured output is no numbers",
+                where=", ".join(self.model.mapping.outputs),
+                expected="real numbers",
+                got=f"shape {output.shape} of type {output.dtype}",
+                remedy="give a column of numbers an output, or columns by name",
+            )
+        output = output.astype(np.float64)
         return output.reshape(len(output), -1) if self.model.structure.several_outputs else output.reshape(-1)
 
     def _history(self, inputs: NDArray[np.float64], initial: Initial) -> History | None:

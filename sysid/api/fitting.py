@@ -16,6 +16,7 @@ from sysid.ingest import load_dataset
 from sysid.ingest.reading import is_file_of_traces
 from sysid.ingest.undescribed import load_file
 from sysid.models import AbstractStructure, Mapping, Start, StartLike
+from sysid.models.rest_levels import levels_at_rest
 from sysid.traces import Role, TraceSet
 
 
@@ -84,13 +85,14 @@ def fit(
     Raises:
         ConfigError: If no trace is for estimation, no estimator belongs to the structure, or what is given does not
             apply to it.
-        ChannelError: If a channel of the mapping is missing.
+        ChannelError: If a channel of the mapping is missing, or ``rest_output`` names no output.
     """
     traces = traces_of(traces, word="fit")
     check_order(mapping, structure)
     mapped, start = Mapping.of(mapping), Start.of(start)
     estimators.estimator_of(structure)
     estimators.check_given(initial, stability)
+    rest = levels_at_rest(rest_output, mapped.outputs)
     structure = structure.for_outputs(len(mapped.outputs))
     chosen = structure.mappings(mapped)
     estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)
@@ -111,7 +113,7 @@ def fit(
             structure,
             training,
             start=start,
-            rest_output=rest_output,
+            rest_output=rest,
             selection=selection,
             initial=initial,
             stability=stability,

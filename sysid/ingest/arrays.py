@@ -16,6 +16,7 @@ from sysid.ingest.experiments import columns_of, experiments_of
 from sysid.ingest.frames import (
     check_distinct,
     check_rows,
+    seconds,
 )
 from sysid.ingest.headers import parse_header
 from sysid.ingest.in_python import remedies_in_python
@@ -60,9 +61,9 @@ def data(
         units: Units by channel, one for all, or in the order of inputs and outputs. A column named ``level [cm]`` has
             its unit with it. A channel that nothing is said of counts as a pure number.
         split: Roles: a share (``0.7`` fits the first 70 % and validates on the rest), two or three shares (fitted,
-            chosen by, only scored), spans of seconds by role (``{"estimation": (0, 60), "validation": (60, 90)}``), the
-            name of a column that holds the role of each sample, or a role for each experiment. All is for estimation
-            where nothing is said.
+            chosen by, only scored), spans of seconds or durations by role (``{"estimation": (0, 60), "validation":
+            (60, None)}``), the name of a column that holds the role of each sample, or a role for each experiment, in
+            their order or by name. All is for estimation where nothing is said.
         repairs: As in a data set's ``source.repairs``: ``{"nan": "mask"}``, ``{"gaps": "linear"}`` ...
         grid: As in a data set's ``source.grid``: ``{"method": "linear"}`` ...
         name: Name of the data set.
@@ -86,7 +87,7 @@ def data(
     check_distinct([*(wanted_inputs or ()), *(wanted_outputs or ())], where="inputs and outputs")
     repaired = check(RepairOptions, {"constant": "accept", **_options(repairs, "repairs")}, where="repairs")
     gridded = check(GridOptions, {"fewest_samples": 2, **_options(grid, "grid")}, where="grid")
-    given = _seconds(sample_time)
+    given = seconds(sample_time)
     step = None if given is None else check(TimeOptions, {"step": given}, where="sample_time").step
     experiments = experiments_of(values, wanted_inputs if wanted_outputs is None else wanted_outputs)
     whole: list[Trace] = []
@@ -118,13 +119,6 @@ def _names(given: Names) -> tuple[str, ...] | None:
         return None
     several: Iterable[Any] = given if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
     return tuple(".".join(map(str, one)) if isinstance(one, tuple) else str(one) for one in several)
-
-
-def _seconds(value: Any) -> Any:
-    """A duration in seconds; of anything else itself."""
-    if isinstance(value, np.timedelta64):
-        return float(value / np.timedelta64(1, "s"))
-    return value.total_seconds() if isinstance(value, datetime.timedelta) else value
 
 
 def _options(given: Mapping[str, Any] | None, what: str) -> dict[str, Any]:
@@ -189,18 +183,18 @@ def _trace(
 def _units(names: Sequence[str], units: Mapping[str, str] | Sequence[str] | str | None) -> dict[str, str]:
     if units is None:
         return {}
-    if isinstance(units, str):
-        return dict.fromkeys(names, units)
+    if not isinstance(units, Mapping | list | tuple | np.ndarray):  # one for all: text, or a unit of pint's
+        return dict.fromkeys(names, str(units))
     if isinstance(units, Mapping):
         strangers = [name for name in units if name not in names]
         if strangers:
             raise ChannelError(strangers, names, where="units")
-        return dict(units)
+        return {name: str(unit) for name, unit in units.items() if unit is not None}
     if len(units) != len(names):
         raise ConfigError(
             "units and channels do not match",
             expected=f"{len(names)} units, for {', '.join(names)}",
-            got=", ".join(units),
+            got=", ".join(map(str, units)),
             remedy="give a unit for each channel, or a dict by channel",
         )
-    return dict(zip(names, units, strict=True))
+    return {name: str(unit) for name, unit in zip(names, units, strict=True) if unit is not None}

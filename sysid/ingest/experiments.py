@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.ingest.frames import as_array, check_labels, columns_by_name, index_of
+from sysid.ingest.frames import as_column, check_labels, columns_by_name, index_of
 from sysid.ingest.memory_table import no_samples
 
 
 def experiments_of(values: Any, channels: tuple[str, ...] | None) -> dict[str, Any]:
     """The experiments by name; a single one is called ``record``.
 
-    Arrays of a single column are columns, whether they lie flat or stand, as those of ``scipy.io.loadmat`` do.
+    Arrays of a single column or row are columns, as those of ``scipy.io.loadmat`` are.
 
     Args:
         values: What :func:`sysid.data` was given.
@@ -29,7 +29,8 @@ def experiments_of(values: Any, channels: tuple[str, ...] | None) -> dict[str, A
         ConfigError: If a list is of rows, or is the pair (u, y) by its look.
     """
     standing = isinstance(values, Mapping) and any(
-        not isinstance(one, tuple) and np.shape(one)[1:] == (1,) and not _is_frame(one) for one in values.values()
+        not isinstance(one, tuple | Mapping) and not _is_frame(one) and np.ndim(one) == 2 and 1 in np.shape(one)
+        for one in values.values()
     )
     if isinstance(values, Mapping) and values and not standing and all(_is_record(one) for one in values.values()):
         return {str(label): one for label, one in values.items()}
@@ -49,6 +50,13 @@ def experiments_of(values: Any, channels: tuple[str, ...] | None) -> dict[str, A
 def _check_no_rows(values: list[Any]) -> None:
     """Refuse a list of rows, which would be as many experiments of a few samples each."""
     few = len(values[0]) if isinstance(values[0], list | tuple) else 0
+    if all(isinstance(one, Mapping) and all(map(np.isscalar, one.values())) for one in values):
+        raise ConfigError(
+            "a list is of several experiments",
+            expected="records: pairs (u, y), frames, dicts of columns",
+            got=f"{len(values)} rows, a dict each",
+            remedy="one record of rows is a frame: pd.DataFrame(rows)",
+        )
     rows = 0 < few < len(values) and all(
         isinstance(one, list | tuple) and len(one) == few and all(map(np.isscalar, one)) for one in values
     )
@@ -161,7 +169,7 @@ def _given(names: tuple[str, ...] | None, matrix: NDArray[Any], letter: str) -> 
 
 
 def _two_dimensional(values: Any, *, where: str) -> NDArray[Any]:
-    array = as_array(values)
+    array = as_column(values)
     array = array[:, None] if array.ndim == 1 else array
     if array.ndim != 2 or array.dtype.kind not in "buif":
         raise ConfigError(
@@ -169,7 +177,9 @@ def _two_dimensional(values: Any, *, where: str) -> NDArray[Any]:
             where=where,
             expected="a frame, a dict of columns, a pair (u, y) of arrays, or an array of one or two dimensions",
             got=f"{type(values).__name__} of shape {np.shape(array)} and type {array.dtype}",
-            remedy="give numbers; several experiments are a list of records",
+            remedy="give its real part, array.real, or both parts as channels of their own"
+            if array.dtype.kind == "c"
+            else "give numbers; several experiments are a list of records",
         )
     if not len(array):
         raise no_samples(where)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, time, timedelta
 from decimal import Decimal
 from itertools import pairwise
 from numbers import Real
@@ -158,13 +158,13 @@ def check_rows(table: Any, *, where: str) -> None:
         )
     labels = as_column(table.index)
     steps = np.diff(labels) if labels.dtype.kind in "iu" else labels[:0]
-    uneven = np.flatnonzero(steps != steps[0]) if len(steps) else steps
+    uneven = np.flatnonzero((steps != steps[0]) | (steps < 0)) if len(steps) else steps
     if len(uneven):
         row = int(uneven[0])
         raise ConfigError(
-            "the rows do not follow each other: their labels do not count evenly",
+            "the rows do not follow each other: their labels do not count up evenly",
             where=f"{where}, row {row + 1}",
-            expected=f"label {labels[row] + steps[0]} after {labels[row]}",
+            expected=f"label {labels[row] + abs(steps[0])} after {labels[row]}",
             got=str(labels[row + 1]),
             remedy="rows that were dropped: frame.reindex(range(first, last + 1)) with repairs={'nan': 'mask'}; rows "
             "out of order: frame.sort_index(); several records: a list of frames; none of these: "
@@ -210,14 +210,35 @@ def as_column(column: Any) -> NDArray[Any]:
         column: A column or an index of a frame, an array, a list.
 
     Returns:
-        The array; one of a single column lies flat.
+        The array; one of a single column lies flat, and one of a single row too: one sample is no record.
     """
     if hasattr(column, "to_timestamp") and not hasattr(column, "index"):  # pandas.PeriodIndex
         column = column.to_timestamp()
     if getattr(getattr(column, "dtype", None), "tz", None) is not None:
         column = getattr(column, "dt", column).tz_convert(None)
     array = as_array(column.to_numpy() if hasattr(column, "to_numpy") else column)
-    return array[:, 0] if array.ndim == 2 and array.shape[1] == 1 else array
+    return array.reshape(-1) if array.ndim == 2 and 1 in array.shape else array
+
+
+def seconds(value: Any) -> Any:
+    """A duration in seconds; of anything else itself.
+
+    Args:
+        value: A duration of Python's, NumPy's or pandas's, or a number; a number in single precision is the decimal
+            number that it was written as.
+
+    Returns:
+        Seconds.
+
+    Example:
+        >>> seconds(timedelta(milliseconds=20)), seconds(np.float32(0.1))
+        (0.02, 0.1)
+    """
+    if isinstance(value, np.timedelta64):
+        return float(value / np.timedelta64(1, "s"))
+    if isinstance(value, np.floating) and value.itemsize < np.dtype(np.float64).itemsize:
+        return float(str(value))
+    return value.total_seconds() if isinstance(value, timedelta) else value
 
 
 def not_numbers(name: str, array: NDArray[Any], *, where: str) -> ReaderError | None:
@@ -250,15 +271,25 @@ def _of_objects(array: NDArray[Any]) -> NDArray[Any]:
         return array
     cells = array.ravel().tolist()
     there = [cell for cell in cells if not _is_missing(cell)]
-    if there and all(isinstance(cell, datetime) for cell in there):
-        times = [None if _is_missing(cell) else _without_zone(cell) for cell in cells]
-        return np.array(times, dtype="datetime64[ns]").reshape(array.shape)
+    if there and all(isinstance(cell, date | time | timedelta) for cell in there):
+        return _of_times(cells, there).reshape(array.shape)
     numbers = [_number(cell) for cell in cells]
     return array if None in numbers else np.array(numbers, dtype=np.float64).reshape(array.shape)
 
 
-def _without_zone(time: datetime) -> datetime:
-    return time if time.tzinfo is None else time.astimezone(UTC).replace(tzinfo=None)
+def _of_times(cells: list[Any], there: list[Any]) -> NDArray[Any]:
+    """Calendar times and days as such; durations, and times of day since midnight, as spans of time."""
+    spans = isinstance(there[0], time | timedelta)
+    if any(isinstance(cell, time | timedelta) != spans for cell in there):
+        return np.array(cells, dtype=object)
+    kind = "timedelta64[ns]" if spans else "datetime64[ns]"
+    return np.array([None if _is_missing(cell) else _plain_time(cell) for cell in cells], dtype=kind)
+
+
+def _plain_time(cell: date | time | timedelta) -> date | timedelta:
+    if isinstance(cell, time):
+        return datetime.combine(date.min, cell.replace(tzinfo=None)) - datetime.min
+    return cell.astimezone(UTC).replace(tzinfo=None) if isinstance(cell, datetime) and cell.tzinfo else cell
 
 
 def _is_missing(cell: object) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
 from sysid.ingest.columns import RawColumn
-from sysid.ingest.frames import INDEX, Columns, as_array, columns_by_name
+from sysid.ingest.frames import INDEX, Columns, as_array, as_column, columns_by_name
 from sysid.ingest.in_units import stamps_in_seconds
 from sysid.ingest.memory_table import check_lengths, no_samples, table_of
 from sysid.ingest.options import FileOptions
@@ -75,7 +75,7 @@ def inputs_of(
 
 
 def _of_array(values: Any, names: tuple[str, ...]) -> NDArray[np.float64]:
-    array = as_array(values)
+    array = as_column(values) if len(names) == 1 else as_array(values)
     array = array[:, None] if array.ndim == 1 else array
     if array.ndim != 2 or array.shape[1] != len(names) or array.dtype.kind not in "buif":
         raise ConfigError(

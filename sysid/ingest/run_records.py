@@ -78,7 +78,7 @@ def level_of(initial: Any) -> float:
     Raises:
         ConfigError: If it is not one finite number.
     """
-    if np.ndim(initial) == 0 and isinstance(initial, int | float | np.number) and np.isfinite(initial):
+    if isinstance(initial, int | float | np.number) and not isinstance(initial, bool) and np.isfinite(initial):
         return float(initial)
     raise ConfigError(
         "the output before the first sample is one finite number",

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, did_you_mean
+from sysid.ingest.frames import seconds
 from sysid.traces import Role, Trace, TraceSet
 
-Split = float | Sequence[float] | Sequence[str] | Mapping[str, tuple[float, float]] | str | None
+Split = float | Sequence[float] | Sequence[str | Role] | Mapping[Any, Any] | str | None
 """How records get their roles; :func:`sysid.ingest.arrays.data` says what each form means."""
 
 ROLES = {role.value: role for role in Role} | {
@@ -54,11 +55,11 @@ def split_traces(
     if isinstance(split, str):
         parts = [part for trace, mark in zip(traces, marks, strict=True) for part in _by_column(trace, mark)]
     elif isinstance(split, Mapping):
-        parts = [part for trace in traces for part in _by_time(trace, split)]
+        parts = _by_name(traces, split) or [part for trace in traces for part in _by_time(trace, split)]
     elif isinstance(split, float | int | np.number):
         parts = _by_share(traces, [float(split)])
-    elif all(isinstance(entry, str) for entry in split):
-        parts = _by_experiment(traces, [str(entry) for entry in split])
+    elif all(isinstance(entry, str | Role) for entry in split):
+        parts = _by_experiment(traces, [_word(entry) for entry in split])
     else:
         parts = _by_share(traces, [_share(entry) for entry in split])
     named: list[Trace] = []
@@ -140,11 +141,28 @@ def _by_experiment(traces: tuple[Trace, ...], words: list[str]) -> list[tuple[Ro
     return [(_role(word), trace) for word, trace in zip(words, traces, strict=True)]
 
 
-def _by_time(trace: Trace, spans: Mapping[str, tuple[float, float]]) -> list[tuple[Role, Trace]]:
+def _by_name(traces: tuple[Trace, ...], roles: Mapping[Any, Any]) -> list[tuple[Role, Trace]]:
+    """Each experiment's role by its name; nothing where the values are spans of time."""
+    if not roles or not all(isinstance(role, str | Role) for role in roles.values()):
+        return []
+    names, given = [trace.name for trace in traces], {str(name): role for name, role in roles.items()}
+    if set(given) != set(names):
+        raise ConfigError(
+            "roles and experiments do not match",
+            where="split",
+            expected=f"a role for each of {', '.join(names)}",
+            got=", ".join(given),
+            remedy="name each experiment once: its name is its key in the dict of records, or record-1, record-2 ...",
+        )
+    return [(_role(_word(given[trace.name])), trace) for trace in traces]
+
+
+def _by_time(trace: Trace, spans: Mapping[Any, Any]) -> list[tuple[Role, Trace]]:
     parts = []
     fuzz = 1e-6 * trace.sample_time
     taken = np.zeros(len(trace), dtype=bool)
-    for word, span in spans.items():
+    for key, span in spans.items():
+        word = _word(key)
         start, stop = _span(word, span)
         inside = np.flatnonzero((trace.time >= start - fuzz) & (trace.time < stop - fuzz))
         if not len(inside):
@@ -170,12 +188,14 @@ def _by_time(trace: Trace, spans: Mapping[str, tuple[float, float]]) -> list[tup
 
 def _span(word: str, span: Any) -> tuple[float, float]:
     try:
-        start, stop = (float(end) for end in span)
+        first, last = span
+        start = -np.inf if first is None else float(seconds(first))
+        stop = np.inf if last is None else float(seconds(last))
     except (TypeError, ValueError):
         raise ConfigError(
             "a span of the split is a pair of times",
             where=f"split, {word}",
-            expected="(start, stop) in seconds",
+            expected="(start, stop), in seconds or as durations; None for an open end",
             got=repr(span)[:60],
             remedy="write for example split={'estimation': (0, 60), 'validation': (60, 90)}",
         ) from None
@@ -197,6 +217,11 @@ def _by_column(trace: Trace, marks: NDArray[Any] | None) -> list[tuple[Role, Tra
     return [(_role(words[start]), _cut(trace, start, stop, words[start])) for start, stop in pairwise(changes)]
 
 
+def _word(role: object) -> str:
+    """A role as a word, of :class:`Role` or as text."""
+    return str(role.value if isinstance(role, Role) else role)
+
+
 def _role(word: str) -> Role:
     if word.strip().lower() not in ROLES:
         raise ConfigError(
@@ -212,13 +237,4 @@ def _role(word: str) -> Role:
 
 
 def _cut(trace: Trace, start: int, stop: int, name: str) -> Trace:
-    window = slice(start, stop)
-    return dataclasses.replace(
-        trace,
-        name=name,
-        values=trace.values[window],
-        start_time=float(trace.time[start]),
-        usable=None if trace.usable is None or trace.usable[window].all() else trace.usable[window],
-        weights=None if trace.weights is None else trace.weights[window],
-        provenance=(*trace.provenance, f"samples {start} to {stop - 1} of {len(trace)}"),
-    )
+    return dataclasses.replace(trace[start:stop], name=name)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, TraceError
 from sysid.models.ends import Ends, check_record
 from sysid.models.form import AbstractForm
-from sysid.models.history import History, known_inputs
+from sysid.models.history import History, input_columns
 from sysid.models.mapping import Mapping
 from sysid.models.ratio import Ratio
 from sysid.models.structure import AbstractStructure
@@ -311,8 +311,9 @@ class AbstractModel(ABC):
         """Free run: the model is fed its own past output.
 
         Args:
-            inputs: Shape ``(n_samples, n_inputs)``, in the mapping's order and units. One that is infinite is read as
-                one that is not a number: the output is not a number for as long as it is remembered.
+            inputs: Shape ``(n_samples, n_inputs)``, in the mapping's order and units; one input may lie flat,
+                ``(n_samples,)``. What is infinite or masked is read as not a number: the output is not a number for as
+                long as it is remembered.
             history: Samples before the first; by default at rest: inputs held at their first sample, output
                 at ``rest_output``.
 
@@ -320,9 +321,10 @@ class AbstractModel(ABC):
             Output of shape ``(n_samples,)``, in its unit.
 
         Raises:
-            TraceError: If the number of inputs is not the mapping's.
+            TraceError: If the inputs are no numbers, or not as many as the mapping's.
         """
-        return self.recursion.simulate(known_inputs(inputs), history or self._rest(inputs))
+        inputs = input_columns(inputs, self.mapping.inputs)
+        return self.recursion.simulate(inputs, history or self._rest(inputs))
 
     def predict(
         self,
@@ -355,10 +357,18 @@ class AbstractModel(ABC):
                 got=repr(steps),
                 remedy="1 is the next sample; simulate() is the free run, which starts from no measured output",
             )
-        return self.recursion.predict(known_inputs(inputs), output, history or self._rest(inputs), steps)
+        inputs = input_columns(inputs, self.mapping.inputs)
+        return self.recursion.predict(inputs, output, history or self._rest(inputs), steps)
 
     def _rest(self, inputs: NDArray[np.float64]) -> History:
-        return History.at_rest(inputs=np.asarray(inputs, dtype=np.float64)[0], output=self.resting)
+        if not len(inputs):
+            raise TraceError(
+                "there are no samples",
+                expected=f"at least one sample of {', '.join(self.mapping.inputs)}, at which the system rests before",
+                got=f"inputs of shape {inputs.shape}",
+                remedy="give inputs, or the samples before as a history",
+            )
+        return History.at_rest(inputs=inputs[0], output=self.resting)
 
 
 class SeveralOutputs(AbstractModel):

@@ -18,7 +18,7 @@ from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends, check_record
-from sysid.models.history import known_inputs
+from sysid.models.history import input_columns
 from sysid.models.rest_levels import leaders, resting
 from sysid.models.to_control import of_wired
 from sysid.models.wiring import Member, Wiring
@@ -334,7 +334,7 @@ class Cascade:
         Raises:
             TraceError: If the shape is not the cascade's.
         """
-        inputs = np.asarray(inputs, dtype=np.float64)
+        inputs = input_columns(inputs, self.inputs)
         if inputs.ndim != axes or inputs.shape[-1] != len(self.inputs) or 0 in inputs.shape[:-1]:
             raise TraceError(
                 "the inputs do not fit the cascade",
@@ -342,7 +342,7 @@ class Cascade:
                 got=f"shape {inputs.shape}",
                 remedy="give one column per input, in the order of cascade.inputs",
             )
-        return known_inputs(inputs)
+        return inputs
 
     def empty(self, *shape: int) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
         """Room for a run: values of all channels, and what held the outputs.

@@ -144,8 +144,8 @@ def unheeded(initial: object, *, model: str) -> ConfigError:
         where="initial",
         expected="a model that remembers its own output, or one that may rest at any",
         got=f"initial {initial}",
-        remedy="leave it out, or give measured samples of the output, from which the state is found: in Python those "
-        "before the run, initial=(u_before, y_before); to sysid simulate the output's column beside the inputs",
+        remedy="leave it out, or give measured samples of the output, from which the state is found: in Python "
+        "several before the run, initial=(u_before, y_before); to sysid simulate the output's column beside the inputs",
     )
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +108,40 @@ def known_inputs(inputs: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     inputs = np.asarray(inputs, dtype=np.float64)
     return np.where(np.isinf(inputs), np.nan, inputs) if np.isinf(inputs).any() else inputs
+
+
+def input_columns(values: object, names: Sequence[str]) -> NDArray[np.float64]:
+    """What was given as a model's inputs, as numbers in columns.
+
+    Args:
+        values: Shape ``(n_samples, n_inputs)``; one input may lie flat.
+        names: The inputs.
+
+    Returns:
+        The numbers, of which what is infinite or masked is not a number.
+
+    Raises:
+        TraceError: If they are no real numbers.
+    """
+    found = np.asarray(values)
+    if found.dtype.kind not in "buifO":
+        raise _no_numbers(found)
+    try:
+        inputs = np.asarray(found, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise _no_numbers(found) from None
+    if isinstance(values, np.ma.MaskedArray):
+        inputs = np.where(np.ma.getmaskarray(values), np.nan, inputs)
+    return known_inputs(inputs[:, np.newaxis] if inputs.ndim == 1 and len(names) == 1 else inputs)
+
+
+def _no_numbers(found: NDArray[Any]) -> TraceError:
+    return TraceError(
+        "the inputs are no numbers",
+        expected="real numbers of shape (n_samples, n_inputs)",
+        got=f"shape {found.shape} of type {found.dtype}",
+        remedy="give an array of numbers, one column an input; fit.simulate takes frames and records too",
+    )
 
 
 class StartKind(enum.Enum):

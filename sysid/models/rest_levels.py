@@ -5,10 +5,49 @@ Whoever says where an output begins says it of all that follow it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from collections.abc import Mapping as Dict
+from typing import Any
 
-from sysid.errors import ConfigError
+from sysid.errors import ChannelError, ConfigError, shortened
+
+
+def levels_at_rest(given: Any, outputs: Collection[str]) -> Dict[str, float] | None:
+    """Levels of some outputs at rest, by name.
+
+    Args:
+        given: One number, of all of them; numbers by name; or ``None``.
+        outputs: The outputs that there are.
+
+    Returns:
+        Numbers by name; ``None`` where nothing was given.
+
+    Raises:
+        ChannelError: If a name is none of an output.
+        ConfigError: If a level is no finite number.
+
+    Example:
+        >>> levels_at_rest(2, ["y"]), levels_at_rest({"y": 1.5}, ["y", "z"])
+        ({'y': 2.0}, {'y': 1.5})
+    """
+    if given is None:
+        return None
+    levels = dict(given) if isinstance(given, Dict) else dict.fromkeys(outputs, given)
+    strangers = [name for name in levels if name not in outputs]
+    if strangers:
+        raise ChannelError(strangers, tuple(outputs), where="rest_output")
+    for name, level in levels.items():
+        number = hasattr(level, "__float__") and not isinstance(level, bool) and not getattr(level, "ndim", 0)
+        if not number or not math.isfinite(level):
+            raise ConfigError(
+                "an output's level at rest is one finite number",
+                where=f"rest_output, {name}",
+                expected="a number, in the output's unit",
+                got=shortened(level),
+                remedy="write for example rest_output=1.5, or rest_output={'y1': 1.5, 'y2': 0.0} for several outputs",
+            )
+    return {name: float(level) for name, level in levels.items()}
 
 
 def leaders(name: str, rest: Dict[str, float | str], outputs: Collection[str]) -> list[str]:

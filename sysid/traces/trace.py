@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,8 +183,36 @@ class Trace:
         channels = ", ".join(channel.label for channel in self.channels)
         return f"<Trace {self.name}: {len(self):,} samples of {self.sample_time:g} s; {channels}>"
 
-    def __getitem__(self, channel: str) -> NDArray[np.float64]:
-        return self.values[:, self.index(channel)]
+    @overload
+    def __getitem__(self, key: str) -> NDArray[np.float64]: ...
+
+    @overload
+    def __getitem__(self, key: slice) -> Trace: ...
+
+    def __getitem__(self, key: str | slice) -> NDArray[np.float64] | Trace:
+        """A channel by its name; of a slice of samples, those as a trace: ``trace[:300]``."""
+        return self._cut(key) if isinstance(key, slice) else self.values[:, self.index(key)]
+
+    def _cut(self, window: slice) -> Trace:
+        start, stop, step = window.indices(len(self))
+        if step != 1 or stop <= start:
+            raise TraceError(
+                "no part of a trace",
+                where=f"trace {self.name}",
+                expected=f"a slice of at least one of {len(self)} samples, in steps of 1",
+                got=f"{window}",
+                remedy="correct the slice; fewer samples a second are made by grid={'method': 'average'} with a "
+                "sample_time, which filters before",
+            )
+        usable = None if self.usable is None else self.usable[start:stop]
+        return replace(
+            self,
+            values=self.values[start:stop],
+            start_time=float(self.start_time + self.sample_time * start),
+            usable=None if usable is None or usable.all() else usable,
+            weights=None if self.weights is None else self.weights[start:stop],
+            provenance=(*self.provenance, f"samples {start} to {stop - 1} of {len(self)}"),
+        )
 
     def __contains__(self, channel: object) -> bool:
         return channel in self.channel_names

@@ -214,3 +214,60 @@ def test_a_trace_in_other_units_is_no_input() -> None:
 def test_samples_before_a_run_are_numbers(fit: sysid.Fit) -> None:
     with pytest.raises(TraceError, match="a sample before the first is missing"):
         fit.simulate(U, initial=(U[:3], [0.0, float("nan"), 0.0]))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [U[20:], list(U[20:]), U[None, 20:], np.ma.array(U[20:]), pd.Series(U[20:])],
+    ids=lambda one: type(one).__name__,
+)
+def test_one_input_may_lie_flat_wherever_a_model_is_run(fit: sysid.Fit, given: Any) -> None:
+    expected = fit.model.simulate(U[20:, None])
+    assert_array_equal(fit.simulate(given), expected)
+    if np.ndim(given) == 1:
+        assert_array_equal(fit.model.simulate(given), expected)
+        assert_array_equal(fit.model.predict(given, Y[20:]), fit.predict(Y[20:], given))
+
+
+def test_what_is_masked_is_no_number_to_a_model(fit: sysid.Fit) -> None:
+    masked = np.ma.masked_where(np.arange(len(U)) == 30, U)
+    run = fit.model.simulate(masked)
+    assert np.isfinite(run[:31]).all()
+    assert np.isnan(run[31:]).all()
+
+
+@pytest.mark.parametrize("given", [["a", "b"], U + 1j, np.zeros((0, 1))], ids=["text", "complex", "empty"])
+def test_a_model_refuses_what_are_no_numbers(fit: sysid.Fit, given: Any) -> None:
+    with pytest.raises(TraceError):
+        fit.model.simulate(given)
+    with pytest.raises((TraceError, ConfigError)):
+        fit.simulate(given)
+
+
+def test_measured_output_that_is_no_number_is_refused(fit: sysid.Fit) -> None:
+    with pytest.raises(TraceError, match="no numbers"):
+        fit.predict(["a"] * len(U), U)
+
+
+def test_a_sample_before_a_run_that_says_nothing_is_refused() -> None:
+    """As a level is: one sample alone is a system at rest, and these rest where their inputs hold them."""
+    traces = sysid.data((U, Y), sample_time=0.1)
+    found = sysid.fit(traces, "u -> y", sysid.OE(nb=1, nf=1, nk=1))
+    with pytest.raises(ConfigError, match="says nothing"):
+        found.simulate(U[50:], initial=(U[49:50], Y[49:50] + 1.0))
+    assert_allclose(found.simulate(U[50:], initial=(U[40:50], Y[40:50])), Y[50:], atol=1e-6)
+
+
+@pytest.mark.parametrize("level", ["1", np.array([1.0]), float("nan"), True, None, {"y": [1.0]}, {"z": 1.0}], ids=repr)
+def test_a_level_at_rest_is_a_number_of_an_output(level: Any) -> None:
+    traces = sysid.data((U, Y), sample_time=0.1)
+    if level is None:
+        sysid.fit(traces, "u -> y", ORDERS, start="rest", rest_output=level)
+        return
+    with pytest.raises((ConfigError, ChannelError)):
+        sysid.fit(traces, "u -> y", ORDERS, start="rest", rest_output=level)
+
+
+def test_a_trace_before_a_run_is_refused_in_words(fit: sysid.Fit) -> None:
+    with pytest.raises(ConfigError, match="u_before, y_before"):
+        fit.simulate(U, initial=fit.traces.traces[0])  # type: ignore[arg-type]

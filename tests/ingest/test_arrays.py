@@ -222,3 +222,16 @@ def test_columns_are_named_by_their_numbers_and_by_their_levels() -> None:
 )
 def test_a_sample_time_may_be_a_duration(step: object) -> None:
     assert data((np.arange(9.0), np.arange(9.0)), sample_time=step).traces[0].sample_time == 0.1
+
+
+def test_a_sample_time_in_single_precision_is_the_number_that_was_written() -> None:
+    assert data((U, Y), sample_time=np.float32(0.1)).sample_time == 0.1
+
+
+def test_units_may_be_those_of_a_library() -> None:
+    pint = pytest.importorskip("pint")
+    registry = pint.UnitRegistry()
+    for units in ({"u": registry.volt, "y": None}, [registry.volt, None]):
+        assert [channel.unit for channel in data((U, Y), sample_time=1, units=units).channels] == ["volt", "1"]
+    with pytest.raises(UnitError):
+        data((U, Y), sample_time=1, units={"u": 5})  # type: ignore[dict-item]

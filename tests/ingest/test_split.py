@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.ingest.arrays import data
+from sysid.traces import Role
 
 Y = np.arange(20.0)
 SETS = ["train"] * 8 + ["select"] * 4 + ["test"] * 8
@@ -34,6 +36,32 @@ SPLITS: dict[str, tuple[Any, list[tuple[str, str, int, float]]]] = {
         [("train", "estimation", 8, 0.0), ("select", "selection", 4, 0.8), ("test", "test", 8, 1.2)],
     ),
 }
+
+
+@pytest.mark.parametrize(
+    "split",
+    [
+        {Role.ESTIMATION: (0.0, 1.0), Role.VALIDATION: (1.0, 2.0)},
+        {"estimation": (None, pd.Timedelta("1s")), "validation": (timedelta(seconds=1), None)},
+        {"train": (np.timedelta64(0, "ms"), np.timedelta64(1000, "ms")), "val": (np.float32(1.0), None)},
+    ],
+)
+def test_spans_are_roles_with_numbers_durations_or_open_ends(split: Any) -> None:
+    parts = data(Y, sample_time=0.1, split=split)
+    assert [(parts.roles[part.name], len(part)) for part in parts] == [(Role.ESTIMATION, 10), (Role.VALIDATION, 10)]
+
+
+@pytest.mark.parametrize("split", [[Role.ESTIMATION, "test"], {"b": Role.TEST, "a": "train"}], ids=["list", "dict"])
+def test_each_experiment_has_its_role_in_order_or_by_name(split: Any) -> None:
+    assert data({"a": {"y": Y}, "b": {"y": Y}}, sample_time=0.1, split=split).roles == {
+        "a": Role.ESTIMATION,
+        "b": Role.TEST,
+    }
+
+
+def test_a_role_by_the_name_of_no_experiment_is_refused() -> None:
+    with pytest.raises(ConfigError, match="roles and experiments"):
+        data({"a": {"y": Y}, "b": {"y": Y}}, sample_time=0.1, split={"a": "train", "c": "test"})
 
 
 @pytest.mark.parametrize("case", SPLITS)

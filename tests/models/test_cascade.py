@@ -385,7 +385,7 @@ def test_a_channel_that_holds_an_output_belongs_to_its_part():
     assert set(cascade.upstream_of(["BC"]).outputs) == {"BP", "AR", "BC"}
 
 
-@pytest.mark.parametrize("shape", [(5, 2), (5,), (0, 1)], ids=str)
+@pytest.mark.parametrize("shape", [(5, 2), (5, 1, 1), (0, 1)], ids=str)
 def test_inputs_of_the_wrong_shape_are_refused(shape):
     with pytest.raises(TraceError, match="inputs do not fit the cascade"):
         service().simulate(np.zeros(shape))

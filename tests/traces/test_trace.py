@@ -76,3 +76,31 @@ def test_a_mask_of_each_channel_hides_a_sample_from_who_knows_that_channel_alone
     alike = Trace(name="a", sample_time=1.0, channels=channels, values=np.zeros((3, 3)), usable=mask[:, [1, 1, 1]])
     plain = Trace(name="a", sample_time=1.0, channels=channels, values=np.zeros((3, 3)), usable=mask[:, 1])
     assert alike.digest == plain.digest != trace.digest
+
+
+def test_a_slice_of_a_trace_is_a_trace_with_all_that_belongs_to_its_samples() -> None:
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
+    usable = np.arange(10) != 6
+    whole = Trace(
+        name="a",
+        sample_time=0.5,
+        channels=channels,
+        values=np.arange(20.0).reshape(10, 2),
+        start_time=100.0,
+        usable=usable,
+        weights=np.arange(10.0),
+    )
+    part = whole[5:8]
+    assert part.time.tolist() == [102.5, 103.0, 103.5]
+    assert part["y"].tolist() == [11.0, 13.0, 15.0]
+    assert part.usable_samples.tolist() == [True, False, True]
+    assert part.weights is not None
+    assert part.weights.tolist() == [5.0, 6.0, 7.0]
+    assert whole[-3:].usable is None
+    assert "samples 5 to 7 of 10" in part.provenance
+
+
+@pytest.mark.parametrize("window", [slice(5, 5), slice(20, 30), slice(None, None, 2), slice(None, None, -1)], ids=str)
+def test_a_slice_that_is_no_part_of_a_record_is_refused(window: slice) -> None:
+    with pytest.raises(TraceError, match="no part of a trace"):
+        TRACE[window]

@@ -17,6 +17,7 @@ from sysid.errors import ConfigError
 from sysid.extras import need
 from sysid.field_checks import check
 from sysid.models import Mapping, Start, StartKind, StartLike
+from sysid.models.rest_levels import levels_at_rest
 from sysid.names import slug
 from sysid.reporting.sweep_record import FIGURES, SweepRecord
 from sysid.traces import TraceSet
@@ -127,11 +128,10 @@ def auto(
     """
     traces = traces_of(traces, word="auto")
     chosen, start = mapping_of(traces, mapping), Start.of(start)
-    if not isinstance(rest_output, Dict):
-        rest_output = {} if rest_output is None else {chosen.output: rest_output}
+    rest = levels_at_rest(rest_output, chosen.outputs) or {}
     fields = {
         **{"kind": "auto", "name": slug(traces.name) or "auto", "data": traces.name, "mapping": chosen, "seed": seed},
-        **{"start": start, "rest": dict(rest_output), "minutes": minutes, "iterations": iterations, "workers": workers},
+        **{"start": start, "rest": rest, "minutes": minutes, "iterations": iterations, "workers": workers},
         **({"export": None} if folder is None else {}),
     }
     config = check(AutoConfig, fields, where="sysid.auto")
