@@ -3,8 +3,8 @@
     python -m tests.benchmarks engines
 
 Networks of two inputs with random weights over 20,000 samples, and free runs of 200. Medians of nine after one run that
-warms up, the two in turn; one BLAS thread, processor times. Both run in one pass: what is left between them is what
-stands around it.
+warms up, the two in turn; one BLAS thread, processor times. Both have one mechanism: what is left between them is
+noise, or what the whole's errors cost, of which none counts as one here.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from sysid.reporting.numbers import number
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 
-SAMPLES, SHORT, REPEATS, CALLS = 20_000, 200, 9, 100
+SAMPLES, SHORT, REPEATS, CALLS, ERROR = 20_000, 200, 9, 100, 0.25
 NETWORKS = (
     NARX(input_delays=5, output_delays=3, neurons=0),
     NARX(input_delays=2, output_delays=2, neurons=4),
@@ -55,7 +55,7 @@ def providers(network: NARX, samples: int = SAMPLES) -> tuple[RecursionProvider,
     trace = Trace(name="record", sample_time=0.1, channels=channels, values=np.column_stack([u, y]))
     return (
         RecursionProvider(template=model.recursion, experiments=(record,), closed=True),
-        CascadeProvider(cascade=Cascade(models=(model,)), traces=(trace,), errors={"y": 1.0}),
+        CascadeProvider(cascade=Cascade(models=(model,)), traces=(trace,), errors={"y": ERROR}),
     )
 
 
@@ -81,7 +81,8 @@ def main() -> None:
     for network in NETWORKS:
         alone, whole = providers(network)
         theta = whole.theta
-        np.testing.assert_allclose(whole.linearise(theta).gradient, alone.linearise(theta).gradient, rtol=1e-6)
+        own, of_whole = (provider.linearise(theta).gradient for provider in (alone, whole))
+        np.testing.assert_allclose(of_whole * ERROR**2, own, rtol=0.0, atol=1e-13 * np.abs(own).max())
         loss, linearise = (
             medians([partial(getattr(one, name), theta) for one in (alone, whole)]) for name in ("loss", "linearise")
         )

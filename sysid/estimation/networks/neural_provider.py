@@ -13,7 +13,7 @@ from sysid.estimation.first_samples import is_another, moves_of_shown
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.linear.segments import Segment
-from sysid.estimation.networks.provider import BLOCK
+from sysid.estimation.networks.program_provider import BLOCK
 from sysid.kernels import neural_state_space as kernel
 from sysid.kernels.arrays import forget_what_has_died_away
 from sysid.models import NeuralForm

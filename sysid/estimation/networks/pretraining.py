@@ -33,7 +33,7 @@ from sysid.estimation.least_squares.provider import AbstractProvider, Linearisat
 from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
-from sysid.estimation.networks.provider import BLOCK
+from sysid.estimation.networks.program_provider import BLOCK
 from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import NARXModel
 

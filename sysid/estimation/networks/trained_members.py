@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.kernels.arrays import read_only
 from sysid.kernels.cascade_layout import Program
 from sysid.kernels.cascade_plan import Plan
 from sysid.models import Cascade, Ends, Member
@@ -73,19 +75,40 @@ class TrainedMembers:
             if yes and columns.equation is not None and columns.equation.free == slice(0, 0):
                 raise _cannot(model)
         program = program_of(members, [Ends.of(model) for model in run], cascade.wiring.channels, cascade.limits)
-        places = _places(members, flags, program)
+        return cls.of_program(program, members, flags, tuple(m for m, yes in zip(run, flags, strict=True) if yes))
+
+    @classmethod
+    def of_program(
+        cls,
+        program: Program,
+        columns: Sequence[ColumnRecursion],
+        trained: Sequence[bool],
+        members: tuple[Member, ...] = (),
+    ) -> TrainedMembers:
+        """Those of a program that is there already, such as one network in its scaled numbers.
+
+        Args:
+            program: What is run.
+            columns: Each member of it.
+            trained: Whether each is trained.
+            members: The trained ones as models, where their parameters are put back.
+
+        Returns:
+            Them.
+        """
+        places = _places(columns, trained, program)
         output_of = {int(channel): i for i, channel in enumerate(program.output_channel)}
         source = np.array([output_of.get(int(channel), -1) for channel in program.regressor_channel], dtype=np.int64)
-        own_first = np.full(len(run), -1, dtype=np.int64)
-        own_first[np.flatnonzero(flags)] = [own.start for _, own in places]
+        own_first = np.full(len(columns), -1, dtype=np.int64)
+        own_first[np.flatnonzero(trained)] = [own.start for _, own in places]
         return cls(
-            members=tuple(m for m, yes in zip(run, flags, strict=True) if yes),
+            members=members,
             program=program,
             plan=Plan.of(program),
-            depth=max(columns.lags.depth for columns in members),
+            depth=max(one.lags.depth for one in columns),
             places=places,
             own_first=own_first,
-            extent=_extent(program, source, flags, [own for _, own in places]),
+            extent=_extent(program, source, trained, [own for _, own in places]),
             source=source,
             carry=_carry(program, source),
         )
@@ -93,14 +116,29 @@ class TrainedMembers:
     @property
     def theta(self) -> NDArray[np.float64]:
         """The parameters that the trained members have, shape ``(n_parameters,)``."""
-        numbers = self.program.numbers
-        return np.concatenate([numbers[whole] for whole, _ in self.places])
+        return np.concatenate([self._numbers[whole] for whole, _ in self.places])
+
+    @cached_property
+    def _alone(self) -> bool:
+        """Whether the trained parameters are all that there are, in the same order."""
+        return self.places == ((slice(0, len(self._numbers)),) * 2,)
+
+    @cached_property
+    def _numbers(self) -> NDArray[np.float64]:
+        return self.program.numbers
+
+    def numbers_at(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the pass is given with these parameters of the trained members."""
+        if self._alone:
+            return read_only(np.ascontiguousarray(theta))
+        whole = self._numbers.copy()
+        for place, own in self.places:
+            whole[place] = theta[own]
+        return read_only(whole)
 
     def program_at(self, theta: NDArray[np.float64]) -> Program:
         """The program with these parameters of the trained members."""
-        whole, n = self.program.numbers.copy(), len(self.program.theta)
-        for place, own in self.places:
-            whole[place] = theta[own]
+        whole, n = self.numbers_at(theta).copy(), len(self.program.theta)
         return self.program._replace(theta=whole[:n], equations=self.program.equations._replace(registers=whole[n:]))
 
     def put(self, cascade: Cascade, theta: NDArray[np.float64]) -> Cascade:

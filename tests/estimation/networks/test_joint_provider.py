@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.least_squares.counted_rows import counted_rows
-from sysid.estimation.networks.joint_provider import BLOCK, CascadeProvider
+from sysid.estimation.networks.joint_provider import CascadeProvider
 from sysid.estimation.networks.joint_training import unit_errors
+from sysid.estimation.networks.program_provider import LEAST
 from sysid.models import Cascade, Limit
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace
@@ -141,12 +142,12 @@ def test_an_output_held_by_a_channel_moves_with_it():
 @pytest.fixture
 def short_blocks(monkeypatch):
     """Blocks are as short as those of large wholes."""
-    monkeypatch.setattr("sysid.estimation.networks.joint_provider.MOST", BLOCK)
+    monkeypatch.setattr("sysid.estimation.networks.program_provider.BLOCK", LEAST)
 
 
 @pytest.mark.usefixtures("short_blocks")
 def test_blocks_join_without_a_seam():
-    one = provider(service(), n=2 * BLOCK + 57)
+    one = provider(service(), n=2 * LEAST + 57)
     theta, direction = one.theta, np.random.default_rng(4).standard_normal(len(one.theta))
     width = 1e-6
     expected = (one.residuals(theta + width * direction) - one.residuals(theta - width * direction)) / (2 * width)
@@ -159,9 +160,9 @@ def test_blocks_join_without_a_seam():
 @pytest.mark.parametrize("each", [False, True], ids=["samples", "each channel"])
 def test_normal_equations_equal_the_dense_ones(stride, moves, workers, each):
     cascade = service()
-    usable = np.random.default_rng(5).random((BLOCK + 90, len(cascade.wiring.channels) if each else 1)) > 0.2
+    usable = np.random.default_rng(5).random((LEAST + 90, len(cascade.wiring.channels) if each else 1)) > 0.2
     usable = usable if each else usable[:, 0]
-    traces = (trace(cascade, BLOCK + 90, usable=usable), trace(cascade, 50, 1))
+    traces = (trace(cascade, LEAST + 90, usable=usable), trace(cascade, 50, 1))
     errors = {"BC": 2.0, "BP": 0.5}
     one = provider(cascade, traces=traces, errors=errors, stride=stride, moves=moves, workers=workers)
     counts, scale = [t.counted(cascade.inputs, errors) for t in traces], list(errors.values())

@@ -14,7 +14,7 @@ from sysid.estimation.networks.neural_layout import NeuralLayout
 from sysid.estimation.networks.neural_provider import NeuralProvider
 from sysid.estimation.networks.neural_start import linear_start
 from sysid.estimation.networks.neural_state_space import STARTS
-from sysid.estimation.networks.provider import BLOCK
+from sysid.estimation.networks.program_provider import BLOCK
 from sysid.models import (
     History,
     Mapping,
