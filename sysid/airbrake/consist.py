@@ -9,11 +9,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from sysid.airbrake.settings import check_numbers
 from sysid.errors import ConfigError
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
 
 TEMPERATURE = 298.0
 """Temperature of all air in K; the model is isothermal."""
+
+MOST_PAIRS = 500
+"""Longest train in wagon pairs (ours)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,12 +29,18 @@ class Pipe:
         length: Length per vehicle in m (Legvag).
         area: Area between two vehicles in m2 (AEG).
         vehicle_length: Distance from one vehicle to the next in m (Lvag + Lcti).
+
+    Raises:
+        ConfigError: If one of them is not a finite number above 0.
     """
 
     radius: float = 0.015875
     length: float = 10.5
     area: float = 8e-4
     vehicle_length: float = 9.75 + 0.08
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "a brake pipe")
 
     @property
     def volume(self) -> float:
@@ -45,10 +55,23 @@ class HeadValve:
     Args:
         feed_area: Area into the pipe in m2 (AlocoI).
         exhaust_area: Area out of the pipe in m2 (AlocoO); twice that in an emergency.
+
+    Raises:
+        ConfigError: If one of them is not a finite number above 0.
     """
 
     feed_area: float = 9.5e-5
     exhaust_area: float = 8e-5
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "a head valve")
+
+
+CHOKES = (
+    "charge_auxiliary", "charge_emergency", "charge_action", "apply", "release", "accelerate_service",
+    "accelerate_emergency", "bleed_action", "quick_service", "emergency_vent",
+)  # fmt: skip
+"""Areas of a valve; one that a valve does not have is 0."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +104,9 @@ class BrakeValve:
         full_fall: The same that gives all of ``cylinder_limit``; 1.5 bar.
         cylinder_limit: Largest gauge pressure of its cylinder; 3.8 bar.
         opening_band: What the cylinder is off by at which its choke is fully open, in proportion below (ours).
+
+    Raises:
+        ConfigError: If one of them is not a finite number above 0; a choke may have no area.
     """
 
     auxiliary_volume: float = 0.041
@@ -108,6 +134,9 @@ class BrakeValve:
     cylinder_limit: float = 380_000.0
     opening_band: float = 10_000.0
 
+    def __post_init__(self) -> None:
+        check_numbers(self, "a brake valve", from_zero=CHOKES)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Cylinder:
@@ -124,6 +153,9 @@ class Cylinder:
         contact_travel: Travel in m at which the shoes touch the wheels (ours).
         contact_pressure: Gauge pressure in Pa that takes the piston there against its spring (PFmin).
         stroke_pressure: Gauge pressure in Pa at which the travel is full (ours).
+
+    Raises:
+        ConfigError: If one of them is not a finite number above 0, or the shoes touch at the full stroke or behind it.
     """
 
     area: float = 0.06477
@@ -131,6 +163,16 @@ class Cylinder:
     contact_travel: float = 0.1444
     contact_pressure: float = 10.0 * PSI_IN_PA
     stroke_pressure: float = 60.0 * PSI_IN_PA
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "a brake cylinder")
+        if not (self.contact_travel < self.stroke and self.contact_pressure < self.stroke_pressure):
+            raise ConfigError(
+                "not a brake cylinder: the shoes touch behind the full stroke", where="cylinder",
+                expected="a contact_travel below stroke and a contact_pressure below stroke_pressure",
+                got=f"{self.contact_travel:g} of {self.stroke:g} m, "
+                f"{self.contact_pressure:g} of {self.stroke_pressure:g} Pa",
+            )  # fmt: skip
 
     @property
     def volume(self) -> float:
@@ -183,13 +225,14 @@ class Consist:
     retainers: float | tuple[float, ...] = 0.0
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.pairs, int) and self.pairs >= 1):
+        if isinstance(self.pairs, bool) or not (isinstance(self.pairs, int) and 1 <= self.pairs <= MOST_PAIRS):
             raise ConfigError(
-                "a train needs wagons", where="pairs", expected="an integer of at least 1", got=self.pairs
-            )
+                "a train needs wagons, and not more than a railway can run", where="pairs",
+                expected=f"an integer from 1 to {MOST_PAIRS}", got=self.pairs,
+            )  # fmt: skip
         object.__setattr__(self, "locomotives", tuple(sorted(self.locomotives)))
         for ahead in self.locomotives:
-            if not 1 <= ahead <= self.pairs:
+            if not isinstance(ahead, int) or not 1 <= ahead <= self.pairs:
                 raise ConfigError(
                     "a locomotive stands outside the train",
                     where="locomotives",

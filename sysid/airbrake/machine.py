@@ -72,6 +72,14 @@ def largest_stable_step(consist: Consist, variant: Variant, table: FlowTable) ->
     return 0.5 * math.sqrt(amplitude) / (per_second * root)
 
 
+def _stable_part(sample_time: float, largest: float) -> str:
+    """A step in s that is stable and divides a sample, of two digits where there is one."""
+    least = max(1, math.ceil(sample_time / largest))
+    parts = [f"{sample_time / steps:.2g}" for steps in range(least, 3 * least)]
+    whole = (part for steps, part in enumerate(parts, start=least) if math.isclose(float(part) * steps, sample_time))
+    return next(whole, f"{sample_time / least:.12g}")
+
+
 def _steps_per_sample(
     time_step: float, sample_time: float, consist: Consist, variant: Variant, table: FlowTable
 ) -> int:
@@ -82,9 +90,9 @@ def _steps_per_sample(
             where="time_step",
             expected=f"at most {largest * 1e3:.3g} ms",
             got=f"{time_step * 1e3:g} ms",
-            remedy="use 1 ms or less",
+            remedy=f"use time_step {_stable_part(sample_time, largest)} s, or a shorter one that divides the sample",
         )
-    steps = round(sample_time / time_step)
+    steps = round(sample_time / time_step) if math.isfinite(sample_time) else 0
     if steps < 1 or not math.isclose(steps * time_step, sample_time, rel_tol=1e-9):
         raise StabilityError(
             "a sample does not hold a whole number of time steps",
@@ -254,6 +262,7 @@ class BrakedTrain:
 
         Raises:
             ConfigError: If the command exceeds the running pressure, or the shapes do not fit.
+            StabilityError: If the step is too long for a choke, so that pressures are lost.
         """
         handle = _per_sample(command, len(command), "command")
         heard = handle if remote is None else _per_sample(remote, len(handle), "remote")
@@ -275,6 +284,12 @@ class BrakedTrain:
         self.gained += kernel.advance(
             self.state, self._layout, drive, self._steps, self._watch, output, self._constants, self._table, self._work
         )
+        if not np.isfinite(output).all():
+            raise StabilityError(
+                "the simulation has lost its pressures", where="time_step",
+                expected="chokes and volumes that a step resolves", got="pressures that are not finite",
+                remedy="shorten time_step, or correct the areas and volumes of the train",
+            )  # fmt: skip
         if self._shares is not None:
             output = STANDARD_ATMOSPHERE_PA + self._shares * (output - STANDARD_ATMOSPHERE_PA)
         return output

@@ -7,12 +7,12 @@ last.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.airbrake.settings import check_numbers
 from sysid.errors import ConfigError
 
 
@@ -36,11 +36,11 @@ class Radio:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.delay < math.inf and 0.0 <= self.loss <= 1.0 and 0.0 < self.repeat < math.inf):
+        check_numbers(self, "a radio", from_zero=("delay", "loss", "seed"))
+        if self.loss > 1.0:
             raise ConfigError(
-                "not a radio", where="radio", got=self,
-                expected="a delay from 0 s on, a loss from 0 to 1, messages again after more than 0 s",
-            )  # fmt: skip
+                "not a radio: a loss is a probability", where="radio, loss", expected="from 0 to 1", got=self.loss
+            )
 
     def heard(self, command: NDArray[np.float64], sample_time: float) -> NDArray[np.float64]:
         """The handle as the others have it.

@@ -17,6 +17,9 @@ from typing import Any
 from sysid.errors import ConfigError, did_you_mean
 from sysid.units import PSI_IN_PA
 
+LONGEST_DELAY = 60.0
+"""Of ``rising_delay`` in s: every step of it is remembered for every valve."""
+
 
 class QuickService(enum.Enum):
     """What opens the vent that carries an application from car to car."""
@@ -137,9 +140,14 @@ class Variant:
                 "the leakage is not a rate", where="variant", expected="Pa/s, 0 or above", got=self.leakage,
                 remedy="write for example leakage: 574.6, which is 5 psi/min",
             )  # fmt: skip
+        if self.rising_delay > LONGEST_DELAY:
+            raise ConfigError(
+                "a valve does not remember that long", where="variant, rising_delay",
+                expected=f"at most {LONGEST_DELAY:g} s", got=self.rising_delay,
+            )  # fmt: skip
         for name in ("relay_band", "equalising_rate", "rising_delay", "quick_service_limit"):
             value = getattr(self, name)
-            if value is not None and not value > 0.0:
+            if value is not None and not 0.0 < value < math.inf:
                 raise ConfigError(f"{name} is not positive", where="variant", expected="a number above 0", got=value)
 
     def with_options(self, options: Mapping[str, Any]) -> Variant:

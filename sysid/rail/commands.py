@@ -28,6 +28,10 @@ Out = Annotated[Path | None, typer.Option(help="Folder for the table (.csv) and 
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Read everything, say what would be done, and do nothing.")]
 
 
+FARTHEST = 100_000.0
+"""Metres ahead that anything here is asked for."""
+
+
 class Combination(Enum):
     """How the correlations with several patterns make one."""
 
@@ -72,6 +76,10 @@ def terrain(
     line, consist = _line(track, section), read_train(train)
     if not 0.0 < step <= 1000.0:
         raise ConfigError("step is out of range", where="--step", expected="metres, up to 1000", got=step)
+    if not -FARTHEST <= look_ahead <= FARTHEST:
+        raise ConfigError(
+            "it looks too far ahead", where="--look-ahead", expected="metres, up to 100 km either way", got=look_ahead
+        )
     shape = Shape.of(consist)
     x = np.arange(line.starts[0] - shape.length, line.starts[-1] + 2.0 * shape.length + step, step)
     if len(x) > 1_000_000:
@@ -145,7 +153,7 @@ def drive(
 
     rows, consist = read_card(card), read_train(train)
     line, begins = rows.profile(section), max(0.0, stop - 300.0) if point is None else point
-    if not 0.0 < stop <= 100_000.0 or not 0.0 <= begins < stop or not 0.0 < longest <= 7200.0:
+    if not 0.0 < stop <= FARTHEST or not 0.0 <= begins < stop or not 0.0 < longest <= 7200.0:
         raise ConfigError(
             "the run cannot be made", where="--stop, --point, --longest",
             expected="a stop up to 100 km ahead, a point before it, and up to 7200 s",
@@ -167,12 +175,13 @@ def drive(
 
     limits = np.array([line.lowest_limit(at - consist.length, at) for at in run.position])
     over = float((run.speed - limits).max())
+    stands = "stands" if run.speed[-1] <= 0.01 else "is"
     typer.echo(
-        f"stands at {run.position[-1]:.2f} m after {run.motion.time[-1]:.1f} s; {run.notch_changes} changes of notch, "
-        f"{run.traction_work / 3.6e6:.2f} kWh of traction, "
+        f"{stands} at {run.position[-1]:.2f} m after {run.motion.time[-1]:.1f} s; "
+        f"{run.notch_changes} changes of notch, {run.traction_work / 3.6e6:.2f} kWh of traction, "
         + (f"{3.6 * over:.1f} km/h over a limit" if over > 0.0 else "no limit passed")
     )
-    if run.speed[-1] > 0.01:
+    if stands == "is":
         typer.echo(f"note: it has not stopped within {longest:g} s")
     if out is not None:
         columns = {
@@ -198,11 +207,14 @@ def eot(
     dry_run: DryRun = False,
 ) -> None:
     """The end-of-train device on its bench: the self-test, then an application from both ends of a train."""
+    import numpy as np
+
     from sysid.airbrake.consist import Consist
-    from sysid.rail.end_of_train.bench import LeakingBench, from_both_ends
+    from sysid.rail.end_of_train.bench import LeakingBench, check_application, from_both_ends
     from sysid.rail.end_of_train.tail_unit import self_test
 
     consist, bench = Consist(pairs=pairs), LeakingBench(leak=leak, valve_leak=valve_leak)
+    check_application(consist, handle, seconds=seconds)
     outcome = self_test(bench)
     typer.echo(f"self-test, leaks of {leak:g} and {valve_leak:g} psi a minute: {outcome.value}")
     for at, done, psi in bench.readings:
@@ -214,11 +226,13 @@ def eot(
     found = from_both_ends(consist, handle, seconds=seconds)
     for message, answer in found.log[:1]:
         typer.echo(f"{message.order.name.lower()} ordered at {message.time:.1f} s: {answer.value}")
-    typer.echo(f"valve open from {found.opened:.1f} s, for {found.open_for:.1f} s in all; {len(found.log)} orders")
+    opened = f"open from {found.opened:.1f} s, for {found.open_for:.1f} s in all" if found.open_for else "never open"
+    typer.echo(f"valve {opened}; {len(found.log)} orders")
     places = {"first": consist.valve_nodes[0], "middle": consist.valve_nodes[pairs // 2], "last": consist.vehicles}
     for name, values, took in (("both ends", found.both, found.braked[0]), ("one end", found.one, found.braked[1])):
         held = ", ".join(f"{place} {values[-1, node - 1]:.1f}" for place, node in places.items())
-        typer.echo(f"{name:<9} cylinders at nine tenths after {took:5.1f} s; at the end {held} psi")
+        braked = f"at nine tenths after {took:5.1f} s" if np.isfinite(took) else "have no pressure"
+        typer.echo(f"{name:<9} cylinders {braked}; at the end {held} psi")
     if out is not None:
         columns = {"time_s": found.time} | {
             f"{place}_{ends}_psi": values[:, node - 1]
@@ -250,15 +264,17 @@ def stops(
 
     from sysid.ingest import read_trace, write_csv
     from sysid.rail.constants import MPH
-    from sysid.rail.traces.stop_cycles import characteristic_of, learning_stops, servo, slow_application
+    from sysid.rail.traces.stop_cycles import characteristic_of, check_stops, learning_stops, servo, slow_application
     from sysid.rail.transit.deceleration import identify_characteristic
     from sysid.rail.transit.transit import TransitVehicle
 
+    check_stops(friction=friction, grade=grade, count=count)
     known = characteristic_of(servo()) if trace is None else identify_characteristic(read_trace(trace))
     knots = ", ".join(f"{a / MPH:.2f} at {p:.1f}" for p, a in zip(known.signals, known.decelerations, strict=True))
     typer.echo(f"characteristic from {trace or 'the nominal vehicle'}: {knots} (mph/s at mA)")
     if dry_run:
-        typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/stops.csv and .svg" if out else ""))
+        files = [str(record)] * (record is not None) + [f"{out}/stops.csv and .svg"] * (out is not None)
+        typer.echo("nothing is done: --dry-run" + (f"; it would write {', '.join(files)}" if files else ""))
         return
     if record is not None:
         write_csv(slow_application(TransitVehicle(model=servo(), friction=friction, speed=2000.0)), record)
@@ -288,6 +304,11 @@ def _line(path: Path, section: str | None) -> Any:
     from sysid.rail.track.card import read_card
 
     if path.suffix.lower() != ".csv":
+        if section is not None:
+            raise ConfigError(
+                "a line of YAML has no sections", where="--section", expected="a track card (.csv)", got=path,
+                remedy="leave --section out",
+            )  # fmt: skip
         return read_track(path)
     card = read_card(path)
     if section is None and len(card.sections) > 1:

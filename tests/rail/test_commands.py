@@ -110,12 +110,45 @@ def test_a_dry_run_does_nothing(words: list[str], tmp_path: Path) -> None:
         (["drive", str(LINES / "crest.yaml"), *DRIVE[2:]], "no track card"),
         (["stops", "--friction", "9"], "not such stops"),
         (["eot", "--leak", "-1"], "not a test bench"),
+        (["terrain", CREST, TRAIN, "--look-ahead", "nan"], "too far ahead"),
+        (["terrain", CREST, TRAIN, "--section", "A"], "no sections"),
+        (["eot", "--pairs", "100000"], "a train needs wagons"),
+        (["eot", "--handle", "90", "--dry-run"], "not an application"),
+        (["stops", "--count", "0", "--dry-run"], "not such stops"),
     ],
-    ids=["step", "section", "point", "unknown section", "no card", "friction", "leak"],
-)
+    ids=["step", "section", "point", "unknown section", "no card", "friction", "leak", "look ahead", "no sections",
+         "wagons", "dry eot", "dry stops"],
+)  # fmt: skip
 def test_what_cannot_be_is_refused_in_words(words: list[str], said: str) -> None:
     with pytest.raises(SysidError, match=said):
         CliRunner().invoke(app, words, catch_exceptions=False)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([*EOT, "--handle", "89.5"], "valve never open; 0 orders\nboth ends cylinders have no pressure"),
+        ([*DRIVE, "--longest", "20"], "is at 156.02 m after 20.0 s"),
+        ([*STOPS, "--dry-run", "--record", "slow.csv"], "it would write slow.csv"),
+    ],
+    ids=["no application", "still moving", "dry record"],
+)
+def test_what_did_not_happen_is_not_told(words: list[str], said: str) -> None:
+    assert said in run(words)
+
+
+def test_a_line_with_posts_in_kilometres_is_refused(tmp_path: Path) -> None:
+    line = tmp_path / "km.yaml"
+    line.write_text("name: km\ngrade: [[0, 5], [0.1, -20], [0.7, 20], [0.9, -5]]\n", encoding="utf-8")
+    with pytest.raises(SysidError, match="no longer than a wagon"):
+        CliRunner().invoke(app, ["terrain", str(line), TRAIN], catch_exceptions=False)
+
+
+def test_a_card_with_distances_in_metres_is_refused(tmp_path: Path) -> None:
+    card = tmp_path / "m.csv"
+    card.write_text("section,distance_km,code,value\nA,0,GRADE,5\nA,700,GRADE,-5\n", encoding="utf-8")
+    with pytest.raises(SysidError, match="longer than any line"):
+        CliRunner().invoke(app, ["terrain", str(card), TRAIN], catch_exceptions=False)
 
 
 def test_the_command_line_finds_what_a_field_brings(

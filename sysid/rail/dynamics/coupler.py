@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.airbrake.settings import check_numbers
 from sysid.errors import ConfigError
 
 
@@ -53,17 +54,13 @@ class Coupler:
     friction_speed: float = 0.02
 
     def __post_init__(self) -> None:
-        positive = (self.stiffness, self.stop_stiffness, self.toe, self.friction_speed)
-        good = min(positive) > 0.0 and self.slack >= 0.0 and self.preload >= 0.0
-        if not (good and self.toe < self.travel and 0.0 <= self.friction < 1.0):
+        check_numbers(self, "a coupler", from_zero=("slack", "preload", "friction"))
+        if not (self.toe < self.travel and self.friction < 1.0):
             raise ConfigError(
-                "not a coupler",
-                where="coupler",
-                expected="stiffnesses, toe and friction_speed above 0, slack and preload from 0 on, "
-                "toe below travel, friction from 0 to below 1",
-                got=self,
+                "not a coupler", where="coupler", expected="toe below travel, friction below 1",
+                got=f"toe {self.toe:g} m of {self.travel:g} m, friction {self.friction:g}",
                 remedy="correct the value; units are SI",
-            )
+            )  # fmt: skip
 
     @property
     def row(self) -> NDArray[np.float64]:

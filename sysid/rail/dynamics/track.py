@@ -62,6 +62,8 @@ class TrackProfile:
             raise self._error("a grade is too steep for a railway", "at most 200 per mille", steepest)
         if self.curvatures.min() < 0.0 or self.curvatures.max() > 1.0 / 20.0:
             raise self._error("a curve is not possible", "a radius of at least 20 m", self.curvatures)
+        if np.abs(self.superelevations).max() > 0.3:
+            raise self._error("a cant is not possible", "at most 300 mm", self.superelevations)
         if self.speed_limits.min() <= 0.0:
             raise self._error("a speed limit is not positive", "m/s above 0", self.speed_limits)
 
@@ -177,6 +179,9 @@ def _held(steps: Steps, before: float, starts: NDArray[np.float64]) -> NDArray[n
 STRAIGHT = 99_999.0
 """Radius in m that a track file writes for straight track (source of the track card)."""
 
+SHORTEST_LINE = 10.0
+"""In m: posts that lie closer together are read as kilometres, and refused."""
+
 Row = tuple[Annotated[float, Field(allow_inf_nan=False)], Annotated[float, Field(allow_inf_nan=False)]]
 
 
@@ -204,6 +209,12 @@ def read_track(path: Path) -> TrackProfile:
         ConfigError: If the file cannot be read or a value cannot be used.
     """
     file = check(_TrackFile, read_yaml(path), where=path)
+    posts = sorted({x for rows in (file.grade, file.curve, file.superelevation, file.speed_limit) for x, _ in rows})
+    if len(posts) > 1 and posts[-1] - posts[0] < SHORTEST_LINE:
+        raise ConfigError(
+            "the line is no longer than a wagon", where=path, expected="positions in m",
+            got=f"posts from {posts[0]:g} to {posts[-1]:g}", remedy="write kilometres times 1000",
+        )  # fmt: skip
     for position, radius in file.curve:
         if radius < 20.0:
             raise ConfigError(

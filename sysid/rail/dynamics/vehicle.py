@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.airbrake.settings import check_numbers
 from sysid.errors import ConfigError
 from sysid.rail.constants import KMH, MPH, POUND_FORCE, SHORT_TON
 
@@ -39,13 +40,7 @@ class Davis:
     c: float
 
     def __post_init__(self) -> None:
-        _need(
-            min(self.a, self.b, self.c) >= 0.0,
-            "a running resistance is negative",
-            where="davis",
-            expected="a, b and c from 0 on",
-            got=(self.a, self.b, self.c),
-        )
+        check_numbers(self, "a running resistance", from_zero=("a", "b", "c"))
 
     def force(self, speed: float) -> float:
         """Resistance in N at a speed in m/s."""
@@ -105,12 +100,13 @@ class Shoe:
     slope: float = 2.0
 
     def __post_init__(self) -> None:
+        check_numbers(self, "the friction of a brake shoe")
         _need(
-            self.base > 0.0 and self.reference > 0.0 and self.slope >= 1.0,
-            "not the friction of a brake shoe",
-            where="shoe",
-            expected="base and reference above 0, slope from 1 on",
-            got=(self.base, self.reference, self.slope),
+            self.slope >= 1.0,
+            "not the friction of a brake shoe: it rises with speed",
+            where="shoe, slope",
+            expected="from 1 on",
+            got=self.slope,
         )
 
     def friction(self, speed: float) -> float:
@@ -149,13 +145,11 @@ class Rigging:
     shoe: Shoe = Shoe()
 
     def __post_init__(self) -> None:
+        check_numbers(self, "a brake rigging", from_zero=("area", "ratio", "spring_pressure"))
         _need(
-            self.area >= 0.0 and self.ratio >= 0.0 and 0.0 < self.efficiency <= 1.0 and self.spring_pressure >= 0.0,
-            "not a brake rigging",
-            where="rigging",
-            expected="area, ratio and spring pressure from 0 on, efficiency above 0 and at most 1",
-            got=self,
-        )
+            self.efficiency <= 1.0, "not a brake rigging: more force than the lever gives", where="rigging, efficiency",
+            expected="above 0 and at most 1", got=self.efficiency,
+        )  # fmt: skip
 
     @property
     def gain(self) -> float:
@@ -305,10 +299,4 @@ class Vehicle:
     name: str = "wagon"
 
     def __post_init__(self) -> None:
-        _need(
-            self.mass > 0.0 and self.length > 0.0,
-            "a vehicle without mass or length",
-            where=f"vehicle {self.name}",
-            expected="mass in kg and length in m above 0",
-            got=(self.mass, self.length),
-        )
+        check_numbers(self, f"a vehicle ({self.name})")

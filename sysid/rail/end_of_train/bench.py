@@ -18,6 +18,9 @@ from sysid.rail.end_of_train.brake_computer import Message
 from sysid.rail.end_of_train.tail_unit import AbstractTestBench, Answer, TwoEndedBrake, full_braking_times
 from sysid.units import PSI_IN_PA
 
+AFTER = 5.0
+"""When the handle moves, in s."""
+
 
 @dataclass(kw_only=True)
 class LeakingBench(AbstractTestBench):
@@ -100,7 +103,8 @@ class BothEnds:
         open_for: For how long, in s.
         both: Cylinders in psi gauge from both ends, shape ``(n_samples, n_vehicles)``.
         one: The same from the head alone.
-        braked: Seconds from the command until every cylinder has nine tenths of its pressure, both ends and one.
+        braked: Seconds from the command until every cylinder has nine tenths of its pressure, both ends and one; NaN
+            where none has any.
     """
 
     time: NDArray[np.float64]
@@ -112,7 +116,28 @@ class BothEnds:
     braked: tuple[float, float]
 
 
-def from_both_ends(consist: Consist, handle: float, *, seconds: float = 150.0, after: float = 5.0) -> BothEnds:
+def check_application(consist: Consist, handle: float, *, seconds: float, after: float = AFTER) -> None:
+    """Refuse an application that cannot be made or looked at.
+
+    Args:
+        consist: The train.
+        handle: Psi gauge; 0 is the emergency.
+        seconds: How long it is looked at.
+        after: When the handle moves, in s.
+
+    Raises:
+        ConfigError: If the handle or the time does not fit the train.
+    """
+    running = consist.running_pressure
+    if not 0.0 <= handle < running or not 1.0 <= after < seconds <= 1000.0:
+        raise ConfigError(
+            "not an application", where="end of train",
+            expected=f"a handle from 0 to below {running:g} psi, and {after:g} to 1000 s",
+            got=f"{handle:g} psi, {seconds:g} s",
+        )  # fmt: skip
+
+
+def from_both_ends(consist: Consist, handle: float, *, seconds: float = 150.0, after: float = AFTER) -> BothEnds:
     """Move the handle once and look at the train.
 
     Args:
@@ -127,13 +152,8 @@ def from_both_ends(consist: Consist, handle: float, *, seconds: float = 150.0, a
     Raises:
         ConfigError: If the handle or the time does not fit the train.
     """
+    check_application(consist, handle, seconds=seconds, after=after)
     running = consist.running_pressure
-    if not 0.0 <= handle < running or not 1.0 <= after < seconds <= 1000.0:
-        raise ConfigError(
-            "not an application", where="end of train",
-            expected=f"a handle from 0 to below {running:g} psi, and up to 1000 s",
-            got=f"{handle:g} psi, {seconds:g} s",
-        )  # fmt: skip
     watched = _Watched(consist)
     step, moved = watched.sample_time, round(after / watched.sample_time)
     command = np.repeat([running, handle], [moved, round(seconds / step) - moved])
@@ -153,4 +173,5 @@ def from_both_ends(consist: Consist, handle: float, *, seconds: float = 150.0, a
 
 
 def _braked(cylinders: NDArray[np.float64], step: float, moved: int) -> float:
-    return float(np.nanmax(full_braking_times(cylinders, step, from_sample=moved)))
+    times = full_braking_times(cylinders, step, from_sample=moved)
+    return float(np.nanmax(times)) if np.isfinite(times).any() else float("nan")

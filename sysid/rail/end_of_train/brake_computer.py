@@ -10,6 +10,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from sysid.airbrake.settings import check_numbers
 from sysid.errors import ConfigError
 from sysid.rail.end_of_train.ring import Ring
 
@@ -96,14 +97,14 @@ class ComputerSettings:
     recovery: float = 1.0
 
     def __post_init__(self) -> None:
-        numbers = [getattr(self, name) for name in self.__dataclass_fields__]
-        if min(numbers) <= 0.0 or max(self.stable_window, self.drop_window, self.emergency_window) > self.history:
+        check_numbers(self, "the settings of a brake computer")
+        windows = (self.stable_window, self.drop_window + self.confirm_time, self.held_window, self.emergency_window)
+        if max(windows) > self.history:
             raise ConfigError(
-                "not the settings of a brake computer",
+                "not the settings of a brake computer: it looks farther back than it remembers",
                 where="computer settings",
-                expected="numbers above 0, windows within the history",
-                got=self,
-            )
+                expected=f"windows of at most {self.history:g} s, the history", got=f"{max(windows):g} s",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -284,7 +285,9 @@ class BrakeComputer:
 
     def _in_emergency(self, reading: Reading) -> Outcome:
         self._lowest = min(self._lowest, reading.head)
-        recovering = reading.head - self._lowest >= self.settings.recovery and not self._emergency()
+        # The air of a short train swings below the atmosphere and back: no charge comes with that.
+        rise = reading.head - max(self._lowest, 0.0)
+        recovering = rise >= self.settings.recovery and not self._emergency()
         if recovering and self._er.newest >= reading.head:
             after = State.RELEASE if self._setup_complete else State.SETUP
             return self._enter(after, self._message(Order.RELEASE))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.airbrake.settings import check_numbers
 from sysid.errors import ConfigError
 from sysid.rail.dynamics.brake import AbstractBrake, BrakeOutput, Signal
 from sysid.rail.end_of_train.brake_computer import BrakeComputer, ComputerSettings, Message, Order, Reading
@@ -52,10 +53,8 @@ class TailSettings:
     refusal: float = 2.0
 
     def __post_init__(self) -> None:
-        sizes = (self.emergency_area, self.service_area, self.service_band, self.minimum_reduction, self.refusal)
-        if min(sizes) <= 0.0:
-            raise ConfigError("an area or a pressure of the tail unit is not positive", where="tail settings", got=self)
-        if self.emergency_hold < 15.0 or not 0.0 <= self.emergency_delay <= 1.0:
+        check_numbers(self, "the settings of a tail unit", from_zero=("emergency_delay", "service_delay"))
+        if self.emergency_hold < 15.0 or self.emergency_delay > 1.0:
             raise ConfigError(
                 "the emergency valve is not that of 49 CFR 232.405",
                 where="tail settings",
@@ -253,12 +252,10 @@ class Telemetry:
     loss: float = 0.0
 
     def __post_init__(self) -> None:
-        if min(self.accuracy, self.delay) < 0.0 or self.step <= 0.0 or self.interval <= 0.0 or not 0 <= self.loss < 1:
+        check_numbers(self, "a telemetry", from_zero=("accuracy", "delay", "loss"))
+        if self.loss >= 1.0:
             raise ConfigError(
-                "not a telemetry",
-                where="telemetry",
-                expected="accuracy and delay from 0 on, step and interval above 0, loss from 0 to below 1",
-                got=self,
+                "not a telemetry: every report is lost", where="telemetry, loss", expected="below 1", got=self.loss
             )
 
     def reported(self, pressure: NDArray[np.float64], sample_time: float, *, seed: int) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
+from sysid.airbrake.settings import check_numbers
 from sysid.airbrake.variant import USUAL, Variant
 from sysid.errors import ConfigError
 from sysid.rail.constants import KMH
@@ -50,9 +51,12 @@ class HabitSettings:
     recharge: float = 60.0
 
     def __post_init__(self) -> None:
-        good = 0.0 < self.first <= self.deepest < self.running and min(self.band, self.deepening, self.patience) > 0.0
-        if not good or self.target <= self.band or self.recharge < 0.0:
-            raise ConfigError("not the habits of a driver", where="habits", expected="see HabitSettings", got=self)
+        check_numbers(self, "the habits of a driver", from_zero=("recharge",))
+        if not (self.first <= self.deepest < self.running and self.band < self.target):
+            raise ConfigError(
+                "not the habits of a driver", where="habits", got=self,
+                expected="first at most deepest, deepest below running, band below target",
+            )  # fmt: skip
 
 
 class CycleBrakingDriver(AbstractDriver):

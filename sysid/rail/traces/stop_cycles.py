@@ -104,6 +104,25 @@ class StopFigures:
     trace: Trace
 
 
+def check_stops(*, friction: float, grade: float, count: int) -> None:
+    """Refuse stops that cannot be made.
+
+    Args:
+        friction: Of the vehicle's shoes, 1 being nominal.
+        grade: Rise over run.
+        count: How many stops.
+
+    Raises:
+        ConfigError: If the vehicle or the count cannot be.
+    """
+    if not 1 <= count <= 100 or not -0.06 <= grade <= 0.06 or not 0.2 <= friction <= 3.0:
+        raise ConfigError(
+            "not such stops", where="stops",
+            expected="1 to 100 stops, friction from 0.2 to 3, grades up to 6 %",
+            got=f"{count}, {friction:g}, {100.0 * grade:g} %",
+        )  # fmt: skip
+
+
 def learning_stops(
     characteristic: Characteristic, *, friction: float = 1.0, grade: float = 0.0, count: int = 5
 ) -> list[StopFigures]:
@@ -121,12 +140,7 @@ def learning_stops(
     Raises:
         ConfigError: If the vehicle or the count cannot be.
     """
-    if not 1 <= count <= 100 or not -0.06 <= grade <= 0.06 or not 0.2 <= friction <= 3.0:
-        raise ConfigError(
-            "not such stops", where="stops",
-            expected="1 to 100 stops, friction from 0.2 to 3, grades up to 6 %",
-            got=f"{count}, {friction:g}, {100.0 * grade:g} %",
-        )  # fmt: skip
+    check_stops(friction=friction, grade=grade, count=count)
     controller = DecelerationController(characteristic=characteristic, sample_time=SAMPLE_TIME)
     vehicle = TransitVehicle(model=servo(), friction=friction, grade=grade)
     commands = np.repeat([40.0 * MPH, 20.0 * MPH], [round(CRUISING / SAMPLE_TIME), round(STOPPING / SAMPLE_TIME)])

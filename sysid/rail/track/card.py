@@ -16,6 +16,9 @@ from sysid.errors import ConfigError, ReaderError, did_you_mean
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.track import STRAIGHT, TrackProfile
 
+LONGEST_SECTION = 500e3
+"""In m from a station: what lies farther was written in metres."""
+
 HEADER = ("section", "distance_km", "code", "value")
 """Columns of the file."""
 
@@ -75,6 +78,11 @@ class TrackCard:
             if row.distance <= last.get(place, -1.0):
                 raise _wrong(number, "the distances of a section do not increase", "increasing distances", row.distance)
             last[place] = row.distance
+            if row.distance > LONGEST_SECTION:
+                raise _wrong(
+                    number, "a section is longer than any line", "distances in km from its first station",
+                    f"{row.distance / 1000.0:g} km",
+                )  # fmt: skip
             if row.code is not CardCode.GRADE and row.value <= 0.0:
                 raise _wrong(number, f"a {row.code.value} is not positive", "a radius in m or km/h above 0", row.value)
 

@@ -48,7 +48,8 @@ class Shape:
 
     def __post_init__(self) -> None:
         lengths, masses = (np.array(v, dtype=np.float64) for v in (self.lengths, self.masses))
-        if lengths.ndim != 1 or lengths.shape != masses.shape or len(lengths) == 0 or min(*lengths, *masses) <= 0.0:
+        fits = lengths.ndim == 1 and lengths.shape == masses.shape and len(lengths) > 0
+        if not fits or not all(0.0 < value < np.inf for value in (*lengths, *masses)):
             raise ConfigError(
                 "not the shape of a train",
                 where="shape",
@@ -125,7 +126,7 @@ class Pattern:
 
     def __post_init__(self) -> None:
         good = len(self.edges) == len(self.values) + 1 and bool(np.all(np.diff(self.edges) > 0.0))
-        if not good or not any(self.values):
+        if not good or not np.isfinite([*self.edges, *self.values]).all() or not any(self.values):
             raise ConfigError(
                 "not a pattern",
                 where=f"pattern {self.name}",
@@ -307,7 +308,12 @@ def stringlining_risk(
 
     Returns:
         A pure number, 0 on tangent track.
+
+    Raises:
+        ConfigError: If the speed is not above 0.
     """
+    if not np.all(np.asarray(speed) > 0.0):
+        raise ConfigError("a train at rest has no such risk", where="speed", expected="m/s above 0", got=speed)
     bend = correlation(track, shape, x, pattern=MEAN, values=track.curvatures) / CURVATURE_SCALE
     tilt = correlation(track, shape, x, pattern=MEAN, values=track.superelevations) / SUPERELEVATION_SCALE
     return np.asarray(np.hypot(bend, tilt) * SPEED_SCALE / np.asarray(speed))

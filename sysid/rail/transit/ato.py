@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sysid.airbrake.settings import check_numbers
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.drive import AbstractDriver, Controls, Observation
 from sysid.rail.dynamics.track import TrackProfile
@@ -42,6 +43,9 @@ class AtoSettings:
         position: ES of stop position differences.
         calm: ENC.
         memory: Time constant in s with which the prediction learns from the measured acceleration.
+
+    Raises:
+        ConfigError: If a number is not finite or not above 0; margin and offset may be 0.
     """
 
     margin: float = 3.0 * KMH
@@ -53,6 +57,9 @@ class AtoSettings:
     position: Closeness = POSITION_CLOSENESS
     calm: Calm = CALM
     memory: float = 3.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "the settings of an automatic operation", from_zero=("margin", "offset"))
 
 
 def target_speed(track: TrackProfile, position: float, *, margin: float, planned: float, length: float) -> float:

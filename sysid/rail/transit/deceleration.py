@@ -62,7 +62,7 @@ class JerkProfile:
 
     def __post_init__(self) -> None:
         limits = (self.rate, self.jerk, self.jerk_rate if self.jerk_rate is not None else 1.0)
-        if not (self.start > self.stop >= 0.0 and min(limits) > 0.0):
+        if not (np.inf > self.start > self.stop >= 0.0 and all(0.0 < limit < np.inf for limit in limits)):
             raise ConfigError(
                 "not a deceleration",
                 where="jerk profile",
@@ -154,7 +154,8 @@ class Characteristic:
 
     def __post_init__(self) -> None:
         p, a = np.array(self.signals), np.array(self.decelerations)
-        if len(p) != len(a) or len(p) < 2 or np.any(np.diff(p) >= 0.0) or np.any(np.diff(a) < 0.0) or a[-1] <= a[0]:
+        fits = len(p) == len(a) >= 2 and bool(np.isfinite([p, a]).all())
+        if not fits or np.any(np.diff(p) >= 0.0) or np.any(np.diff(a) < 0.0) or a[-1] <= a[0]:
             raise ConfigError(
                 "not a brake characteristic",
                 where="characteristic",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.airbrake.settings import check_numbers
 from sysid.errors import ConfigError
 from sysid.models import AbstractModel
 from sysid.rail.constants import GRAVITY, MPH
@@ -68,13 +69,15 @@ class TransitVehicle:
     """
 
     def __init__(self, *, model: AbstractModel, friction: float = 1.0, speed: float = 0.0, grade: float = 0.0) -> None:
-        if friction <= 0.0 or len(model.mapping.inputs) != 1:
+        if (
+            not (0.0 < friction < np.inf and 0.0 <= speed < np.inf and abs(grade) < 0.2)
+            or len(model.mapping.inputs) != 1
+        ):
             raise ConfigError(
-                "the brake of the vehicle cannot be used",
-                where="transit vehicle",
-                expected="friction above 0, a model with one input",
-                got=f"{friction:g}, {model.mapping}",
-            )
+                "the brake of the vehicle cannot be used", where="transit vehicle",
+                expected="friction above 0, a speed from 0 on, a grade up to 20 %, a model with one input",
+                got=f"{friction:g}, {speed:g} m/s, {grade:g}, {model.mapping}",
+            )  # fmt: skip
         self.sample_time, self.friction, self.speed, self.grade = model.sample_time, friction, speed, grade
         self.acceleration, self.pressure, self._pull = 0.0, 0.0, COAST_RATE
         self._bank = ModelBank(stage=Stage(models=(model,)), cars=1, rest_inputs=(0.0,))
@@ -115,6 +118,9 @@ class ControlSettings:
         largest_modifier: Bound of the modifier.
         overspeed: Speed in m/s above the wanted one at which the full service brake is applied: above the command, or
             during a ramp above the ramp's speed, in its open-loop part too.
+
+    Raises:
+        ConfigError: If one of them is not a finite number, or below what it may be.
     """
 
     proportional: float = 0.5
@@ -123,6 +129,13 @@ class ControlSettings:
     learning: float = 0.8
     largest_modifier: float = 1.0
     overspeed: float = 2.0 * MPH
+
+    def __post_init__(self) -> None:
+        check_numbers(
+            self,
+            "control settings",
+            from_zero=("proportional", "integral", "learning", "largest_modifier", "overspeed"),
+        )
 
 
 class DecelerationController:
@@ -151,6 +164,7 @@ class DecelerationController:
         self._command: float | None = None
         self._profile: JerkProfile | None = None
         self._clock, self._integral, self._error, self._correction = 0.0, 0.0, 0.0, 0.0
+        self._since, self._before = 0.0, 0.0
         self._too_fast = False
 
     @property
@@ -160,8 +174,8 @@ class DecelerationController:
 
     @property
     def open_loop(self) -> bool:
-        """Whether the first seconds of a ramp, without the regulator, are running."""
-        return self.ramp_active and self._clock < OPEN_LOOP
+        """Whether the first seconds after a change of the command, without the regulator, are running."""
+        return self.ramp_active and self._since < OPEN_LOOP
 
     def step(self, command: float, speed: float, tachometer: float, pendulum: float) -> float:
         """One sample.
@@ -175,9 +189,11 @@ class DecelerationController:
         Returns:
             Signal P in mA.
         """
-        if self._command is not None and command < self._command and speed > command + 1e-6:
-            self._profile = JerkProfile(start=speed, stop=command)
-            self._clock, self._integral, self._error, self._correction = 0.0, 0.0, 0.0, 0.0
+        if self._command is not None and command != self._command:
+            if self._profile is not None:
+                self._replan(self._profile, command)
+            elif command < self._command and speed > command + 1e-6:
+                self._begin(command, speed, tachometer)
         self._command = command
         if self._profile is None:
             return self._cruise(command, speed, tachometer, pendulum)
@@ -189,9 +205,32 @@ class DecelerationController:
         self.request = self._requested(self._profile, speed, grade)
         self._too_fast = speed > self._profile.speed(self._clock) + self.settings.overspeed
         self._clock += self._dt
+        self._since += self._dt
         if self._clock >= self._profile.duration:
             self._finish(self._profile)
         return FULL_SERVICE if self._too_fast else self.characteristic.signal(self._modified(self.request))
+
+    def _begin(self, command: float, speed: float, tachometer: float) -> None:
+        """A ramp from the speed that a vehicle under traction has once that is off, within the limit of the jerk."""
+        gaining = max(0.0, tachometer)
+        self._profile = JerkProfile(start=speed + 0.5 * gaining**2 / JERK, stop=command)
+        self._clock = self._since = -gaining / JERK
+        self._integral, self._error, self._correction, self._before = 0.0, 0.0, 0.0, 0.0
+
+    def _replan(self, ramp: JerkProfile, command: float) -> None:
+        """Another command within a ramp: the ramp to it that has the speed and the deceleration of now.
+
+        It ends at the command, or, where that is passed before the deceleration can be taken off, where that is.
+        """
+        rate, speed = ramp.deceleration(self._clock), ramp.speed(self._clock)
+        spent = 0.5 * rate**2 / JERK
+        start, stop = speed + spent, max(0.0, min(command, speed - spent))
+        if start - stop < 1e-6:
+            self._profile = None
+            return
+        gone = rate / JERK if self._clock > 0.0 else self._clock
+        self._before += self._clock - gone
+        self._profile, self._clock, self._since = JerkProfile(start=start, stop=stop), gone, min(gone, 0.0)
 
     def _modified(self, request: float) -> float:
         """The request with the modifier on what the brake adds to the friction of coasting."""
@@ -213,7 +252,7 @@ class DecelerationController:
         return max(0.0, profile.deceleration(self._clock) + grade + self._correction)
 
     def _finish(self, profile: JerkProfile) -> None:
-        mean = self._error / profile.duration
+        mean = self._error / (self._before + profile.duration)
         self.mean_errors.append(mean)
         if self.learns:
             s = self.settings

@@ -212,6 +212,13 @@ def test_an_emergency_valve_opens_within_1_s_and_for_15_s_whatever_the_samples(
     assert np.all(np.diff(opened) == 1)
 
 
+@pytest.mark.parametrize("pairs", [2, 3, 4])
+def test_a_short_train_swings_below_the_atmosphere_and_is_not_taken_for_charged(pairs: int) -> None:
+    brake = TwoEndedBrake(ReferenceBrake(consist=Consist(pairs=pairs), sample_time=0.02))
+    brake.advance(np.repeat([90.0, 0.0], [100, 1500]))
+    assert [message.order for message, _ in brake.log] == [Order.EMERGENCY]
+
+
 def test_samples_that_are_longer_than_the_delay_are_refused() -> None:
     with pytest.raises(ConfigError, match="cannot open the valve of the tail in time"):
         TwoEndedBrake(ReferenceBrake(consist=Consist(pairs=1), sample_time=2.0))

@@ -273,6 +273,42 @@ def test_a_command_far_below_is_overspeed_in_the_open_loop_only_above_the_ramp(
     assert trace["P"].min() > FULL_SERVICE
 
 
+@pytest.mark.parametrize(
+    ("commands", "lasting"),
+    [
+        ([40, 20, 10], [10, 5, 40]),
+        ([40, 20, 15, 5], [10, 3, 3, 40]),
+        ([40, 20, 40], [10, 5, 50]),
+        ([40, 20, 30], [10, 8, 50]),
+        ([40, 20, 10], [10, 11, 40]),
+        ([20, 40, 10], [5, 6, 50]),
+        ([40, 20, 40, 10], [10, 5, 10, 50]),
+    ],
+    ids=["lower", "twice lower", "raised", "raised in part", "lower while leaving", "while it gains", "raised, lower"],
+)
+def test_another_command_within_a_ramp_keeps_to_the_limit_of_the_jerk(
+    surrogate: AbstractModel, characteristic: Characteristic, commands: list[float], lasting: list[float]
+) -> None:
+    """A ramp that began from no deceleration had twice the jerk, and eight times after a vehicle that gained speed."""
+    controller = DecelerationController(characteristic=characteristic, sample_time=STEP)
+    vehicle = TransitVehicle(model=surrogate, speed=commands[0] * MPH)
+    counts = [round(seconds / STEP) for seconds in lasting]
+    trace = stop_trace(vehicle, controller, np.repeat(np.array(commands) * MPH, counts))
+    assert largest_jerk(trace["A"], STEP) <= 1.1 * JERK
+    assert trace["P"].min() > FULL_SERVICE
+    assert trace["V"][-1] == pytest.approx(commands[-1] * MPH, abs=0.05)
+
+
+def test_a_command_that_is_raised_again_ends_the_braking(
+    surrogate: AbstractModel, characteristic: Characteristic
+) -> None:
+    """From 40 to 20 mph, and after 5 s back: 8 mph are lost by then, and 2 more while the deceleration goes."""
+    controller = DecelerationController(characteristic=characteristic, sample_time=STEP)
+    vehicle = TransitVehicle(model=surrogate, speed=40 * MPH)
+    trace = stop_trace(vehicle, controller, np.repeat([40.0, 20.0, 40.0], [200, 100, 800]) * MPH)
+    assert 27.0 * MPH < trace["V"].min() < 31.0 * MPH
+
+
 def test_a_vehicle_needs_friction(surrogate: AbstractModel) -> None:
     with pytest.raises(ConfigError, match="brake of the vehicle"):
         TransitVehicle(model=surrogate, friction=0.0)
