@@ -36,8 +36,9 @@ from sysid.models.neural_state_space import (
     VectorNeuralStateSpaceModel,
 )
 from sysid.models.orthonormal_basis import Domain
-from sysid.models.polynomial import ARMAX, BJ, OE, PolynomialModel
+from sysid.models.polynomial import PolynomialModel
 from sysid.models.polynomial_narx import PolynomialNARX
+from sysid.models.polynomial_orders import ARMAX, BJ, OE
 from sysid.models.recursion import Recursion, parameter_count
 from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.state_space import StateSpace

@@ -26,7 +26,8 @@ from sysid.models.neural_state_space import (
     VectorNeuralStateSpace,
     VectorNeuralStateSpaceModel,
 )
-from sysid.models.polynomial import POLYNOMIALS, PolynomialModel
+from sysid.models.polynomial import PolynomialModel
+from sysid.models.polynomial_orders import POLYNOMIALS
 from sysid.models.structure import AbstractStructure
 from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
 from sysid.models.vector_narx import VectorNARX, VectorNARXModel

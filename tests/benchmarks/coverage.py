@@ -43,7 +43,7 @@ from sysid.models import (
 )
 from sysid.models.innovations import Innovations
 from sysid.models.linear_state_space import polynomials
-from sysid.models.polynomial import AbstractPolynomial
+from sysid.models.polynomial_orders import AbstractPolynomial
 from sysid.models.ratio import Ratio
 from sysid.reporting.linear_view import LinearView, linear_views
 from sysid.reporting.step_responses import band

@@ -44,7 +44,7 @@ from sysid.models import (
     VectorStateSpace,
     VectorStateSpaceModel,
 )
-from sysid.models.polynomial import AbstractPolynomial
+from sysid.models.polynomial_orders import AbstractPolynomial
 from sysid.models.transfer_function import TransferFunctionModel
 from sysid.traces import Channel, Trace
 from sysid.units import Reference

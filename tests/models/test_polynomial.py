@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from sysid.errors import ConfigError
 from sysid.models import ARMAX, ARX, BJ, OE, ARXModel, History, Mapping, PolynomialModel, Scaling, model_from_dict
-from sysid.models.polynomial import AbstractPolynomial
+from sysid.models.polynomial_orders import AbstractPolynomial
 
 TERMS = {
     "mapping": Mapping.parse("u1+u2 -> y"), "sample_time": 0.1, "input_units": ("V", "A"), "output_unit": "bar",
@@ -79,18 +76,3 @@ def test_armax_without_c_is_arx_in_every_start() -> None:
     for steps in (1, 3):
         ahead = one.predict(u, y, rest, steps=steps)
         np.testing.assert_allclose(ahead, other.predict(u, y, rest, steps=steps), rtol=1e-9, atol=1e-9)
-
-
-@given(
-    st.dictionaries(
-        st.sampled_from(["na", "nc", "nb", "nk"]),
-        st.one_of(st.integers(-3, 10**12), st.lists(st.integers(-2, 300), max_size=3), st.text(max_size=2), st.none()),
-    )
-)
-def test_orders_are_taken_or_refused_in_words(given_orders: dict) -> None:
-    try:
-        orders = ARMAX(**{"na": 1, "nb": (1,), "nc": 1, "nk": (1,)} | given_orders)
-    except ConfigError as error:
-        assert error.remedy
-    else:
-        assert orders.n_parameters == len(orders.names(tuple(f"u{j}" for j in range(len(orders.nb)))))

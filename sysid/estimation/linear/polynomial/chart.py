@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.linear.state_space.coordinates import Directions
 from sysid.models.innovations import Innovations
-from sysid.models.polynomial import AbstractPolynomial
+from sysid.models.polynomial_orders import AbstractPolynomial
 
 Array = NDArray[np.float64]
 

@@ -29,7 +29,8 @@ from sysid.estimation.linear.state_space.refinement import flat_prior
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import Mapping, Start
-from sysid.models.polynomial import AbstractPolynomial, PolynomialModel
+from sysid.models.polynomial import PolynomialModel
+from sysid.models.polynomial_orders import AbstractPolynomial
 from sysid.models.typed_fields import TypedFields
 from sysid.traces import Trace
 

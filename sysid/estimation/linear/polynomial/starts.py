@@ -28,7 +28,7 @@ from sysid.estimation.linear.subspace.projections import arx_orders, regress
 from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.subspace.yardstick import Yardstick
 from sysid.models import LinearStateSpace
-from sysid.models.polynomial import AbstractPolynomial
+from sysid.models.polynomial_orders import AbstractPolynomial
 
 Array = NDArray[np.float64]
 
