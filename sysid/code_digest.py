@@ -21,31 +21,20 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from sysid.code_text import (
-    StatementReader,
     Target,
-    bound,
     chain_of,
-    decorator_name,
-    imported,
-    is_for_types,
-    is_said,
-    is_script,
 )
+from sysid.code_units import Module, Unit, parsed, sha
 from sysid.kept_digests import kept_or_taken
 
 ROUNDS = 3
 """How many steps away it is seen that a name means another definition of the same words."""
-
-CALLED_BY_NAME = frozenset(
-    {"property", "cached_property", "setter", "staticmethod", "classmethod", "abstractmethod", "override", "cache"}
-)
-"""Decorators of methods that run only where somebody asks for them."""
 
 QUIET_BASES = frozenset({"ABC", "Protocol", "Generic", "BaseModel", "Enum", "StrEnum", "IntEnum", "NamedTuple"}) | {
     name for name, value in vars(builtins).items() if isinstance(value, type)
@@ -155,12 +144,12 @@ def _labels(addresses: Sequence[str], without: Sequence[str]) -> list[str]:
     return sorted(set(labels.values()))
 
 
-def _closure(addresses: Sequence[str], without: Sequence[str]) -> tuple[_Sources, list[_Unit]]:
+def _closure(addresses: Sequence[str], without: Sequence[str]) -> tuple[_Sources, list[Unit]]:
     """Every definition that is reached, and where they were found."""
     sources = _sources(frozenset({"sysid", *(address.split(":")[0].split(".")[0] for address in addresses)}))
-    found: dict[_Unit, None] = {}
+    found: dict[Unit, None] = {}
     asked: set[str] = set()
-    unasked: defaultdict[str, list[_Unit]] = defaultdict(list)
+    unasked: defaultdict[str, list[Unit]] = defaultdict(list)
     roots = {unit for address in addresses for unit in sources.at_address(address)}
     waiting = list(roots)
     while waiting:
@@ -169,7 +158,7 @@ def _closure(addresses: Sequence[str], without: Sequence[str]) -> tuple[_Sources
             continue
         found[unit] = None
         meaning = sources.meaning(unit)
-        waiting += [other for means in meaning.names.values() for other in means if isinstance(other, _Unit)]
+        waiting += [other for means in meaning.names.values() for other in means if isinstance(other, Unit)]
         waiting += sources.loose(unit.module)
         for name in meaning.asked - asked:
             waiting += unasked.pop(name, [])
@@ -185,136 +174,16 @@ def _sources(ours: frozenset[str]) -> _Sources:
     return _Sources(ours=ours)
 
 
-def _label(labels: dict[_Unit, str], names: dict[str, list[_Unit | str]], own: str) -> str:
+def _label(labels: dict[Unit, str], names: dict[str, list[Unit | str]], own: str) -> str:
     """A definition's label with what its names mean."""
     said = sorted(
         f"{name}={','.join(sorted(one if isinstance(one, str) else labels.get(one, '') for one in found))}"
         for name, found in names.items()
     )
-    return _sha("\n".join([own, *said]))
+    return sha("\n".join([own, *said]))
 
 
-def _sha(text: str) -> str:
-    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Unit:
-    """One definition: a statement at the top of a module, or a method.
-
-    Args:
-        module: Where it stands.
-        package: Of which that is.
-        ours: Top-level packages that are followed.
-        name: Of a function, class or method; empty for another statement.
-        nodes: Its code; of a class without the methods that run only where somebody asks for them.
-        owner: Of a method the name of its class.
-    """
-
-    module: str
-    package: str
-    ours: frozenset[str]
-    name: str
-    nodes: tuple[ast.AST, ...]
-    owner: str = ""
-
-    @cached_property
-    def reader(self) -> StatementReader:
-        """The definition, read."""
-        reader = StatementReader(package=self.package, ours=self.ours)
-        for node in self.nodes:
-            reader.read(node, in_class=bool(self.owner))
-        return reader
-
-    @cached_property
-    def digest(self) -> str:
-        """Of its code alone."""
-        return _sha("".join([self.owner, *self.reader.text]))
-
-    def is_in(self, places: Iterable[str]) -> bool:
-        """Whether it is one of some addresses, or stands in one of some modules or packages."""
-        return any(f"{self.address}:".startswith((f"{one}.", f"{one}:")) for one in places)
-
-    @property
-    def address(self) -> str:
-        """Where it is, for people; a statement without a name is its module's."""
-        return f"{self.module}:{f'{self.owner}.' if self.owner else ''}{self.name}"
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Module:
-    """What stands at the top of a file: definitions and imports by name, and what binds no name."""
-
-    name: str
-    package: str
-    ours: frozenset[str]
-    units: dict[str, list[_Unit]] = field(default_factory=dict)
-    methods: dict[_Unit, dict[str, _Unit]] = field(default_factory=dict)
-    imports: dict[str, Target] = field(default_factory=dict)
-    loose: list[_Unit] = field(default_factory=list)
-
-    @property
-    def all(self) -> list[_Unit]:
-        """Every definition."""
-        named = [unit for name, units in self.units.items() if name != "__all__" for unit in units]
-        return [*named, *self.loose, *(one for unit in named for one in self.methods.get(unit, {}).values())]
-
-
-@cache
-def _parsed(name: str, file: Path, ours: frozenset[str], _changed: int, _size: int) -> _Module:
-    """A file's module; again only when the file has changed."""
-    package = name if file.name == "__init__.py" else name.rpartition(".")[0]
-    module = _Module(name=name, package=package, ours=ours)
-    _fill(module, ast.parse(file.read_bytes()).body)
-    return module
-
-
-def _fill(module: _Module, body: Iterable[ast.stmt]) -> None:
-    for node in body:
-        if isinstance(node, ast.If) and is_for_types(node):
-            module.imports.update(_all_imported(node.body, module.package))
-            _fill(module, node.orelse)
-        elif isinstance(node, ast.Import | ast.ImportFrom):
-            module.imports.update(imported(node, module.package))
-        elif not is_said(node) and not is_script(node):
-            unit = _divided(module, node) if isinstance(node, ast.ClassDef) else _unit(module, node)
-            if not unit.name:
-                module.imports.update(_all_imported([node], module.package))  # try: import this
-            names = list(bound(node))
-            for one in names:
-                module.units.setdefault(one, []).append(unit)
-            if not names:
-                module.loose.append(unit)
-
-
-def _unit(module: _Module, *nodes: ast.AST, owner: str = "") -> _Unit:
-    name = getattr(nodes[0], "name", "")
-    return _Unit(module=module.name, package=module.package, ours=module.ours, name=name, nodes=nodes, owner=owner)
-
-
-def _all_imported(nodes: Iterable[ast.AST], package: str) -> dict[str, Target]:
-    return {name: target for node in nodes for one in ast.walk(node) for name, target in imported(one, package).items()}
-
-
-def _divided(module: _Module, node: ast.ClassDef) -> _Unit:
-    """A class without the methods that run only where somebody asks for them; these are kept beside it."""
-    methods: dict[str, list[ast.stmt]] = {}
-    for one in node.body:
-        if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef) and _is_asked_for(one):
-            methods.setdefault(one.name, []).append(one)
-    rest = [one for one in node.body if not any(one in found for found in methods.values())]
-    unit = _unit(module, ast.ClassDef(**{**{name: getattr(node, name) for name in node._fields}, "body": rest}))
-    module.methods[unit] = {name: _unit(module, *found, owner=node.name) for name, found in methods.items()}
-    return unit
-
-
-def _is_asked_for(method: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
-    """Whether a method runs only where somebody asks for it by its name."""
-    hidden = method.name.endswith("_") or method.name.startswith("model_")
-    return not hidden and all(decorator_name(one) in CALLED_BY_NAME for one in method.decorator_list)
-
-
-def _bases(unit: _Unit) -> list[ast.expr]:
+def _bases(unit: Unit) -> list[ast.expr]:
     return [base for node in unit.nodes if isinstance(node, ast.ClassDef) for base in node.bases]
 
 
@@ -322,7 +191,7 @@ def _bases(unit: _Unit) -> list[ast.expr]:
 class _Meaning:
     """What the names in a definition mean: definitions, or addresses in other packages; what it asks objects for."""
 
-    names: dict[str, list[_Unit | str]]
+    names: dict[str, list[Unit | str]]
     asked: set[str]
 
 
@@ -331,16 +200,16 @@ class _Sources:
     """The modules of some packages, parsed when they are asked for."""
 
     ours: frozenset[str]
-    _known: dict[str, _Module | None] = field(default_factory=dict)
-    _understood: dict[_Unit, _Meaning] = field(default_factory=dict)
+    _known: dict[str, Module | None] = field(default_factory=dict)
+    _understood: dict[Unit, _Meaning] = field(default_factory=dict)
 
-    def module(self, name: str) -> _Module | None:
+    def module(self, name: str) -> Module | None:
         """A module; ``None`` where there is none of that name, or it is another package's."""
         if name not in self._known:
             self._known[name] = self._found(name)
         return self._known[name]
 
-    def _found(self, name: str) -> _Module | None:
+    def _found(self, name: str) -> Module | None:
         top, *rest = name.split(".")
         if top not in self.ours:
             return None
@@ -348,10 +217,10 @@ class _Sources:
         for file in (base / "__init__.py", base.with_name(f"{base.name}.py")):
             if file.is_file():
                 stat = file.stat()
-                return _parsed(name, file, self.ours, stat.st_mtime_ns, stat.st_size)
+                return parsed(name, file, self.ours, stat.st_mtime_ns, stat.st_size)
         return None
 
-    def at_address(self, address: str) -> Iterator[_Unit]:
+    def at_address(self, address: str) -> Iterator[Unit]:
         """The definitions that an address names, with every method of a class."""
         name, _, attribute = address.partition(":")
         if self.module(name) is None:
@@ -360,30 +229,30 @@ class _Sources:
         if not found or left:
             raise LookupError(f"no {attribute} in {name}")
         for unit in found:
-            if isinstance(unit, _Unit):
+            if isinstance(unit, Unit):
                 yield unit
                 yield from self.methods(unit).values() if "." not in attribute else ()
 
-    def loose(self, name: str) -> list[_Unit]:
+    def loose(self, name: str) -> list[Unit]:
         """What runs when a module is imported, beside its definitions; its packages are imported with it."""
         parts = name.split(".")
         modules = [self.module(".".join(parts[:n])) for n in range(1, len(parts) + 1)]
         return [unit for module in modules if module is not None for unit in module.loose]
 
-    def methods(self, unit: _Unit) -> dict[str, _Unit]:
+    def methods(self, unit: Unit) -> dict[str, Unit]:
         """The methods of a class that run only where somebody asks for them."""
         module = self.module(unit.module)
         return {} if module is None else module.methods.get(unit, {})
 
-    def meaning(self, unit: _Unit) -> _Meaning:
+    def meaning(self, unit: Unit) -> _Meaning:
         """What the names in a definition mean."""
         if unit not in self._understood:
             self._understood[unit] = self._understand(unit)
         return self._understood[unit]
 
-    def _understand(self, unit: _Unit) -> _Meaning:
+    def _understand(self, unit: Unit) -> _Meaning:
         reader = unit.reader
-        names: dict[str, list[_Unit | str]] = {}
+        names: dict[str, list[Unit | str]] = {}
         asked = set(reader.attributes)
         for name in reader.names:
             first, *rest = name.split(".")
@@ -403,16 +272,16 @@ class _Sources:
         kept = {name: [one for one in found if one is not unit] for name, found in names.items()}
         return _Meaning(names={name: found for name, found in kept.items() if found}, asked=asked)
 
-    def _calls(self, base: ast.expr, unit: _Unit) -> bool:
+    def _calls(self, base: ast.expr, unit: Unit) -> bool:
         """Whether a base is another package's, and may call methods by the names that they have here."""
         chain = chain_of(base.value if isinstance(base, ast.Subscript) else base)
         if chain.split(".")[-1] in QUIET_BASES:
             return False
         found = self.named(unit.module, chain.split("."), inside=True)[0] if chain else []
-        ours = [one for one in found if isinstance(one, _Unit)]
+        ours = [one for one in found if isinstance(one, Unit)]
         return not ours or any(self._calls(above, one) for one in ours for above in _bases(one))
 
-    def named(self, name: str, chain: list[str], *, inside: bool = False) -> tuple[list[_Unit | str], list[str]]:
+    def named(self, name: str, chain: list[str], *, inside: bool = False) -> tuple[list[Unit | str], list[str]]:
         """What ``a.b.c`` means in a module, or all of the module where nothing is named.
 
         Args:
@@ -431,7 +300,7 @@ class _Sources:
         first, rest = chain[0], chain[1:]
         here, left = module.units.get(first, []), rest
         methods = [self.methods(unit)[rest[0]] for unit in here if rest and rest[0] in self.methods(unit)]
-        found: list[_Unit | str] = [*here, *methods]
+        found: list[Unit | str] = [*here, *methods]
         if methods:
             left = rest[1:]
         if first in module.imports and module.imports[first] != (name, first):
@@ -443,7 +312,7 @@ class _Sources:
             found += module.units.get("__getattr__", ())
         return found, left
 
-    def target(self, target: Target, chain: list[str]) -> tuple[list[_Unit | str], list[str]]:
+    def target(self, target: Target, chain: list[str]) -> tuple[list[Unit | str], list[str]]:
         """What an import leads to."""
         module, attribute = target
         return self.named(module, chain if attribute is None else [attribute, *chain])

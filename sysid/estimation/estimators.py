@@ -84,37 +84,28 @@ OF_STATES = f"{GROWING}, or a subspace method alone gave it, whose covariance is
 OF_POLYNOMIALS = f"{GROWING}, or its noise is integrated and drifts as far"
 LINEAR_START = "a linear model finds its own start"
 
+_linear = partial(Estimator, begins=LINEAR_START, stability=PoleCheck)
+_trained = partial(Estimator, training=Training, no_posterior=ENDED)
+
 ESTIMATORS: dict[str, Estimator] = {
     row.kind: row
     for row in (
-        Estimator(
-            structure=ARX,
-            name="an ARX model",
-            fit=fit_arx,
-            begins=LINEAR_START,
-            stability=PoleCheck,
-            posterior=arx_posterior,
-            no_posterior=GROWING,
-        ),
-        Estimator(
+        _linear(structure=ARX, name="an ARX model", fit=fit_arx, posterior=arx_posterior, no_posterior=GROWING),
+        _trained(
             structure=NARX,
             name="a NARX network",
             fit=fit_narx,
-            training=Training,
             check_training=partial(check_shooting, "a NARX network"),
             initial=check_initial,
-            no_posterior=ENDED,
             joins=True,
         ),
         *(
-            Estimator(
+            _trained(
                 structure=structure,
                 name=name,
                 fit=fit_by,
-                training=Training,
                 check_training=check_training,
                 initial=check_neural_initial,
-                no_posterior=ENDED,
                 starts=STARTS,
                 unites=True,
                 each=True,
@@ -125,13 +116,11 @@ ESTIMATORS: dict[str, Estimator] = {
             )
         ),
         *(
-            Estimator(
+            _trained(
                 structure=structure,
                 name=name,
                 fit=fit,
-                training=Training,
                 check_training=check_grey_training,
-                no_posterior=ENDED,
                 begins="a grey box begins at the starts of its parameters",
                 starts=GREY_STARTS,
                 each=True,
@@ -142,13 +131,11 @@ ESTIMATORS: dict[str, Estimator] = {
             )
         ),
         *(
-            Estimator(
+            _trained(
                 structure=structure,
                 name=name,
                 fit=fit,
-                training=Training,
                 check_training=check_block_training,
-                no_posterior=ENDED,
                 begins="a block-oriented model begins at the best linear one",
                 starts=BLOCK_STARTS,
             )
@@ -157,67 +144,54 @@ ESTIMATORS: dict[str, Estimator] = {
                 (WienerHammerstein, "a Wiener-Hammerstein model", fit_wiener_hammerstein),
             )
         ),
-        Estimator(
+        _trained(
             structure=PolynomialNARX,
             name="a polynomial NARX model",
             fit=fit_polynomial_narx,
-            training=Training,
             check_training=check_polynomial_narx,
-            no_posterior=ENDED,
             begins="a polynomial NARX model begins at the terms that explain most one step ahead",
         ),
-        Estimator(
+        _linear(
             structure=TransferFunction,
             name="a transfer function",
             fit=fit_transfer_function,
             training=TransferFunctionTraining,
             of_residuals="A transfer function here has no model of the noise: one step ahead it does what it does in "
             "free run, and its residuals need not be white, only independent of the inputs.",
-            begins=LINEAR_START,
-            stability=PoleCheck,
             posterior=transfer_function_posterior,
             no_posterior=f"{GROWING}, or it was fitted through a predictor, whose covariance is not known",
         ),
-        Estimator(
-            structure=LinearStateSpace,
-            name="a linear state space",
-            fit=fit_state_space,
-            training=StateSpaceTraining,
-            begins=LINEAR_START,
-            stability=PoleCheck,
-            posterior=state_space_posterior,
-            no_posterior=OF_STATES,
-        ),
-        Estimator(
-            structure=VectorStateSpace,
-            name="a linear state space of several outputs",
-            fit=fit_vector_state_space,
-            training=StateSpaceTraining,
-            begins=LINEAR_START,
-            stability=PoleCheck,
-            posterior=state_space_posterior,
-            no_posterior=OF_STATES,
+        *(
+            _linear(
+                structure=structure,
+                name=name,
+                fit=fit,
+                training=StateSpaceTraining,
+                posterior=state_space_posterior,
+                no_posterior=OF_STATES,
+            )
+            for structure, name, fit in (
+                (LinearStateSpace, "a linear state space", fit_state_space),
+                (VectorStateSpace, "a linear state space of several outputs", fit_vector_state_space),
+            )
         ),
         *(
-            Estimator(
+            _linear(
                 structure=structure,
                 name=name,
                 fit=fit_polynomial,
                 training=PolynomialTraining,
-                begins=LINEAR_START,
-                stability=PoleCheck,
                 posterior=polynomial_posterior,
                 no_posterior=OF_POLYNOMIALS,
             )
             for structure, name in ((OE, "an OE model"), (BJ, "a Box-Jenkins model"), (ARMAX, "an ARMAX model"))
         ),
-        Estimator(
+        _trained(
             structure=VectorNARX,
             name="a NARX network of several outputs",
             fit=fit_vector_narx,
             training=JointTraining,
             initial=check_vector_initial,
-            no_posterior=ENDED,
         ),
     )
 }

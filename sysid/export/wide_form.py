@@ -16,9 +16,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from sysid.export.block_terms import InputTerm, Now, Past, affine
 from sysid.export.stage import Stage
 from sysid.export.surrogate import Surrogate
-from sysid.export.wide_blocks import Block, InputTerm, Now, Past, affine, block_of, levels_of
+from sysid.export.wide_blocks import Block, block_of, levels_of
 from sysid.kernels.neurons import Neuron
 
 WORTH = 3000

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from sysid.names import output_side
 from sysid.reporting.figures.style import PALETTE, new_figure, styled
+from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, picture
-from sysid.reporting.results import FitRecord
 from sysid.reporting.signals import CaseSignals
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
 

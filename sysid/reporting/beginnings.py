@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sysid.reporting.fit_records import CaseRecord
 from sysid.reporting.fit_tables import case_columns
 from sysid.reporting.parts import Part, Section
-from sysid.reporting.results import CaseRecord, Results
+from sysid.reporting.results import Results
 from sysid.reporting.tables import Cell, Table
 
 HOW = {

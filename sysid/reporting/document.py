@@ -14,6 +14,7 @@ from sysid.reporting.amplitude import amplitude_section
 from sysid.reporting.beginnings import beginnings_section
 from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
+from sysid.reporting.fit_records import FitRecord, LearningCurve
 from sysid.reporting.fit_tables import (
     accuracy_table,
     case_columns,
@@ -34,7 +35,7 @@ from sysid.reporting.orders_view import orders_section
 from sysid.reporting.overview import overview_section
 from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
 from sysid.reporting.published.tables import PublishedTable
-from sysid.reporting.results import FitRecord, LearningCurve, Results
+from sysid.reporting.results import Results
 from sysid.reporting.runtime_table import exported_run_times
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.state_table import state_section

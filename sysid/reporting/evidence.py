@@ -12,13 +12,14 @@ from sysid.reporting.curves import read_curves
 from sysid.reporting.figures.curves_figure import curves_figure
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
+from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.linear_view import linear_views
 from sysid.reporting.modes_table import modes_table
 from sysid.reporting.numbers import number
 from sysid.reporting.parameter_table import parameter_tables
 from sysid.reporting.parts import Part, Picture, Section, identifier, picture
 from sysid.reporting.residuals import GroupRecord, read_residuals
-from sysid.reporting.results import FitRecord, LinearityRecord, Results
+from sysid.reporting.results import LinearityRecord, Results
 from sysid.reporting.tables import Cell, Table, figure_cell
 from sysid.units import squared
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 
+from sysid.reporting.fit_records import CaseRecord, ExportRecord, FiguresRecord, FitRecord, PublishedRecord
 from sysid.reporting.numbers import number, seconds, times
-from sysid.reporting.results import CaseRecord, ExportRecord, FiguresRecord, FitRecord, PublishedRecord, Results
+from sysid.reporting.results import Results
 from sysid.reporting.tables import DIVERGED, Cell, Column, Table, figure_cell
 from sysid.traces import Role
 from sysid.units import squared

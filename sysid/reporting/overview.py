@@ -8,9 +8,10 @@ from typing import Final
 
 from sysid.reporting.figures.comparison_figure import Overlay, comparison_figure
 from sysid.reporting.figures.style import PALETTE
+from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.fit_tables import SCORED, case_columns, drawn_cases, told_of_drawn, worst_case
 from sysid.reporting.parts import Gallery, Part, Section, picture
-from sysid.reporting.results import FitRecord, Results
+from sysid.reporting.results import Results
 from sysid.reporting.signals import CaseSignals
 
 MOST: Final = len(PALETTE)

@@ -9,8 +9,8 @@ import numpy as np
 from sysid.estimation import FitResult
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models.grey_box_model import EquationModel
+from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.numbers import number
-from sysid.reporting.results import FitRecord
 from sysid.reporting.tables import Cell, Table, figure_cell
 
 LEVEL = 0.95

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from sysid.reporting.assembly.results import AssemblyResults
+from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.judging.results import JudgementResults
 from sysid.reporting.numbers import seconds
-from sysid.reporting.results import FitRecord, Results
+from sysid.reporting.results import Results
 from sysid.reporting.scores import Score
 
 

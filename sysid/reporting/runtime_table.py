@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from sysid.reporting.fit_records import RunTimeRecord
 from sysid.reporting.numbers import number
-from sysid.reporting.results import Results, RunTimeRecord
+from sysid.reporting.results import Results
 from sysid.reporting.tables import Cell, Table
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.fit_tables import SCORED
 from sysid.reporting.parts import Section
-from sysid.reporting.results import FitRecord, Results
+from sysid.reporting.results import Results
 from sysid.reporting.tables import Cell, Table, figure_cell
 from sysid.units import squared
 

@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.figures.style import MARKERS, PALETTE, new_figure, styled
+from sysid.reporting.fit_records import AttemptRecord, CaseRecord, FitRecord
 from sysid.reporting.fit_tables import case_columns
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, identifier, picture
-from sysid.reporting.results import AttemptRecord, CaseRecord, FitRecord, Results
+from sysid.reporting.results import Results
 from sysid.reporting.tables import Cell, Table, figure_cell, plain_cell
 from sysid.units import squared
 

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 
 from sysid.estimation import Status
 from sysid.names import output_side
+from sysid.reporting.fit_records import CaseRecord, FitRecord
 from sysid.reporting.fit_tables import mean_mse, real_time_factor, scored_cases
 from sysid.reporting.numbers import number, quantity, seconds, times
 from sysid.reporting.parts import Tile, Verdict
-from sysid.reporting.results import CaseRecord, FitRecord, Results
+from sysid.reporting.results import Results
 from sysid.reporting.worst_instants import Instant
 from sysid.traces import Role
 from sysid.units import squared

@@ -8,8 +8,8 @@ import numpy as np
 
 from sysid.estimation import FitResult, Loop, Status
 from sysid.estimation.uncertainty import Uncertainty
+from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.parameter_table import parameter_tables
-from sysid.reporting.results import FitRecord
 from tests.export.grey_boxes import GREY_BOXES
 
 KNOWN = Uncertainty(

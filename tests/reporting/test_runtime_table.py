@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from sysid.reporting.results import ExportRecord, FitRecord, Results, RunTimeRecord
+from sysid.reporting.fit_records import ExportRecord, FitRecord, RunTimeRecord
+from sysid.reporting.results import Results
 from sysid.reporting.runtime_table import exported_run_times
 
 

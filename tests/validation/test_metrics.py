@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sysid
-from sysid.reporting.results import FiguresRecord
+from sysid.reporting.fit_records import FiguresRecord
 from sysid.testing import first_order_record
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.metrics import MERITS, Figures, figures, mean_fit, percent

@@ -7,8 +7,8 @@ from typing import Literal
 
 from pydantic import Field
 
+from sysid.reporting.fit_records import AttemptRecord, ExportRecord
 from sysid.reporting.records import DataSetRecord, Number, Record, RunResults
-from sysid.reporting.results import AttemptRecord, ExportRecord
 from sysid.traces import Role
 
 ByCase = dict[str, Number]

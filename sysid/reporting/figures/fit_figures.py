@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from sysid.reporting.figures.style import DASHES, PALETTE, PUBLISHED, TARGET, new_figure, series_style, styled
 from sysid.reporting.figures.thinning import distinct_points, thin
+from sysid.reporting.fit_records import CaseRecord, LearningCurve
 from sysid.reporting.numbers import number
-from sysid.reporting.results import CaseRecord, LearningCurve, Results
+from sysid.reporting.results import Results
 from sysid.reporting.signals import CaseSignals
 from sysid.reporting.worst_instants import Instant
 from sysid.units import squared

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
+from sysid.reporting.fit_records import CaseRecord, FitRecord, PublishedRecord
 from sysid.reporting.published.tables import PublishedTable
-from sysid.reporting.results import CaseRecord, FitRecord, PublishedRecord, Results
+from sysid.reporting.results import Results
 
 KINDS = ("free_run", "one_step", "run_time")
 """Which figures are compared: mse of the free run, mse of one step ahead, and run time of the free run."""

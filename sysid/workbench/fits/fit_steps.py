@@ -15,7 +15,6 @@ from sysid.export.exporters import wanted_formats
 from sysid.reporting.published.tables import read_published
 from sysid.reporting.results import Results, parse_results
 from sysid.reporting.sweep_record import has_sweep, read_sweep
-from sysid.units import squared
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.choice import Choice, choose
 from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, PipelineConfig
@@ -35,8 +34,8 @@ from sysid.workbench.fits.record import (
     write_residuals,
     write_scores,
 )
+from sysid.workbench.fits.words import cases_told, fit_title, how_ended, in_unit, looked_told, worst_told
 from sysid.workbench.runner import events
-from sysid.workbench.runner.naming import cases_of
 from sysid.workbench.runner.run import REPORT, Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
 from sysid.workbench.runner.store import read_json, strict, write_json
@@ -180,7 +179,7 @@ class FitSteps:
             name=LOADING.name,
             title=LOADING.title,
             make=make,
-            outcome=_cases,
+            outcome=cases_told,
             at_hand=lambda: unmade_data(self._names, beside=beside) is None,
             how_long=lambda: unmade_data(self._names, beside=beside) or NOT_KNOWN,
         )
@@ -241,7 +240,7 @@ class FitSteps:
             after=[initial] if initial else [],
             write=partial(write_fit, folder),
             read=lambda _: read_fit(folder),
-            outcome=_ended,
+            outcome=how_ended,
             final=is_final,
             amount=lambda: _amount(fit, loaded.value),
             how_long=lambda: how_long(fit, config, loaded.value),
@@ -290,7 +289,7 @@ class FitSteps:
             of=made,
             write=lambda scores: write_scores(folder, scores) + written,
             read=lambda _: read_scores(folder),
-            outcome=_worst,
+            outcome=worst_told,
             typical=SCORING_TIME,
         )
 
@@ -309,7 +308,7 @@ class FitSteps:
             key=lambda: steps.advice_key(self.config, loaded.value, suggest=self.suggest),
             write=write,
             read=lambda _: read_json(file),
-            outcome=_looked,
+            outcome=looked_told,
             typical=LOOKING.estimate,
         )
 
@@ -327,7 +326,7 @@ class FitSteps:
         def outcome(exports: Sequence[Mapping[str, Any]]) -> str:
             worst = max((float(entry["largest_difference"]) for entry in exports), default=0.0)
             files = "1 file" if len(exports) == 1 else f"{len(exports)} files"
-            return f"{files}, at most {_in(f'{worst:.1e}', unit)} from the model"
+            return f"{files}, at most {in_unit(f'{worst:.1e}', unit)} from the model"
 
         return Step(
             name="export",
@@ -381,27 +380,8 @@ class FitSteps:
         return run.results(new)
 
 
-def fit_title(fit: FitConfig) -> str:
-    """The step of a fit, for people.
-
-    Args:
-        fit: The fit.
-
-    Returns:
-        For example ``"Fitting open loop, NARX 1/1/2"``.
-    """
-    return f"Fitting {fit.name}" if fit.name == fit.structure.label else f"Fitting {fit.name}, {fit.structure.label}"
-
-
 def _loaded(data: Data) -> events.DataLoaded:
     return events.DataLoaded(traces=data.traces, selection=tuple(trace.name for trace in data.selection))
-
-
-def _cases(data: Data) -> str:
-    cases = cases_of(data.traces) + (f", {len(data.selection)} to choose by" if data.selection else "")
-    return "; ".join(
-        [cases, *(f"{name} has samples of {other}, which is fitted" for name, other in data.traces.shared)]
-    )
 
 
 def _amount(fit: FitConfig, data: Data) -> dict[str, Any]:
@@ -412,25 +392,3 @@ def _amount(fit: FitConfig, data: Data) -> dict[str, Any]:
         "training": str(seedless(fit.training_options(0))),
         "samples": {trace.name: len(trace) for trace in data.traces},
     }
-
-
-def _ended(fit: FitResult) -> str:
-    """How long a fit took; how it ended, where it is not what it should be."""
-    said = "" if fit.status.usable and is_final(fit) else f", {fit.status.value}"
-    return f"{fit.train_time_s:.1f} s{said}"
-
-
-def _worst(scores: steps.Scores) -> str:
-    """How a fit came out, in a line."""
-    worst = max(scores.evaluation.cases.values(), key=lambda case: case.free_run.mse)
-    return f"free run at worst {_in(f'{worst.free_run.mse:.3g}', squared(worst.free_run.unit))} ({worst.case})"
-
-
-def _in(figure: str, unit: str) -> str:
-    """A figure in its unit; a pure number has none to be told."""
-    return figure if unit == "1" else f"{figure} {unit}"
-
-
-def _looked(found: Sequence[Mapping[str, Any]]) -> str:
-    verdicts = [one["verdict"] for advice in found for one in advice["findings"]]
-    return f"{verdicts.count('LOOK')} of {len(verdicts)} findings ask to be looked at"

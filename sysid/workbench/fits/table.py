@@ -8,8 +8,9 @@ from rich.table import Table
 from rich.text import Text
 
 from sysid.estimation.result import Status
+from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.fit_tables import scored_cases
-from sysid.reporting.results import FitRecord, Results, SystemRecord
+from sysid.reporting.results import Results, SystemRecord
 from sysid.units import squared
 from sysid.validation.metrics import mean_fit, percent
 

@@ -33,7 +33,7 @@ def operations(model: AbstractModel) -> int:
 
 
 def scores(
-    models: Sequence[AbstractModel], traces: TraceSet, selection: Sequence[Trace], start: Start
+    models: Sequence[AbstractModel], traces: TraceSet, selection: tuple[Trace, ...], start: Start
 ) -> dict[str, Any]:
     """Figures on every case and on the selection traces.
 

@@ -13,7 +13,7 @@ import pytest
 from sysid.reporting.figures.fit_figures import Series, case_figure, cases_figure, learning_figure
 from sysid.reporting.figures.style import DASHES, MARKERS, PALETTE, series_style
 from sysid.reporting.figures.svg import svg
-from sysid.reporting.results import LearningCurve
+from sysid.reporting.fit_records import LearningCurve
 
 TIME = 0.1 * np.arange(20_000)
 TARGET = 30.0 + 20.0 * np.sin(TIME / 60.0)
