@@ -19,7 +19,8 @@ from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
 from sysid.export.layout import HiddenState
 from sysid.export.parity import Parity, ParityCase
-from sysid.export.stage import Port, Range, Stage
+from sysid.export.ranges import example_of, range_of
+from sysid.export.stage import Port, Stage
 from sysid.export.surrogate import Surrogate
 from sysid.extras import has
 from sysid.models import Start
@@ -107,7 +108,7 @@ def describe(
         "model": stored,
         "n_parameters": source.n_parameters,
         "state": surrogate.state_text(),
-        "initialisation": _initialisation(surrogate, _example(traces)),
+        "initialisation": _initialisation(surrogate, example_of(traces)),
         "fit": stages[0]["fit"] if single else None,
         "cases_start": _begun(start, several=not single),
         "metrics": None if metrics is None else _metrics(metrics),
@@ -277,51 +278,6 @@ def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def declared_ranges(inputs: Sequence[str], traces: TraceSet) -> dict[str, Range]:
-    """The range that each input has in the estimation traces, which is what a bundle is declared for.
-
-    Args:
-        inputs: Names of the inputs.
-        traces: The cases.
-
-    Returns:
-        By channel; empty without estimation traces.
-    """
-    return ranges_in(inputs, traces.with_role(Role.ESTIMATION))
-
-
-def ranges_in(inputs: Sequence[str], traces: Sequence[Trace]) -> dict[str, Range]:
-    """The range that each input has in some traces.
-
-    Args:
-        inputs: Names of the inputs.
-        traces: The traces.
-
-    Returns:
-        By channel, of those that they have.
-    """
-    return {name: found for name in inputs if (found := _range(name, traces))}
-
-
-def first_inputs(inputs: Sequence[str], traces: TraceSet) -> dict[str, float]:
-    """What each input is at the beginning of the first estimation trace, or of the first trace without one.
-
-    Args:
-        inputs: Names of the inputs.
-        traces: The cases.
-
-    Returns:
-        By channel.
-    """
-    example = _example(traces)
-    return {name: float(example[name][0]) for name in inputs}
-
-
-def _example(traces: TraceSet) -> Trace:
-    estimation = traces.with_role(Role.ESTIMATION)
-    return estimation[0] if estimation else traces.traces[0]
-
-
 AMPLIFIES = 1e3
 """From here on rounding is told to matter: 13 digits that two compilers have in common are 10 at the end of a run."""
 
@@ -351,16 +307,11 @@ def amplification(cases: Sequence[ParityCase], sequences: Sequence[ParityCase], 
     }
 
 
-def _range(name: str, estimation: Sequence[Trace]) -> Range | None:
-    there = [trace[name] for trace in estimation if name in trace.channel_names]
-    return (min(float(v.min()) for v in there), max(float(v.max()) for v in there)) if there else None
-
-
 def _channel(port: Port, traces: TraceSet, estimation: tuple[Trace, ...]) -> dict[str, Any]:
     """A channel as the traces describe it; an output that they lack is known by its model alone."""
     first = traces.traces[0]
     channel = first.channel(port.name) if port.name in first.channel_names else None
-    found = _range(port.name, estimation)
+    found = range_of(port.name, estimation)
     return {
         "name": port.name,
         "unit": port.unit,

@@ -26,16 +26,15 @@ from sysid.export.manifest import (
     Metrics,
     amplification,
     attachments,
-    declared_ranges,
     describe,
     file_entry,
-    first_inputs,
     schema_text,
     seal,
     sha256,
 )
 from sysid.export.own_figures import own_figures, side_by_side
 from sysid.export.parity import Allowed, ParityCase, check_parity, parity_cases, random_cases
+from sysid.export.ranges import declared_ranges, first_inputs
 from sysid.export.stability import WORST, check_free_run, state_stability, state_unbounded
 from sysid.export.surrogate import Surrogate
 from sysid.export.verification import write_verification

@@ -1,7 +1,7 @@
 """What a model is: structure, parameters, scaling, initial state; free run and prediction."""
 
 from sysid.models.arx import ARX, ARXModel
-from sysid.models.base import AbstractModel, SeveralOutputs
+from sysid.models.base import AbstractModel
 from sysid.models.beginning import Beginning, beginning
 from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
 from sysid.models.built_model import BuiltModel
@@ -41,6 +41,7 @@ from sysid.models.polynomial_narx import PolynomialNARX
 from sysid.models.polynomial_orders import ARMAX, BJ, OE
 from sysid.models.recursion import Recursion, parameter_count
 from sysid.models.scaling import Scaling, VectorScaling
+from sysid.models.several_outputs import SeveralOutputs
 from sysid.models.state_space import StateSpace
 from sysid.models.store import cascade_from_dict, model_from_dict, structure_from_dict
 from sysid.models.structure import AbstractStructure

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from sysid.equations import RUNGE_KUTTA, Lowered
 from sysid.equations.written import renamed
 from sysid.errors import ConfigError, did_you_mean
-from sysid.models.base import AbstractModel, SeveralOutputs
+from sysid.models.base import AbstractModel
 from sysid.models.case_values import CaseValues
 from sysid.models.equation_form import EquationForm, StateTerms
 from sysid.models.grey_box import GreyBox, lowered
 from sysid.models.history import History
 from sysid.models.mapping import Mapping
 from sysid.models.scaling import Scaling, VectorScaling, scaling_from_dict
+from sysid.models.several_outputs import SeveralOutputs
 
 Array = NDArray[np.float64]
 

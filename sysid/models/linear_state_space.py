@@ -13,7 +13,6 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.base import SeveralOutputs
 from sysid.models.continuous import ContinuousStateSpace, rates
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
@@ -23,6 +22,7 @@ from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
 from sysid.models.ratio import Ratio
 from sysid.models.scaling import Scaling, VectorScaling, scaling_from_dict
+from sysid.models.several_outputs import SeveralOutputs
 from sysid.models.state_space import Filter, StateSpace
 from sysid.models.structure import AbstractStructure
 from sysid.models.to_control import Matrices, state_space

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.activations import PLAIN, Activation, check_activation
-from sysid.models.base import AbstractModel, SeveralOutputs
+from sysid.models.base import AbstractModel
 from sysid.models.history import History
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
@@ -22,6 +22,7 @@ from sysid.models.neural_ensemble import NeuralEnsemble, check_shares
 from sysid.models.neural_form import NeuralForm
 from sysid.models.neural_sizes import Sizes
 from sysid.models.scaling import Scaling, VectorScaling, scaling_from_dict
+from sysid.models.several_outputs import SeveralOutputs
 from sysid.models.structure import AbstractStructure
 
 OUTPUTS = ("plain", "absolute")

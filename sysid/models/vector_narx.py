@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
 from sysid.models.activations import PLAIN, Activation
-from sysid.models.base import SeveralOutputs
 from sysid.models.cascade_program import Limit
 from sysid.models.history import History
 from sysid.models.lags import Lags, LagSpec, is_one_set
@@ -22,6 +21,7 @@ from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP, NARX
 from sysid.models.output_limits import Between, parse_several, written
 from sysid.models.scaling import VectorScaling
+from sysid.models.several_outputs import SeveralOutputs
 from sysid.models.structure import AbstractStructure
 from sysid.models.vector_recursion import VectorRecursion
 

@@ -24,7 +24,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 from sysid.errors import SysidError
 from sysid.estimation import FitResult
 from sysid.export import EXPORTERS, Surrogate, check_parity, parity_cases, random_cases, read_bundle
-from sysid.export.manifest import declared_ranges
+from sysid.export.ranges import declared_ranges
 from sysid.ingest import load_dataset
 from sysid.models import AbstractModel, Cascade, Start
 from sysid.traces import TraceSet

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.export.bundle import ranges_of
-from sysid.export.manifest import ranges_in
+from sysid.export.ranges import ranges_in
 from sysid.models import Cascade, Interpolation
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference

@@ -77,24 +77,6 @@ def view_tag(cases: Sequence[str], created_ms: int) -> str:
         shown.pop()
 
 
-def read_view(value: str) -> dict[str, Any]:
-    """What :func:`view_tag` packed.
-
-    Args:
-        value: The tag's value.
-
-    Returns:
-        The state of the page.
-
-    Example:
-        >>> read_view(view_tag(["VAL01"], 0))["orderByKey"]
-        'metrics.`mean_free_run_mse`'
-    """
-    packed = json.loads(value)["state"].removeprefix("deflate;")
-    found: dict[str, Any] = json.loads(zlib.decompress(base64.b64decode(packed)))
-    return found
-
-
 def column(kind: str, name: str) -> str:
     """A column's name in MLflow's page.
 
