@@ -15,7 +15,8 @@ from sysid.equations.written import renamed
 from sysid.errors import ConfigError, did_you_mean
 from sysid.models.base import AbstractModel
 from sysid.models.case_values import CaseValues
-from sysid.models.equation_form import EquationForm, StateTerms
+from sysid.models.equation_form import EquationForm
+from sysid.models.equation_programs import StateTerms
 from sysid.models.grey_box import GreyBox, lowered
 from sysid.models.history import History
 from sysid.models.mapping import Mapping
