@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from sysid.export.flags import Flag
-from sysid.export.onnx_core import bounded, within
 from sysid.export.onnx_flags import Cause, Watched
+from sysid.export.onnx_holds import bounded, within
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.stage import Side, Stage
 from sysid.export.wide_form import WideForm

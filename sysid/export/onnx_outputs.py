@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from sysid.export.flags import MEANING, Flag
-from sysid.export.onnx_core import within
 from sysid.export.onnx_flags import Cause, Watched
+from sysid.export.onnx_holds import within
 from sysid.export.onnx_limits import LimitedRow, Limits, limited_rows
 from sysid.export.onnx_nodes import Nodes
 from sysid.export.stage import Port

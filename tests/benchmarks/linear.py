@@ -20,7 +20,7 @@ from scipy.signal import lfilter
 
 from sysid.estimation import fit_transfer_function
 from sysid.estimation.linear.order_search import OrderGrid, search_orders
-from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
 from sysid.models import Domain, Mapping, TransferFunction
 from sysid.traces import Channel, Trace

@@ -13,8 +13,8 @@ from sysid.estimation.clock import now
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import scattered, sections_of, stabilised
-from sysid.estimation.linear.records import SpectralRecord
 from sysid.estimation.linear.sanathanan_koerner import sk_poles
+from sysid.estimation.linear.spectral_record import SpectralRecord
 from sysid.estimation.linear.transfer_function_search import AbstractProblem
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.linear.poles import continuous_from, scattered, sections_of, stabilised
-from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.refined_iv import refined_sections
 from sysid.estimation.linear.regression import solve
 from sysid.estimation.linear.sanathanan_koerner import sk_poles
+from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.segments import columns_of_lags

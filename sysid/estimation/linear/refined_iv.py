@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.linear.poles import sections_of, stabilised
-from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.kernels import linear as kernel
 from sysid.models.orthonormal_basis import Domain, basis_of

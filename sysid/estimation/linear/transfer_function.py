@@ -19,8 +19,8 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.delay_search import without_dead_time
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
-from sysid.estimation.linear.records import TimeRecord
 from sysid.estimation.linear.segments import delayed_inputs, scaling_of
+from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_search import AbstractProblem
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining

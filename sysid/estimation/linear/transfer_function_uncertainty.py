@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.linear.coloured_errors import colour, information, sandwich
-from sysid.estimation.linear.records import TimeRecord
+from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import SeparableProvider, Separated
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import TransferFunctionModel

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sysid.estimation.linear.records import AbstractRecord, SpectralRecord, TimeRecord
+from sysid.estimation.linear.records import AbstractRecord
+from sysid.estimation.linear.spectral_record import SpectralRecord
+from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
 from sysid.models.orthonormal_basis import Domain
 
