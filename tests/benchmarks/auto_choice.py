@@ -82,8 +82,14 @@ def wiener(rng: np.random.Generator) -> tuple[Array, Array]:
 def oscillator(
     rng: np.random.Generator, longest: int, force: Callable[[float, float], float], x: float
 ) -> tuple[Array, Array]:
+    """An input that is held for up to so many samples, and what comes of it."""
+    u = held_input(rng, 5, longest, 2.0)
+    return u, oscillator_over(u, force, x)
+
+
+def oscillator_over(u: Array, force: Callable[[float, float], float], x: float) -> Array:
     """Runge and Kutta's rule, four steps a sample of 0.1 s."""
-    u, y, state = held_input(rng, 5, longest, 2.0), np.empty(1000), np.array([x, 0.0])
+    y, state = np.empty(len(u)), np.array([x, 0.0])
     for k in range(len(u)):
         y[k] = state[0]
 
@@ -95,7 +101,7 @@ def oscillator(
             b = slope(state + 0.0125 * a)
             c = slope(state + 0.0125 * b)
             state = state + 0.025 / 6.0 * (a + 2.0 * b + 2.0 * c + slope(state + 0.025 * c))
-    return u, y
+    return y
 
 
 PLANTS: dict[str, Callable[[np.random.Generator], tuple[Array, Array]]] = {

@@ -198,7 +198,7 @@ class Excursions(AbstractSequences):
             TraceError: If no trace has 20 usable samples in a row.
         """
         names = [*inputs, *outputs]
-        records = tuple(part for trace in traces for part in _usable_parts(trace, names))
+        records = tuple(part for trace in traces for part in usable_parts(trace, names))
         if not records:
             raise TraceError("no trace is long enough for excursions", expected="20 usable samples in a row")
         longest = max(len(record) for record in records)
@@ -306,8 +306,16 @@ class Excursions(AbstractSequences):
         return np.asarray((1.0 - share) * self._rows[below] + share * self._rows[below + 1])
 
 
-def _usable_parts(trace: Trace, names: Sequence[str]) -> list[NDArray[np.float64]]:
-    """Stretches without gaps, long enough to take passages from."""
+def usable_parts(trace: Trace, names: Sequence[str]) -> list[NDArray[np.float64]]:
+    """Stretches without gaps, long enough to take passages from.
+
+    Args:
+        trace: A record.
+        names: Channels, in the order of the columns.
+
+    Returns:
+        Each of shape ``(n_samples, len(names))``, of 20 samples at least.
+    """
     columns, usable = trace.columns(names), trace.usable_samples
     edges = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(np.int8), [0]])))
     return [columns[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 20]

@@ -203,7 +203,7 @@ def check_stability(
     largest = np.nan
     worst: tuple[tuple[bool, float], InputSequence, NDArray[np.float64]] | None = None
     begun: list[tuple[InputSequence, NDArray[np.float64]]] = []
-    for sequence, output in _runs(model, _in_time(sequences.draw(count, seed), until)):
+    for sequence, output in free_runs(model, _in_time(sequences.draw(count, seed), until)):
         drawn += 1
         outputs = output.reshape(len(sequence.inputs), -1)
         begun += [(sequence, outputs)] if drawn <= TWICE else []
@@ -238,7 +238,7 @@ def check_stability(
         beyond=further,
         asked=sequences.available(count),
         # What runs away is not asked whether it forgets.
-        beginnings=None if unbounded or unsettled else compare_beginnings(partial(_runs, model), begun, width),
+        beginnings=None if unbounded or unsettled else compare_beginnings(partial(free_runs, model), begun, width),
     )
 
 
@@ -279,12 +279,19 @@ def _says_nothing(
     return not _away(outputs, sequence, np.where(high > low, high - low, 1.0)) <= tolerance
 
 
-def _runs(
+def free_runs(
     model: AbstractModel | Run, sequences: Iterable[InputSequence]
 ) -> Iterator[tuple[InputSequence, NDArray[np.float64]]]:
     """Each sequence with the run over it, in order; a model's kernels leave the interpreter to a second thread.
 
     Where parameters differ by case, the sequences are dealt out to the cases.
+
+    Args:
+        model: A model of the sequences' outputs, or a function that runs anything over a sequence.
+        sequences: What is run.
+
+    Yields:
+        A sequence, and the outputs: shape ``(n_samples,)`` or ``(n_samples, n_outputs)``.
     """
     if not isinstance(model, AbstractModel):
         yield from ((sequence, model(sequence)) for sequence in sequences)

@@ -11,6 +11,7 @@ from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import Trial
+from sysid.workbench.auto.beyond import Beyond
 from sysid.workbench.auto.budget import GOING_ON, REFIT, price
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.parts import ENSEMBLE, LAST, UNITED, Parts
@@ -54,19 +55,24 @@ class LastFit:
     data: Data
     parts: Parts
 
-    def united(self, plan: Plan, chosen: Trial, spent_s: float) -> Mapping[str, Any]:
+    def united(self, plan: Plan, chosen: Trial, spent_s: float, beyond: Beyond) -> Mapping[str, Any]:
         """How it is trained where it is the mean of several starts, as of one alone it would say little.
 
         Args:
             plan: What was tried.
             chosen: What is fitted.
             spent_s: Seconds of the search so far.
+            beyond: How far models are apart on other commands.
 
         Returns:
             Options of its training; none where one start is enough.
         """
         row = estimator_of(structure_from_dict(chosen.structure))
-        apart = "ensemble" in chosen.values or plan.scattered.get(chosen.number, 0.0) > SCATTER
+        apart = (
+            "ensemble" in chosen.values
+            or plan.scattered.get(chosen.number, 0.0) > SCATTER
+            or beyond.tells(error(chosen))
+        )
         if self.parts.trained_on or not row.unites or not apart:
             return {}
         # As many starts as there is time for: halfway trained, none of them says anything.

@@ -175,6 +175,17 @@ class Plan:
             if n in again | late or not again or t.number in self._united or t.structure["kind"] in kinds
         ]
 
+    def starts_of(self, trial: Trial) -> list[int]:
+        """The numbers of points that are one trial: its own, and those of its repeats from other starts.
+
+        Args:
+            trial: The trial.
+
+        Returns:
+            The numbers.
+        """
+        return [trial.number, *(n for n, place in self._repeats.items() if self.trials[place].number == trial.number)]
+
     def _all_rounds(self) -> Iterator[list[Try]]:
         yield from self._search()
         yield from self._whatever_the_time()

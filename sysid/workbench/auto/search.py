@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from sysid.errors import ConfigError
@@ -12,9 +13,11 @@ from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, AbstractStructure
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import SweepRecord, Trial
+from sysid.workbench.auto import told
+from sysid.workbench.auto.beyond import Beyond, look_beyond
 from sysid.workbench.auto.budget import FINAL, RACE, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
-from sysid.workbench.auto.finish import MOST_KEPT, finish_s, span
+from sysid.workbench.auto.finish import finish_s
 from sysid.workbench.auto.last_fit import LAST_FITS, LINEAR_LAST, RIPENING, LastFit, refit_share
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
@@ -22,8 +25,9 @@ from sysid.workbench.auto.plan import AGAIN, Plan
 from sysid.workbench.auto.race import Race, trains_on
 from sysid.workbench.auto.ripe import Ripening, young_told
 from sysid.workbench.auto.trials import Trials
-from sysid.workbench.auto.words import Choice, choose, sentence
+from sysid.workbench.auto.words import Choice, choose, sentence, shown_in
 from sysid.workbench.auto.worth import Rank, error, ranked_by
+from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.fit_steps import GivenFit
@@ -38,15 +42,6 @@ from sysid.workbench.sweep.workers import AbstractWorkers
 FOUND, LINEAR = "best found", "best linear"
 """Names of the fits that a search hands to the pipeline."""
 TITLE = "Searching for a model"
-BUSY = 1.5
-"""Seconds by the clock that a second of training takes from which on it is said."""
-APART = (
-    " From other starts its errors on the same parts are {apart:.0%} apart: what is fitted to all of the record in the "
-    "end is the mean of several starts."
-)
-"""What is said where that is so."""
-LEAST_SHARE = 0.1
-"""Share of the time of a search in which trials can be made at least."""
 CHECKED = 50
 """Sequences over which a trial's free run is checked, or one for each second of the search where that is more: all of
 them took longer than the training of a short search. The last fit is checked over all."""
@@ -257,17 +252,18 @@ class Search:
             kept, raced = kept - spent, len(race.in_it)
         whole = () if self.data.selection else self.data.estimation
         checks = Checks(driver=first, bench=self.bench.fold(0), whole=whole)
+        beyond = self._beyond(plan, trials)
         choice = choose(
-            plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance,
+            plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance, beyond=beyond.of,
             goes_on=lambda trial: self.parts.trained_on and trains_on(structure_from_dict(trial.structure)),
         )  # fmt: skip
-        needs_s = _needs_s(plan, clock.total)
-        shown, hurried = {FOUND: choice.chosen}, _hurried(plan, choice.chosen, clock.total, needs_s)
-        united = self._last.united(plan, choice.chosen, clock.total)
+        needs_s = told.needs_s(plan, clock.total)
+        shown, hurried = {FOUND: choice.chosen}, told.hurried(plan, choice.chosen, clock.total, needs_s)
+        united = self._last.united(plan, choice.chosen, clock.total, beyond)
         if choice.linear is not None and choice.linear.number != choice.chosen.number:
             shown[LINEAR] = choice.linear
         return Found(
-            record=self._record(plan, choice, clock.total, raced, united=bool(united)),
+            record=self._record(plan, choice, beyond, clock.total, raced, united=bool(united)),
             shown=shown,
             fits={name: checks.given(trial) for name, trial in shown.items()},
             training={
@@ -282,8 +278,8 @@ class Search:
                 *self.parts.told,
                 *([hurried] if hurried else []),
                 *([f"{choice.chosen.label} was {choice.chosen.reason}."] if choice.chosen.reason else []),
-                *_busy(plan),
-                *_left_out(plan),
+                *told.busy(plan),
+                *told.left_out(plan),
                 *(f"Look at the data: {one}" for one in self.looked.cautions),
             ),
             hurried=hurried,
@@ -311,16 +307,30 @@ class Search:
     def _n_outputs(self) -> int:
         return len(self.config.mapping.outputs)
 
-    def _record(self, plan: Plan, choice: Choice, wall_s: float, raced: int, *, united: bool) -> SweepRecord:
+    def _beyond(self, plan: Plan, trials: Trials) -> Beyond:
+        """How far what may be chosen is apart on other commands; not asked where training goes on after the choice."""
+        if self.parts.trained_on:
+            return Beyond()
+        sizes = steps.output_sizes(self.data, self.config.mapping.outputs)
+        return look_beyond(
+            plan.candidates, error, lambda one: [m for n in plan.starts_of(one) for m in trials.fitted(n)],
+            self.data.estimation, sizes, seed=self.config.seed,
+        )  # fmt: skip
+
+    def _record(
+        self, plan: Plan, choice: Choice, beyond: Beyond, wall_s: float, raced: int, *, united: bool
+    ) -> SweepRecord:
         outputs = self.config.mapping.outputs
         # Errors of several outputs count over their variances: in standard deviations.
         unit = self.bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
         said = sentence(
-            choice, len(plan.trials), again=plan.n_again, raced=raced, unit=unit, ended=plan.ended, error=error
-        )
-        if united and choice.chosen.number in plan.scattered:
-            apart = math.expm1(plan.scattered[choice.chosen.number])
-            said += APART.format(apart=apart)
+            choice, len(plan.trials), again=plan.n_again, raced=raced, unit=unit, ended=plan.ended, error=error,
+            beyond=beyond.of,
+        )  # fmt: skip
+        said += told.last_fit(plan, choice.chosen) if united else ""
+        linear = choice.linear
+        other = None if linear is None or linear is choice.chosen else (linear.label, error(linear))
+        beyond_told = beyond.sentence(error(choice.chosen), partial(shown_in, unit), other)
         young = young_told(plan.trials, self._rank, self._n_outputs, len(self.parts.folds))
         return SweepRecord(
             name=self.config.name,
@@ -332,54 +342,12 @@ class Search:
             objectives=list(OBJECTIVES),
             choose_by="free_run_mse",
             choose_on="selection",
-            chosen_by=" ".join(one for one in (said, young, *self.parts.told) if one),
+            chosen_by=" ".join(one for one in (said, beyond_told, young, *self.parts.told) if one),
             workers=self.config.workers,
             wall_s=wall_s,
             winner=choice.chosen.number,
             trials=list(plan.trials),
         )
-
-
-def _needs_s(plan: Plan, spent_s: float) -> float:
-    """About how long a search takes, where the time was up before there was anything to compare."""
-    wall_s = plan.budget.wall_s
-    if not plan.hurried or wall_s is None:
-        return 0.0
-    # What was seen on a busy machine says nothing of the same data on another day: it is reckoned as if it were quiet.
-    slowed = plan.budget.slowed
-    need = spent_s / slowed / max(1.0 - MOST_KEPT - plan.budget.refit, LEAST_SHARE)
-    return max(need, 2.0 * wall_s / slowed)
-
-
-def _hurried(plan: Plan, chosen: Trial, spent_s: float, needs_s: float) -> str:
-    """That the time was up before there was anything to compare, and about how long a search takes; else nothing."""
-    if not plan.hurried:
-        return ""
-    wall_s, slowed = plan.budget.wall_s, plan.budget.slowed
-    if wall_s is None:
-        return f"The budget was spent before structures were compared: {chosen.label} is the least that there is."
-    busy = f" on a quiet machine (a second of work takes {slowed:.1f} s now)" if slowed >= BUSY else ""
-    return (
-        f"The time was up before structures were compared: {chosen.label} is the least that there is, fitted once, "
-        f"whatever it is worth. Of {span(wall_s)}, looking at the record and one fit took {span(spent_s)}, and scores, "
-        f"export and report are still to come; a search that compares takes {span(needs_s)} at least{busy}."
-    )
-
-
-def _busy(plan: Plan) -> list[str]:
-    """What a machine that does other things meanwhile has to do with it."""
-    if plan.budget.wall_s is None or plan.budget.slowed < BUSY:
-        return []
-    return [
-        f"The machine was busy: a second of training took {plan.budget.slowed:.1f} s. Fewer structures were tried for "
-        "it, each as far as on a quiet one."
-    ]
-
-
-def _left_out(plan: Plan) -> list[str]:
-    """What was not tried for want of time."""
-    some = ", ".join(plan.left_out)
-    return [f"Linear models that would have taken the time of nonlinear ones were left out: {some}."] if some else []
 
 
 def _progress(event: events.Event, plan: Plan) -> events.Event:

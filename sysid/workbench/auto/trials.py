@@ -6,11 +6,13 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
+from sysid.estimation import FitResult
+from sysid.models import AbstractModel
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.runner.store import digest
 from sysid.workbench.sweep.driver import Driver
 from sysid.workbench.sweep.search_space import Point
-from sysid.workbench.sweep.trial import NOT_DONE
+from sysid.workbench.sweep.trial import NOT_DONE, stored_models
 
 HOPELESS, SEEN = 2.0, 2
 """Times the error of the best so far on the same folds, from so many on, beyond which a point is dropped."""
@@ -48,6 +50,23 @@ class Trials:
     def is_stored(self, point: Point) -> bool:
         """Whether a point's trials are on disk, as far as they are asked for."""
         return all(driver.is_stored(point) for driver in self.drivers)
+
+    def fitted(self, number: int) -> list[list[AbstractModel]]:
+        """What a point was fitted to.
+
+        Args:
+            number: Of the point.
+
+        Returns:
+            For each fold on which it can be used its models: one of all outputs, or one an output.
+        """
+        jobs = [(driver, driver.last[number]) for driver in self.drivers if number in driver.last]
+        stored = [driver.store.read(job.key) for driver, job in jobs]
+        return [
+            [FitResult.from_dict(one["fit"]).model for one in stored_models(outcome)]
+            for outcome in stored
+            if outcome is not None and outcome["usable"]
+        ]
 
     def run(self, points: Sequence[Point]) -> list[Trial]:
         """Try some points on every fold; what is far behind the best on the same folds is dropped on the way.

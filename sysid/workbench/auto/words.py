@@ -37,6 +37,8 @@ class Choice:
             why it comes before one of less error; empty elsewhere.
         stable: The best stable one, where that was passed over for one whose training goes on.
         alone: Of an ensemble the best trial of its structure without one.
+        nearer: The one of the least error, where it was passed over as it is further from the middle of all on other
+            commands.
     """
 
     chosen: Trial
@@ -49,6 +51,7 @@ class Choice:
     more_within: str = ""
     stable: Trial | None = None
     alone: Trial | None = None
+    nearer: Trial | None = None
 
 
 def choose(
@@ -58,6 +61,7 @@ def choose(
     *,
     tolerance: float | None = None,
     goes_on: Callable[[Trial], bool] = lambda _: False,
+    beyond: Error = lambda _: 0.0,
 ) -> Choice:
     """The smallest of those whose error is as good as the least.
 
@@ -68,33 +72,41 @@ def choose(
         tolerance: As for :func:`~sysid.workbench.auto.plan.ranked_by`.
         goes_on: Whether a trial's training goes on once it is chosen. A network that few iterations have brought far
             ahead of all that is stable is not passed over for what those few iterations have left in it.
+        beyond: How far its models are from the middle of all on other commands, a mean square: it counts like the
+            error.
 
     Returns:
         The choice.
     """
-    rank = ranked_by(error, tolerance)
+
+    def worth(trial: Trial) -> float:
+        return error(trial) + beyond(trial)
+
+    rank = ranked_by(worth, tolerance)
 
     def outside(trial: Trial) -> float:
         return rank(trial)[0]
 
     usable = sorted((t for t in trials if math.isfinite(error(t))), key=rank)
     chosen, refused = first_stable(usable)
-    limit = error(chosen) * (1.0 + ALIKE) ** 2
+    limit = worth(chosen) * (1.0 + ALIKE) ** 2
     linear = [t for t in usable if ESTIMATORS[t.structure["kind"]].linear]
 
     def no_worse(trial: Trial) -> bool:
         return (
-            error(trial) <= limit
+            worth(trial) <= limit
             or (trial in linear and cannot_be_told(chosen, trial, error))
             or both_exact(chosen, trial)
         )
 
     alike = [t for t in usable[refused:] if no_worse(t) and outside(t) <= outside(chosen)]
-    more = tolerance is not None and min(map(error, usable[refused:])) < error(chosen)
-    smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, error(t), t.number)))
+    more = tolerance is not None and min(map(worth, usable[refused:])) < worth(chosen)
+    smallest, _ = first_stable(sorted(alike, key=lambda t: (t.operations, worth(t), t.number)))
     nonlinear = [t for t in trials if not ESTIMATORS[t.structure["kind"]].linear]
     alone = [t for t in usable if t.structure == smallest.structure and "ensemble" not in t.values]
+    least = min(usable[refused:], key=error)
     found = Choice(
+        nearer=least if not more and error(least) * (1.0 + ALIKE) ** 2 < error(chosen) else None,
         alone=alone[0] if alone and "ensemble" in smallest.values else None,
         chosen=smallest, least=chosen, linear=linear[0] if linear else None, refused=refused, nonlinear=len(nonlinear),
         finished=sum(t.status != FAILED for t in nonlinear),
@@ -105,7 +117,7 @@ def choose(
     if not ahead:
         return found
     first = usable[ahead[0]]
-    return replace(found, chosen=first, least=first, refused=ahead[0], more_within="", stable=smallest)
+    return replace(found, chosen=first, least=first, refused=ahead[0], more_within="", stable=smallest, nearer=None)
 
 
 def cannot_be_told(best: Trial, other: Trial, error: Error) -> bool:
@@ -117,6 +129,11 @@ def cannot_be_told(best: Trial, other: Trial, error: Error) -> bool:
 def both_exact(*trials: Trial) -> bool:
     """Whether what several leave is rounding: an error of 1e-16 is no better than one of 1e-14."""
     return all(one.selection_rms_shares and max(one.selection_rms_shares) <= EXACT for one in trials)
+
+
+def shown_in(unit: str, value: float) -> str:
+    """A figure with its unit, as far as it has one."""
+    return number(value) if unit == "1" else quantity(value, unit)
 
 
 def _ended(trials: Sequence[Trial]) -> tuple[str, ...]:
@@ -141,7 +158,10 @@ def _beside_nonlinear(choice: Choice) -> str:
     return "and no nonlinear model does better" + (f" ({without} more came to no result)" if without else "")
 
 
-def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit: str, ended: str, error: Error) -> str:
+def sentence(
+    choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit: str, ended: str, error: Error,
+    beyond: Error = lambda _: 0.0,
+) -> str:  # fmt: skip
     """Why this one.
 
     Args:
@@ -152,6 +172,7 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit
         unit: Of the output.
         ended: Why the search ended.
         error: What chooses.
+        beyond: As for :func:`choose`.
 
     Returns:
         One sentence, and another where some were passed over.
@@ -159,11 +180,20 @@ def sentence(choice: Choice, tried: int, *, again: int = 0, raced: int = 0, unit
     root = math.sqrt(error(choice.chosen))
 
     def shown(value: float) -> str:
-        return number(value) if unit == "1" else quantity(value, unit)
+        return shown_in(unit, value)
 
     why = f"{choice.chosen.label} has the least free-run error on what chose, {shown(root)} (root mean square)"
     if choice.more_within:
         why = f"{choice.chosen.label} has {choice.more_within}, more than any of less error than its {shown(root)} has"
+    elif choice.nearer is not None:
+        ours, theirs = (
+            f"{shown(math.sqrt(error(one)))} on what chose and {shown(math.sqrt(beyond(one)))}"
+            for one in (choice.chosen, choice.nearer)
+        )
+        why = (
+            f"{choice.chosen.label} has a free-run error (root mean square) of {ours} from the middle of all on other "
+            f"commands; {choice.nearer.label}, of the least error, has {theirs}"
+        )
     elif choice.least.number != choice.chosen.number:
         within = error(choice.chosen) <= error(choice.least) * (1.0 + ALIKE) ** 2
         alike = f"within {ALIKE:.0%} of" if within else "of those that what chose cannot tell from"

@@ -11,6 +11,7 @@ import pytest
 
 from sysid.models import NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
+from sysid.workbench.auto.beyond import TOLD, Beyond
 from sysid.workbench.auto.budget import REFIT, price
 from sysid.workbench.auto.last_fit import LEAST_LAST, SCATTER, SURE, LastFit
 from sysid.workbench.auto.parts import ENSEMBLE, UNITED
@@ -36,9 +37,17 @@ def test_as_many_starts_are_united_as_there_is_time_for(left_s: float, way: dict
     """Starts that are halfway trained say nothing."""
     last, plan, one = seen(iteration_s=0.03, ends_s=100.0 + left_s)
     plan.scattered = {7: 2.0 * SCATTER}
-    assert last.united(plan, one, 100.0) == way
+    assert last.united(plan, one, 100.0, Beyond()) == way
     plan.scattered[7] = 0.5 * SCATTER
-    assert last.united(plan, one, 100.0) == {}
+    assert last.united(plan, one, 100.0, Beyond()) == {}
+
+
+def test_what_is_apart_on_other_commands_is_united_too() -> None:
+    """Starts that meet the parts of a record alike may still differ where it shows nothing."""
+    last, plan, one = seen(iteration_s=0.03, ends_s=1e9)
+    plan.scattered = {7: 0.0}
+    assert last.united(plan, one, 100.0, Beyond(models=8, spread=0.9 * TOLD**2)) == {}
+    assert last.united(plan, one, 100.0, Beyond(models=8, spread=1.1 * TOLD**2)) == UNITED
 
 
 @pytest.mark.parametrize(

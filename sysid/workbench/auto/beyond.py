@@ -1,0 +1,169 @@
+"""How far models that did alike are apart on other commands: what the record does not show.
+
+Parts of a record that are held out are of the same movement as the rest of it. Of five steps, each of which came to
+rest before the next, a network may meet every part and be far off where a step follows sooner. Nobody knows what the
+plant would do there, but models from other parts, starts and structures, all of which meet the record, say how well it
+is known: where they differ, most of them are wrong (query by committee: Seung, Opper and Sompolinsky 1992; ambiguity of
+an ensemble: Krogh and Vedelsby 1995). The middle of them is the best guess there is, and how far a model is from it is
+counted to its error when one is chosen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.stability.excursions import usable_parts
+from sysid.estimation.stability.free_run import free_runs
+from sysid.estimation.stability.other_commands import LONGEST, OtherCommands
+from sysid.models import AbstractModel
+from sysid.reporting.sweep_record import Trial
+from sysid.traces import Trace
+
+AS_GOOD, LOOKED_AT = 1.5, 2.0
+"""Times the least error up to which a trial's models have a say in where the middle is, and up to which it is looked
+at."""
+TOLD = 1.5
+"""Times the error of the chosen model from which on that is told: elsewhere 1.8 times of it are then to be expected."""
+FEWEST = 6
+"""Models that have a middle."""
+MOST_TRIALS, COMMANDS = 8, 20
+"""Trials that are looked at, and commands over which their models run."""
+MOST_BYTES = 64_000_000
+"""Of all runs together; where they would take more, there are fewer commands."""
+BEGINNING = 0.1
+"""Part of a run that does not count: where it began is given by nothing but the first output."""
+FAR = 10.0
+"""Ranges of an output beyond which a run that leaves it is no further away."""
+
+Models = list[AbstractModel]
+"""Of one fit: one a model of all outputs, or one an output."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beyond:
+    """How far models are apart on other commands; nothing where there were too few to tell.
+
+    Args:
+        models: How many had a say in where the middle is.
+        spread: How far they are from it: median of the mean squares, as errors count.
+        apart: The same of the models of each trial that was looked at, by its number.
+    """
+
+    models: int = 0
+    spread: float = 0.0
+    apart: Mapping[int, float] = field(default_factory=dict)
+
+    def of(self, trial: Trial) -> float:
+        """What is to be added to a trial's error.
+
+        Args:
+            trial: The trial.
+
+        Returns:
+            A mean square; of one that was not looked at that of all.
+        """
+        return self.apart.get(trial.number, self.spread)
+
+    def tells(self, error: float) -> bool:
+        """Whether they are further apart than the error of the one that was chosen lets expect.
+
+        Args:
+            error: Its error on what chose, a mean square.
+
+        Returns:
+            Whether they are.
+        """
+        return self.spread > TOLD**2 * error
+
+    def sentence(self, error: float, shown: Callable[[float], str], linear: tuple[str, float] | None = None) -> str:
+        """That they are, for people; empty where they are not.
+
+        Args:
+            error: As for :meth:`tells`.
+            shown: Writes a root of a mean square with its unit.
+            linear: The best linear model, where it was not chosen, and its error.
+
+        Returns:
+            What it means, and what would help.
+        """
+        if not self.tells(error):
+            return ""
+        apart, own = math.sqrt(self.spread), math.sqrt(error)
+        times = f"{apart / own:.2g} times its error on what chose" if own else "where what chose shows no error"
+        safer = ""
+        if linear is not None and linear[1] < self.spread:
+            safer = f"The best linear model, {linear[0]}, which leaves {shown(math.sqrt(linear[1]))}, is safer there. "
+        return (
+            "Not shown by the record: on other commands, made of pieces of its own inputs in other order, "
+            f"{self.models} models that did alike are {shown(apart)} (root mean square, median) from the middle of "
+            f"them, {times}. "
+            "Expect an error of that size wherever inputs follow each other in other ways than here. "
+            f"{safer}Record more of these: levels and holding times at random, some shorter than the output takes to "
+            "settle."
+        )
+
+
+def look_beyond(
+    trials: Sequence[Trial],
+    error: Callable[[Trial], float],
+    fitted: Callable[[Trial], Sequence[Models]],
+    traces: Sequence[Trace],
+    sizes: Sequence[float],
+    *,
+    seed: int,
+) -> Beyond:
+    """Run what was fitted over other commands.
+
+    Args:
+        trials: What may be chosen.
+        error: Of a trial, a mean square; infinite for what cannot be used.
+        fitted: What a trial was fitted to: part by part, and from each start.
+        traces: The estimation traces.
+        sizes: What the square of an error of each output counts over.
+        seed: Of the commands.
+
+    Returns:
+        How far they are apart.
+    """
+    least = min(map(error, trials), default=np.inf)
+    near = sorted((t for t in trials if error(t) <= LOOKED_AT**2 * least), key=error)[:MOST_TRIALS]
+    found = [(trial, models) for trial in near for models in fitted(trial)]
+    counted = [error(trial) <= AS_GOOD**2 * least for trial, _ in found]
+    if not np.isfinite(least) or sum(counted) < FEWEST or not any(usable_parts(trace, ()) for trace in traces):
+        return Beyond()
+    count = max(2, min(COMMANDS, MOST_BYTES // (8 * LONGEST * len(sizes) * len(found))))
+    runs = np.stack([_run(models, traces, count, seed) for _, models in found])
+    middle = np.median(runs[counted], axis=0)
+    away = [float(np.mean((run - middle) ** 2 / np.asarray(sizes))) for run in runs]
+    apart = {
+        trial.number: median(a for a, (one, _) in zip(away, found, strict=True) if one is trial)
+        for trial in near
+        if any(one is trial for one, _ in found)
+    }
+    return Beyond(
+        models=sum(counted), spread=median(a for a, counts in zip(away, counted, strict=True) if counts), apart=apart
+    )
+
+
+def _run(models: Models, traces: Sequence[Trace], count: int, seed: int) -> NDArray[np.float64]:
+    """The runs over all commands, one after the other: shape ``(n_samples, n_outputs)``."""
+    return np.hstack([_run_one(model, traces, count, seed) for model in models])
+
+
+def _run_one(model: AbstractModel, traces: Sequence[Trace], count: int, seed: int) -> NDArray[np.float64]:
+    commands = OtherCommands.of(traces, model.mapping.inputs, model.mapping.outputs)
+    low, high = commands.output_range
+    least, most = low - FAR * (high - low), high + FAR * (high - low)
+    runs = [
+        np.clip(np.where(np.isnan(run), most, run), least, most)[int(BEGINNING * len(run)) :]
+        for run in (
+            one.reshape(len(command.inputs), -1) for command, one in free_runs(model, commands.draw(count, seed))
+        )
+    ]
+    return np.concatenate(runs)

@@ -1,0 +1,117 @@
+"""Models that did alike on a record are compared on other commands, where nobody knows what the plant would do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from sysid.models import ARX, ARXModel, Mapping, NeuralStateSpace
+from sysid.reporting.sweep_record import Trial
+from sysid.traces import Channel, Trace
+from sysid.workbench.auto.beyond import FEWEST, TOLD, Beyond, Models, look_beyond
+from sysid.workbench.auto.words import choose, sentence, shown_in
+from sysid.workbench.auto.worth import error
+from sysid.workbench.sweep.search_space import Point
+from tests.workbench.auto.test_plan import trial
+
+CHANNELS = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
+U = np.repeat([0.0, 1.0, 0.0, 1.0], 100)
+RECORD = Trace(name="steps", sample_time=1.0, channels=CHANNELS, values=np.column_stack([U, U]))
+
+
+def model(pole: float) -> ARXModel:
+    """All of them come to rest at the input, sooner or later: long steps tell them apart the least."""
+    return ARXModel(
+        orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([1.0 - pole, pole]), intercept=0.0,
+        mapping=Mapping.parse("u -> y"), sample_time=1.0, input_units=("V",), output_unit="V", rest_output=0.0,
+    )  # fmt: skip
+
+
+def network(number: int, rms: float) -> Trial:
+    point = Point(number=number, structure=NeuralStateSpace(states=2, neurons=number), training={}, values={})
+    return trial(point, rms**2).model_copy(update={"operations": 10 * number})
+
+
+def looked(poles: dict[int, Sequence[float]], trials: Sequence[Trial]) -> Beyond:
+    def fitted(one: Trial) -> list[Models]:
+        return [[model(pole)] for pole in poles[one.number]]
+
+    return look_beyond(trials, error, fitted, [RECORD], [1.0], seed=0)
+
+
+ALIKE = [0.8, 0.8, 0.8, 0.8]
+TRIALS = [network(1, 0.102), network(2, 0.100)]
+
+
+def test_models_that_are_one_are_not_apart() -> None:
+    found = looked({1: ALIKE, 2: ALIKE}, TRIALS)
+    assert (found.models, found.spread) == (8, 0.0)
+    assert not found.tells(0.01)
+    assert found.sentence(0.01, str) == ""
+
+
+def test_of_those_that_did_alike_the_one_in_the_middle_is_chosen() -> None:
+    found = looked({1: ALIKE, 2: [0.99, 0.5, 0.98, 0.8]}, TRIALS)
+    assert found.of(TRIALS[0]) < found.of(TRIALS[1])
+    assert choose(TRIALS[::-1], error, lambda some: (some[0], 0)).chosen.number == 1  # the smaller within 3 %
+    far = [network(1, 0.110), network(2, 0.100)]
+    assert choose(far, error, lambda some: (some[0], 0)).chosen.number == 2
+    choice = choose(far, error, lambda some: (some[0], 0), beyond=found.of)
+    assert choice.chosen.number == 1
+    said = sentence(choice, 2, unit="V", ended="the end", error=error, beyond=found.of)
+    assert f"of {shown_in('V', 0.11)} on what chose and {shown_in('V', 0.0)} from the middle of all on other" in said
+    assert f"NSS 2/2, of the least error, has {shown_in('V', 0.1)}" in said
+
+
+def test_what_the_record_does_not_show_is_told_with_its_size() -> None:
+    found = looked({1: [0.5, 0.9, 0.99, 0.8], 2: [0.6, 0.95, 0.3, 0.98]}, TRIALS)
+    size = math.sqrt(found.spread)
+    assert found.tells((size / (1.01 * TOLD)) ** 2)
+    assert not found.tells((size / (0.99 * TOLD)) ** 2)
+    said = found.sentence((size / 3.0) ** 2, lambda value: shown_in("V", value))
+    assert said.startswith("Not shown by the record: on other commands")
+    assert f"8 models that did alike are {shown_in('V', size)}" in said
+    assert "3 times its error" in said
+    assert "safer" not in said
+    assert "safer" not in found.sentence(found.spread / 9.0, str, ("ARX", 1.1 * found.spread))
+    assert "linear model, ARX, which leaves" in found.sentence(found.spread / 9.0, str, ("ARX", 0.9 * found.spread))
+
+
+def test_the_middle_is_that_of_those_that_did_alike() -> None:
+    """A trial of twice the error is looked at, and has no say."""
+    trials = [*TRIALS, network(3, 0.19), network(4, 0.3)]
+    found = looked({1: ALIKE, 2: ALIKE, 3: [0.99] * 20, 4: [0.99]}, trials)
+    assert found.models == 8
+    assert found.of(trials[2]) > 0.0
+    assert 4 not in found.apart
+
+
+def test_a_run_that_is_lost_is_far_away_and_bounded() -> None:
+    found = looked({1: ALIKE, 2: [0.8, 0.8, 0.8, 1.5]}, TRIALS)
+    assert found.spread == 0.0
+    only = looked({1: ALIKE, 2: [1.5] * 3}, TRIALS)
+    assert math.isfinite(only.of(TRIALS[1]))
+    assert only.of(TRIALS[1]) > 1.0
+
+
+@pytest.mark.parametrize("count", [1, FEWEST // 2 - 1])
+def test_a_few_models_have_no_middle(count: int) -> None:
+    found = looked({1: [0.8] * count, 2: [0.9] * count}, TRIALS)
+    assert found == Beyond()
+
+
+def test_records_without_twenty_samples_in_a_row_are_not_asked() -> None:
+    short = Trace(name="short", sample_time=1.0, channels=CHANNELS, values=RECORD.values[:10])
+    assert look_beyond(TRIALS, error, lambda _: [[model(0.8)]] * 6, [short], [1.0], seed=0) == Beyond()
+
+
+def test_of_several_outputs_errors_count_over_what_was_given() -> None:
+    one = looked({1: [0.5, 0.9, 0.99], 2: [0.6, 0.95, 0.3]}, TRIALS)
+
+    def fitted(some: Trial) -> list[Models]:
+        return [[model(pole)] for pole in ([0.5, 0.9, 0.99] if some.number == 1 else [0.6, 0.95, 0.3])]
+
+    assert look_beyond(TRIALS, error, fitted, [RECORD], [4.0], seed=0).spread == pytest.approx(one.spread / 4.0)
