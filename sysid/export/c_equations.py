@@ -64,9 +64,14 @@ def equation_values(stage: Stage, number: int) -> dict[str, Any]:
         "searches": form.searches,
         "terms": _terms(form),
         "lines": [
-            {"first": line.first, "length": line.length, "newest": f"u{i}"}
+            # Of what a later stage computes the newest sample is set behind the step; those before it move on here.
+            {
+                "first": line.first,
+                "length": line.length,
+                "newest": f"u{i}" if stage.sources[i] < stage.targets[0] else "",
+            }
             for i, line in enumerate(layout.lines)
-            if line.length and stage.sources[i] < stage.targets[0]
+            if line.length
         ],
     }
 

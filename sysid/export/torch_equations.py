@@ -125,7 +125,7 @@ class EquationStep(nn.Module):
         reached = torch.zeros_like(y.narrow(1, 0, 1), dtype=torch.bool)
         outputs = y
         if self.limited:
-            y, outputs, reached = self.limits(known, y, y)
+            y, outputs, _, reached = self.limits(known, y, y)
         held = torch.zeros_like(reached)
         parts_after.append(together.index_select(1, self.line_columns))
         return outputs, torch.cat(parts_after, dim=1), held, reached

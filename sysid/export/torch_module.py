@@ -45,7 +45,7 @@ class Limits(nn.Module):
         self.values = [float(side.value) for _, side in sides]
         self.columns = [-1 if side.column is None else int(side.column) for _, side in sides]
 
-    def forward(self, known: Tensor, scaled: Tensor, outputs: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def forward(self, known: Tensor, scaled: Tensor, outputs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Hold a stage's outputs.
 
         Args:
@@ -54,12 +54,14 @@ class Limits(nn.Module):
             outputs: The same in their units.
 
         Returns:
-            Both within the limits, and whether one of them is at one, shape ``(batch, 1)``.
+            Both within the limits; which outputs are at one, shape ``(batch, n_outputs)``; and whether one is at one
+            that is told, shape ``(batch, 1)``.
         """
         together = torch.cat([known, outputs], dim=1)
         channels = list(torch.chunk(together, together.size(1), dim=1))
         numbers = list(torch.chunk(scaled, scaled.size(1), dim=1))
         reached = torch.zeros_like(numbers[0], dtype=torch.bool)
+        there = list(torch.chunk(torch.zeros_like(scaled, dtype=torch.bool), scaled.size(1), dim=1))
         for i in range(len(self.outputs)):
             j = self.outputs[i]
             at = self.first + j
@@ -69,9 +71,11 @@ class Limits(nn.Module):
             beyond = channels[at] > limit if self.upper[i] else channels[at] < limit
             channels[at] = torch.where(beyond, limit, channels[at])
             numbers[j] = torch.where(beyond, (limit - self.offsets[j]) / self.scales[j], numbers[j])
+            there[j] = there[j] | (channels[at] == limit)
             if self.told[i]:
                 reached = reached | (channels[at] == limit)
-        return torch.cat(numbers, dim=1), torch.cat(channels[self.first :], dim=1), reached
+        held = torch.cat(numbers, dim=1), torch.cat(channels[self.first :], dim=1)
+        return held[0], held[1], torch.cat(there, dim=1), reached
 
 
 class LaggedStep(nn.Module):
@@ -139,12 +143,12 @@ class LaggedStep(nn.Module):
             total = total + (hidden * (x @ self.gates)).sum(dim=1, keepdim=True)
         y = torch.clamp(total, self.low, self.high)
         outputs = y * self.output_scale + self.output_offset
-        reached = torch.zeros_like(y[:, :1], dtype=torch.bool)
+        reached, there = torch.zeros_like(y[:, :1], dtype=torch.bool), torch.zeros_like(y, dtype=torch.bool)
         if self.limited:
-            y, outputs, reached = self.limits(known, y, outputs)
+            y, outputs, there, reached = self.limits(known, y, outputs)
         held = torch.zeros_like(reached)
-        if self.bounded:
-            held = ((y <= self.low) | (y >= self.high)).any(dim=1, keepdim=True)
+        if self.bounded:  # A limit that lies beyond a bound is a limit.
+            held = (((y <= self.low) | (y >= self.high)) & ~there).any(dim=1, keepdim=True)
         following = torch.cat([scaled, y, state], dim=1).index_select(1, self.state_columns)
         return outputs, following, held, reached
 
@@ -209,12 +213,12 @@ class StateSpaceStep(nn.Module):
             total = torch.abs(total)
         y = torch.clamp(total, self.low, self.high)
         outputs = y * self.output_scale + self.output_offset
-        reached = torch.zeros_like(y[:, :1], dtype=torch.bool)
+        reached, there = torch.zeros_like(y[:, :1], dtype=torch.bool), torch.zeros_like(y, dtype=torch.bool)
         if self.limited:
-            y, outputs, reached = self.limits(known, y, outputs)
+            y, outputs, there, reached = self.limits(known, y, outputs)
         held = torch.zeros_like(reached)
-        if self.bounded:
-            held = ((y <= self.low) | (y >= self.high)).any(dim=1, keepdim=True)
+        if self.bounded:  # A limit that lies beyond a bound is a limit.
+            held = (((y <= self.low) | (y >= self.high)) & ~there).any(dim=1, keepdim=True)
         change = torch.addmm(self.drift, x, self.change)
         change = change + self.neuron(torch.addmm(self.state_bias, x, self.state_weights)) @ self.state_readout
         return outputs, torch.clamp(state + change, -self.bound, self.bound), held, reached

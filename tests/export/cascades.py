@@ -169,7 +169,7 @@ def build_equations() -> Cascade:
             wired_narx("Q -> BC", structure, 3),
         ),
         rest={"BP": "STP", "AR": 30.0, "Q": 25.0},
-        limits={"AR": Limit(low=12.0, high="TOP"), "Q": Limit(low=30.0, high="STP")},
+        limits={"AR": Limit(low=12.0, high="TOP"), "Q": Limit(low=12.0, high="STP")},
     )  # fmt: skip
 
 

@@ -145,7 +145,10 @@ def test_models_wired_run_as_one(wired, opened, inputs, tmp_path):
     assert run.output.shape == (200, 3, len(surrogate.outputs))
     lost = u[:20].copy()
     lost[5, 0, 0], lost[5, 1, -1], lost[5, 2, 0] = np.nan, np.inf, -np.inf
-    for fed, found in ((u, run), (lost, exported.run(lost, states))):
+    # Far beyond what they know: each is held at a bound, or at a limit that lies beyond its bound.
+    far = u[:40].copy()
+    far[10:12], far[20:22, :, 0], far[30:32, :, -1] = 200.0, 1e4, -50.0
+    for fed, found in ((u, run), (lost, exported.run(lost, states)), (far, exported.run(far, states))):
         for i in range(3):
             expected = surrogate.simulate(fed[:, i])
             assert largest_difference(found.output[:, i], expected) <= row.tolerance
