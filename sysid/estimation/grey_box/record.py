@@ -78,6 +78,18 @@ class Record:
         roots[: self.n_first] = 0.0
         return replace(self, roots=roots, shows=self.known[: self.n_first])
 
+    def first(self, samples: int) -> Record:
+        """The same record as far as some of its samples.
+
+        Args:
+            samples: How many.
+
+        Returns:
+            The record.
+        """
+        roots = None if self.roots is None else self.roots[:samples]
+        return replace(self, u=self.u[:samples], output=self.output[:samples], roots=roots)
+
     @property
     def known(self) -> NDArray[np.bool_]:
         """Which samples count, in all outputs."""

@@ -1,4 +1,4 @@
-"""Starts of a grey box that begin by multiple shooting: from windows that stand apart to one free run."""
+"""Starts of a grey box that begin by multiple shooting, from windows to one free run; or by a growing part."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.shooting import Shooting
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.named import FLAT_ALPHA, Named
@@ -34,7 +35,13 @@ ITERATIONS, TOLERANCE, PATIENCE = 40, 1e-2, 4
 """Of each: iterations at most; and the relative improvement over some of them below which the next one begins."""
 
 
-AUTO, SINGLE, MULTIPLE = "auto", "single", "multiple"
+GROWING = (0.125, 0.25, 0.5)
+"""Shares of each record that are run one after another, from its beginning, where the run grows."""
+FEWEST = 20
+"""Samples of a record that are run at least."""
+
+
+AUTO, SINGLE, MULTIPLE, GROW = "auto", "single", "multiple", "growing"
 
 
 def may_shoot(training: Training, template: EquationModel, begins: Sequence[Begun]) -> bool:
@@ -85,6 +92,9 @@ def shooting_terms(way: str, provider: EquationProvider) -> dict[str, Any]:
     if way == SINGLE:
         return {}
 
+    if way == GROW:
+        return {"prepared": grown}
+
     def prepared(multistart: Multistart, number: int, theta: Array) -> Array:
         return shot(multistart, number, theta) if way == MULTIPLE or number == 1 else theta
 
@@ -127,11 +137,9 @@ def with_way(found: FitResult, chosen: Candidate, way: str, begun: Training, ask
     if way == SINGLE or not found.status.usable:
         return found
     declared = chosen.number < (2 if way == AUTO else 1)
-    multiple = way == MULTIPLE or chosen.number == 1
-    note = (
-        f"The minimum was found by {MULTIPLE if multiple else SINGLE} shooting from "
-        f"{'the declared start' if declared else f'start {chosen.number + 1}'}"
-    )
+    multiple = way == MULTIPLE or (way == AUTO and chosen.number == 1)
+    how = "a growing part of each record" if way == GROW else f"{MULTIPLE if multiple else SINGLE} shooting"
+    note = f"The minimum was found by {how} from {'the declared start' if declared else f'start {chosen.number + 1}'}"
     if begun.n_starts < asked.n_starts:
         note += f", and what it leaves is white: {begun.n_starts} of {asked.n_starts} starts were needed"
     return replace(found, notes=(*found.notes, f"{note}."))
@@ -158,8 +166,10 @@ def shot(multistart: Multistart, number: int, theta: Array) -> Array:
             if not np.isfinite(windows.loss(trained)):
                 return theta
             name = f"{multistart.name}start {number + 1}, windows {weight:g}"
-            prior = _prior(windows, trained, layout.named)
-            solution = multistart.checkpoints.minimise(name, _engine(multistart, number, name), windows, trained, prior)
+            prior = _prior(windows, trained, layout.named, windows.begun, windows.logs)
+            said = f"multiple shooting, {weight:g} of {WEIGHTS[-1]:g}"
+            engine = _engine(multistart, number, name, len(WEIGHTS), said)
+            solution = multistart.checkpoints.minimise(name, engine, windows, trained, prior)
             trained = solution.theta
             if multistart.stop.is_set():
                 break
@@ -167,33 +177,68 @@ def shot(multistart: Multistart, number: int, theta: Array) -> Array:
     return found if np.isfinite(whole.loss(found)) else theta
 
 
-def _prior(windows: Shooting, trained: Array, named: tuple[Named, ...]) -> Prior:
+def grown(multistart: Multistart, number: int, theta: Array) -> Array:
+    """A start after the free run over a growing part of each record.
+
+    What sticks and slips, or swings by itself, is right over a short run before it is over a long one: over all of a
+    record at once the error has a minimum wherever another number of slips falls together with the record's.
+
+    Args:
+        multistart: As for :func:`shot`.
+        number: Which start.
+        theta: Where it begins.
+
+    Returns:
+        What is trained; as it began where the free run of what was found is none.
+    """
+    whole, layout = multistart.provider, multistart.layout
+    assert isinstance(whole, EquationProvider)  # noqa: S101 - made for them
+    assert isinstance(layout, EquationLayout)  # noqa: S101 - likewise
+    trained, straight = theta, np.zeros(len(theta), dtype=bool)
+    with one_blas_thread():
+        for share in GROWING:
+            part = replace(
+                whole, records=tuple(one.first(max(FEWEST, round(share * len(one.output)))) for one in whole.records)
+            )
+            if not np.isfinite(part.loss(trained)):
+                return theta
+            name = f"{multistart.name}start {number + 1}, the first {share:.3g}"
+            prior = _prior(part, trained, layout.named, theta, straight)
+            engine = _engine(multistart, number, name, len(GROWING), f"the first {share:.0%} of each record")
+            trained = multistart.checkpoints.minimise(name, engine, part, trained, prior).theta
+            if multistart.stop.is_set():
+                break
+    return trained if np.isfinite(whole.loss(trained)) else theta
+
+
+def _prior(
+    residuals: AbstractProvider, trained: Array, named: tuple[Named, ...], begun: Array, logs: NDArray[np.bool_]
+) -> Prior:  # fmt: skip
     """What is declared of parameters, and of the rest nothing; the noise as large as what is left."""
     known = [one for one in named if one.parameter.prior is not None]
     places = np.array([one.place for one in known], dtype=np.int64)
     centre, alphas, groups = trained.copy(), [FLAT_ALPHA], list[Group]()
-    centre[: len(windows.begun)] = windows.begun
+    centre[: len(begun)] = begun
     others = np.setdiff1d(np.arange(len(trained)), places)
     groups.append(Group(name="all", members=others, known=True))
     for one in known:
         parameter = one.parameter
         assert parameter.prior is not None  # noqa: S101 - chosen by it
-        size = parameter.start if windows.logs[one.place] else parameter.scale
+        size = parameter.start if logs[one.place] else parameter.scale
         groups.append(Group(name=one.name, members=np.array([one.place]), known=True))
         alphas.append((size / parameter.prior) ** 2)
-    least = np.finfo(np.float64).tiny * windows.n_samples
-    beta = 0.5 * windows.n_samples / max(windows.loss(trained), least)
+    least = np.finfo(np.float64).tiny * residuals.n_samples
+    beta = 0.5 * residuals.n_samples / max(residuals.loss(trained), least)
     return Prior(centre=centre, groups=tuple(groups), alphas=np.array(alphas), beta=beta)
 
 
-def _engine(multistart: Multistart, number: int, name: str) -> LevenbergMarquardt:
+def _engine(multistart: Multistart, number: int, name: str, stages: int, said: str) -> LevenbergMarquardt:
     training = multistart.training
-    seconds = PRETRAINED * training.max_time_s / training.n_starts / len(WEIGHTS)
+    seconds = PRETRAINED * training.max_time_s / training.n_starts / stages
     limits = Termination(
         max_iterations=ITERATIONS,
         max_time_s=min(seconds, multistart.left(name)),
         tolerance=TOLERANCE,
         patience=PATIENCE,
     )
-    said = f"multiple shooting, {name.rsplit(' ', 1)[-1]} of {WEIGHTS[-1]:g}"
     return replace(multistart.engine(number, limits, stage=lambda _: said), evidence_after=None)

@@ -15,7 +15,7 @@ CHOICES = {
     "choose_by": ("selection", "evidence"),
     "damping": tuple(DAMPINGS),
     "basis": ("incremental", "plain"),
-    "shooting": ("auto", "single", "multiple"),
+    "shooting": ("auto", "single", "multiple", "growing"),
 }
 """Options that are words, and what they may be; the first is a good example."""
 
@@ -105,7 +105,8 @@ class Training(TypedFields):
         shooting: How starts of a grey box begin: ``single`` by the free run of whole records, ``multiple`` by that of
             short windows which are drawn together (``shooting.py``), which finds the minimum from parameters that are
             further off. ``auto`` looks at the declared start by single shooting first, begins no other where it comes
-            down to the noise, and takes it by multiple shooting next.
+            down to the noise, and takes it by multiple shooting next. ``growing`` runs a growing part of each record:
+            what sticks and slips, or swings by itself, counts its cycles wrongly over all at once.
     """
 
     loop: Loop = Loop.CLOSED

@@ -40,6 +40,8 @@ BLOCK_LATE = 3
 """Samples of dead time that a filter of few states may look like."""
 CORNERS = (4, 8, 12)
 """Of a curve between two blocks whose corners are round, the least first."""
+FROM_THERE = {"starts": 1, "shooting": "growing", "max_iterations": 100}
+"""Training of equations whose numbers to begin with were found in the record."""
 ONE_STEP = {"pretraining": 2000, "pretraining_iterations": 100}
 """Training that begins one step ahead, at a small part of its price."""
 REGULARISATIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0)
@@ -76,6 +78,7 @@ class Family:
         at_ends: What of it is tried before all else where outputs stand at ends: what is held there.
         adds_up: What of it is tried before all else where outputs add up what inputs bring.
         at_events: What of it is tried before all else where outputs jump at events.
+        held: What of it is tried, one by one, before networks where something is known to hold an output.
     """
 
     kind: str
@@ -89,6 +92,7 @@ class Family:
     at_ends: Callable[[Looked], Sequence[Try]] = lambda _: ()
     adds_up: Callable[[Looked], Sequence[Try]] = lambda _: ()
     at_events: Callable[[Looked], Sequence[Try]] = lambda _: ()
+    held: Callable[[Looked], Sequence[Try]] = lambda _: ()
 
 
 def _arx(looked: Looked) -> list[Try]:
@@ -352,6 +356,7 @@ FAMILIES = (
         linear=False,
         first=lambda _: [],
         at_events=lambda looked: [] if looked.resets is None else [Try(structure=looked.resets)],
+        held=lambda looked: [Try(structure=one, training=FROM_THERE) for one in looked.mechanism],
     ),
     Family(kind=HammersteinWiener.kind, linear=False, first=_blocks, around=_around_blocks),
     Family(kind=PolynomialNARX.kind, linear=False, first=_polynomials),

@@ -18,6 +18,7 @@ from sysid.reporting.advice_record import AdviceRecord
 from sysid.reporting.advice_words import lines
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.jumps import jumps_of
+from sysid.workbench.auto.mechanisms import mechanism_of
 from sysid.workbench.auto.parts import ends_held_out
 from sysid.workbench.fits.data import Data
 
@@ -48,6 +49,7 @@ class Looked:
             remembers one sample, or learns where it begins, is tried first.
         states: Of the best linear state space, once linear models were tried; 0 before.
         resets: Where outputs jump and are linear between, the equations of that: then it is tried before all else.
+        mechanism: Where something holds an output, equations of that, the likeliest first: they are tried next.
         seen_from: Samples after which an input is seen to act first, in a response that takes no drift for its own.
     """
 
@@ -64,6 +66,7 @@ class Looked:
     states: int = 0
     seen_from: int | None = None
     resets: VectorGreyBox | None = None
+    mechanism: tuple[VectorGreyBox, ...] = ()
 
     @property
     def lags(self) -> int:
@@ -94,6 +97,8 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
     integrators = sum(any(finding.code == INTEGRATES for finding in one.findings) for one in advice)
     # A line that adds up would not explain a stop: what stands at its least was left there.
     ends = {} if integrators else at_ends(data.estimation, mapping)
+    at_rest = start.kind is StartKind.REST
+    held = mechanism_of(data.estimation, mapping) if at_rest else None
     return Looked(
         n_inputs=len(mapping.inputs),
         n_outputs=len(mapping.outputs),
@@ -109,7 +114,8 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
             default=None,
         ),
         in_motion=start.kind in {StartKind.REST, StartKind.FIRST_SAMPLE} and bool(in_motion(data.estimation, mapping)),
-        resets=resets_of(data.estimation, mapping) if start.kind is StartKind.REST else None,
+        resets=resets_of(data.estimation, mapping) if at_rest else None,
+        mechanism=() if held is None else held.structures,
     )
 
 

@@ -45,6 +45,10 @@ MET = "what is linear between its events stays within the tolerance on every tra
 """Why a search ends that has found a model of events."""
 
 
+HELD = "equations of what holds an output stay within the tolerance on every trace that chooses"
+"""The same of a model of friction."""
+
+
 TAPS = 10
 """Past values of each input of a model that is taken for want of time."""
 
@@ -150,6 +154,11 @@ class Plan:
         return min((self._rank(trial)[0] for trial in self.trials), default=math.inf)
 
     @property
+    def _is_met(self) -> bool:
+        """Whether something stays within the tolerance on all that chooses."""
+        return self.tolerance is not None and self._least_outside() == 0.0
+
+    @property
     def points(self) -> Mapping[int, Point]:
         """What was tried, by number."""
         return self._points
@@ -199,21 +208,23 @@ class Plan:
     def _whatever_the_time(self) -> Iterator[list[Try]]:
         """Where nothing usable has come in the time, the least structures one by one, until one is.
 
-        Equations of events are no work at all. In motion what begins at rest comes to nothing: one network that learns
-        where it begins is tried. Of linear structures the second has no past outputs: it is stable whatever the
-        record, and fitted in no time.
+        Equations of events are no work at all, those of what holds an output little. In motion what begins at rest
+        comes to nothing: one network that learns where it begins is tried. Of linear structures the second has no past
+        outputs: it is stable whatever the record, and fitted in no time.
         """
         m, least = self.looked.n_inputs, self._least(linear=True)
         stable = Try(structure=ARX(na=0, nb=(TAPS,) * m, nk=(0,) * m))
         nonlinear = [family for family in self.families if not family.linear]
         events = [one for family in nonlinear for one in family.at_events(self.looked)]
         moving = [one for family in nonlinear for one in family.in_motion(self.looked) if self.looked.in_motion]
-        for one in (*events, *moving[:1], *least[:1], stable, *least[1:]):
+        held = [one for family in nonlinear for one in family.held(self.looked)][:1]
+        for one in (*events, *held, *moving[:1], *least[:1], stable, *least[1:]):
             if math.isfinite(self.least()):
                 return
             if self._possible(one) and all(one.structure != tried.structure for tried in self._tries):
                 self.budget.forced, self.hurried = True, one not in events
                 yield [one]
+                self.hurried &= one not in held or not self._is_met
 
     def _finals(self) -> Iterator[list[Try]]:
         """The best nonlinear models once more, from other starts."""
@@ -249,8 +260,15 @@ class Plan:
         if self.looked.resets is not None:
             self.budget.unlimited = 1
             yield from self._rounds_of([one for family in nonlinear_first for one in family.at_events(self.looked)])
-            if self.tolerance is not None and self._least_outside() == 0.0:
+            if self._is_met:
                 self.ended = MET
+                return
+        # What sticks and slips is as little smooth: its equations have few numbers, and are trained in no time.
+        for one in (one for family in nonlinear_first for one in family.held(self.looked)):
+            self.budget.unlimited = 1
+            yield from self._rounds_of([one])
+            if self._is_met:
+                self.ended = HELD
                 return
         # Whatever else adds up drifts, and is close to what was held out by luck.
         if self.looked.integrators:

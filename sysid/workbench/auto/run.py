@@ -327,7 +327,7 @@ class _AutoSteps:
                 options["max_iterations"] = min(
                     FURTHER["max_iterations"], max(1, round(share * self.config.iterations))
                 )
-        elif found.parts.partial and "starts" in options and "ensemble" not in options:
+        elif found.parts.partial and "starts" in {*options} - {*found.shown[name].values} and "ensemble" not in options:
             options |= LAST
         if "max_time_s" in options and 0.0 < seconds < math.inf:
             options["max_time_s"] = round(seconds / len(found.fits[name]), 3)

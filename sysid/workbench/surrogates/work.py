@@ -32,6 +32,7 @@ from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.finish import drawn_in, finish_s, page_s, slowness, span
 from sysid.workbench.auto.jumps import jumps_told
 from sysid.workbench.auto.look import resets_of, span_of
+from sysid.workbench.auto.mechanisms import mechanism_of
 from sysid.workbench.auto.run import Searched, auto_of
 from sysid.workbench.auto.run import program_of as search_program
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
@@ -160,7 +161,8 @@ class Work:
 
     def _jumps(self, traces: Sequence[Trace]) -> list[str]:
         understood = resets_of(traces, self.mapping) is not None
-        return jumps_told(traces, self.mapping, understood=understood)
+        held = mechanism_of(traces, self.mapping)
+        return [*jumps_told(traces, self.mapping, understood=understood), *([] if held is None else [held.told])]
 
     def seconds_left(self, plan: Times) -> float:
         """The time of the search, or of the fits that are asked for."""

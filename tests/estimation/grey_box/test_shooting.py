@@ -128,6 +128,21 @@ def test_parameters_far_off_are_found_by_multiple_shooting_and_it_is_told() -> N
     assert alone.history["mse"][-1] == pytest.approx(found.history["mse"][-1], rel=1e-6)
 
 
+def test_a_growing_part_of_each_record_finds_them_too_and_a_short_record_is_run_whole() -> None:
+    single, found = (fitted(FAR, shooting=way, starts=1) for way in ("single", "growing"))
+    assert single.history["mse"][-1] > 100.0 * found.history["mse"][-1]
+    assert isinstance(found.model, GreyBoxModel)
+    assert dict(zip(("m", "w", "b"), found.model.theta, strict=True)) == pytest.approx(TRUE, rel=0.05)
+    assert any("found by a growing part of each record from the declared start" in note for note in found.notes)
+    record = prepared([a_trace()], a_box(TRUE))[0].records[0]
+    assert [len(record.first(n).output) for n in (20, 1000)] == [20, 240]
+    short = fit_grey_box(
+        [a_trace(15)], MAPPING, a_box(TRUE), sysid.Training(shooting="growing", starts=1, max_iterations=5),
+        start=ESTIMATED,
+    )  # fmt: skip
+    assert np.isfinite(short.history["mse"][-1])
+
+
 def test_no_other_start_is_begun_where_the_first_comes_down_to_the_noise() -> None:
     found = fitted({"m": 1.2, "w": 1.2, "b": 1.0})
     assert {one.start for one in found.attempts} == {1}

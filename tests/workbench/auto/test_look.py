@@ -12,6 +12,7 @@ from sysid.models import ARX, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.families import FAMILIES
 from sysid.workbench.auto.look import Looked, at_ends, in_motion, look
+from sysid.workbench.auto.mechanisms import mechanism_of
 from tests.workbench.auto.conftest import data, record
 
 MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
@@ -66,6 +67,28 @@ def test_what_is_linear_between_its_events_is_known_with_its_equations() -> None
     assert "event_0_0 = on_0_0 >= 1" in found.equations
     assert look(known, MAPPING, ESTIMATED).resets is None
     assert look(data(record("a", 200)), MAPPING, Start(kind=StartKind.REST)).resets is None
+
+
+def test_what_dry_friction_holds_is_known_with_its_equations() -> None:
+    runs = []
+    for seed in range(6):
+        speed = place = 0.0
+        u, y = np.append([0.0, 0.0], np.random.default_rng(seed).uniform(-1.0, 1.0, 20)).repeat(10)[:200], []
+        for force in u:
+            free = 0.9 * speed + 0.1 * force
+            speed = np.sign(free) * max(abs(free) - 0.03, 0.0)
+            y.append(place := place + speed)
+        runs.append(replace(record("a", 200), name=f"r{seed}", values=np.column_stack([u, y])))
+    known = data(*runs)
+    found = look(known, MAPPING, Start(kind=StartKind.REST)).mechanism
+    assert len(found) == 3
+    assert all("deadzone(" in one.equations for one in found)
+    held = mechanism_of(runs, MAPPING)
+    assert held is not None
+    assert held.told.startswith("y stands while an input moves on, as what dry friction holds")
+    assert look(known, MAPPING, ESTIMATED).mechanism == ()
+    masked = replace(runs[0], usable=np.arange(200) > 3)
+    assert mechanism_of([masked, *runs[1:]], MAPPING) is None
 
 
 def test_what_asks_to_be_looked_at_is_told_in_words(looked: Looked) -> None:

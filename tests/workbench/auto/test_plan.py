@@ -14,7 +14,7 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import FINAL, Budget, price
 from sysid.workbench.auto.look import Looked
 from sysid.workbench.auto.parts import ENSEMBLE
-from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, FIRST, MET, PATIENCE, Plan
+from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, FIRST, HELD, MET, PATIENCE, Plan
 from sysid.workbench.auto.worth import error, scatter, with_repeats
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import NOT_DONE
@@ -118,9 +118,13 @@ def test_the_least_linear_structures_are_tried_whatever_the_time_until_one_can_b
 def test_in_motion_one_network_is_tried_whatever_the_time_and_equations_of_events_before_it() -> None:
     """On a busy machine a ball, whose equations were found, had a linear model that begins at rest."""
     events = VectorGreyBox(equations="y = where(before >= 1, 0, before + u)\nbefore[k+1] = y", initial={"before": 0})
-    for resets, first, hurried in ((None, "NSS", True), (events, "VectorGreyBox", False)):
+    for found, first, hurried in (
+        ({}, "NSS", True),
+        ({"resets": events}, "VectorGreyBox", False),
+        ({"mechanism": (events,)}, "VectorGreyBox", True),  # which may be far off: its numbers were fitted once
+    ):
         budget = Budget(wall_s=1.0, iterations=None, clock=lambda: 1000.0, is_stored=lambda _: False)
-        looked = replace(LOOKED, in_motion=True, resets=resets)
+        looked = replace(LOOKED, in_motion=True, **found)
         plan = Plan(looked=looked, budget=budget, error=error)
         (point,) = plan.ask()
         assert point.structure.kind.endswith(first)
@@ -487,3 +491,23 @@ def test_equations_of_events_come_first_and_end_the_search_where_they_stay_withi
     plan.tell([trial(first, 1e-6).model_copy(update={"selection_rms_shares": list(shares)})])
     assert bool(plan.ask()) is (max(shares) > 0.01)
     assert (plan.ended == MET) is (max(shares) <= 0.01)
+
+
+@pytest.mark.parametrize(("errors", "tried"), [((0.004,), 1), ((0.04, 0.004), 2), ((0.04, 0.04), 2)])
+def test_equations_of_what_holds_an_output_are_tried_one_by_one_before_networks(
+    errors: tuple[float, ...], tried: int
+) -> None:
+    some = tuple(
+        VectorGreyBox(equations=f"y = deadzone(before + a*u, -{k}, {k})\nbefore[k+1] = y", parameters={"a": 0.1})
+        for k in (1, 2)
+    )
+    budget = Budget(wall_s=None, iterations=10**9, clock=lambda: 0.0, is_stored=lambda _: False)
+    plan = Plan(looked=replace(LOOKED, mechanism=some), budget=budget, error=error, tolerance=0.01, again=0)
+    for share, structure in zip(errors, some, strict=False):
+        (point,) = plan.ask()
+        assert (point.structure, point.training["starts"]) == (structure, 1)
+        plan.tell([trial(point, share**2).model_copy(update={"selection_rms_shares": [share, 0.001]})])
+    more = plan.ask()
+    assert len(plan.points) - len(more) == tried
+    assert (plan.ended == HELD) is (min(errors) <= 0.01)
+    assert bool(more) is (min(errors) > 0.01)
