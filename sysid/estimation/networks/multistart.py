@@ -307,7 +307,7 @@ def advanced(
     Returns:
         The candidate that it becomes; its iterations go on from those before.
     """
-    keep, state = multistart.checkpoints, before.solution.state
+    keep, state, name = multistart.checkpoints, before.solution.state, f"{multistart.name}{name}"
     theta, centre = begun or (state.theta, state.prior.centre)
     with one_blas_thread():
         at = provider.linearise(theta)

@@ -22,12 +22,20 @@ class NeuralProvider(NeuralRecords, AbstractProvider):
 
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
+        if self.stable and not self._dies_away(theta):
+            return np.inf
         total = 0.0
         for record in self._records:
             residual = record.weighted(self._error(record, theta))
             with np.errstate(over="ignore", invalid="ignore"):  # a free run that explodes has no loss
                 total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
+
+    def _dies_away(self, theta: NDArray[np.float64]) -> bool:
+        """Whether the states die away where neurons do nothing."""
+        n = self.template.sizes.states
+        M = theta[self.template.sizes.linear].reshape(n, -1)[:, :n]
+        return bool(np.isfinite(M).all()) and float(np.abs(np.linalg.eigvals(M)).max()) < 1.0
 
     def _error(self, record: NeuralRecord, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """The free run less what was measured, in one array: a long record's is many MB."""

@@ -58,12 +58,15 @@ class NeuralRecords:
         experiments: The records.
         output_weights: Weight of each output's squared residuals, where they do not all count alike.
         from_shown: Records that begin at the state that their first samples show, and not at one of their own.
+        stable: Parameters without which neurons would let the states grow for ever have no loss: what bounded neurons
+            add to a linear part that dies away stays bounded, whatever the inputs and wherever a run begins.
     """
 
     template: NeuralForm
     experiments: tuple[Experiment, ...]
     output_weights: tuple[float, ...] | None = None
     from_shown: frozenset[int] = frozenset()
+    stable: bool = False
     n_samples: int = field(init=False)
     n_parameters: int = field(init=False)
     """Those of the model and of the records' initial states."""

@@ -29,6 +29,7 @@ from sysid.estimation.networks.neural_start import linear_start
 from sysid.estimation.networks.output_weights import reweighted, weighed
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.race import run_race
+from sysid.estimation.networks.thinned import Thinned
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult
@@ -79,6 +80,8 @@ def check_training(training: Training) -> None:
 LINEAR_SHARE, LINEAR_SHARE_GIVEN = 0.3, 0.1
 """Share of a fit's time that its linear start may take; where a fit is given to begin from it is only what weights are
 drawn to."""
+GIVEN = "from a given fit: "
+"""What runs of such a fit are called: where both are parts of one, those of the fit that gave it are others."""
 LEAST_FREE = 0.5
 """Share of a fit's time that its starts have in any case, however long the linear model took that they begin with."""
 
@@ -122,6 +125,17 @@ def fit_neural_state_space(
             for lagged regressors alone.
     """
     rest = first_output(traces, mapping) if rest_output is None else rest_output
+    given: dict[str, Any] = {
+        "mapping": mapping,
+        "network": network,
+        "start": start or Start(),
+        "rest_output": rest,
+        "vet": vet,
+    }
+    given |= {"traces": traces, "selection": selection, "on_progress": on_progress}
+    sparse = None if initial is not None else Thinned.of(given, training or Training())
+    if sparse is not None:
+        return sparse.fit(fit_neural_state_space)
     experiments = experiments_of(traces, mapping, start or Start(), rest)
     template = NeuralStateSpaceModel(
         network=network,
@@ -176,8 +190,20 @@ def fit_vector_neural_state_space(
         ChannelError: If a trace lacks a channel of the mapping.
         ConfigError: As for one output.
     """
-    given = rest_output or {}
-    rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
+    told = rest_output or {}
+    rests = tuple(told[one.output] if one.output in told else first_output(traces, one) for one in mapping.each)
+    named = dict(zip(mapping.outputs, rests, strict=True))
+    given: dict[str, Any] = {
+        "mapping": mapping,
+        "network": network,
+        "start": start or Start(),
+        "rest_output": named,
+        "vet": vet,
+    }
+    given |= {"traces": traces, "selection": selection, "on_progress": on_progress}
+    sparse = None if initial is not None else Thinned.of(given, training or Training())
+    if sparse is not None:
+        return sparse.fit(fit_vector_neural_state_space)
     experiments = experiments_of(traces, mapping, start or Start(), np.array(rests))
     template = VectorNeuralStateSpaceModel(
         network=network,
@@ -234,7 +260,9 @@ def _fit(
     check_training(training)
     training = training.with_starts(max(STARTS, math.ceil(SPARE * training.ensemble) if training.ensemble > 1 else 0))
     experiments, windows = records.experiments, Windows.of(records.experiments, training)
-    provider = NeuralProvider(template=template.recursion, experiments=windows.experiments)
+    provider = NeuralProvider(
+        template=template.recursion, experiments=windows.experiments, stable=bool(training.stable)
+    )
     starts.check_samples(provider)
     share = LINEAR_SHARE if records.initial is None else LINEAR_SHARE_GIVEN
     base = linear_start(provider, until=now() + share * training.max_time_s)
@@ -258,6 +286,7 @@ def _fit(
         checkpoints=checkpoints_of(on_progress),
         # A fit whose linear start took all of its time would be that start alone.
         least=training.ensemble,
+        name="" if records.initial is None else GIVEN,
         until=max(starts.deadline(began, training, on_progress), now() + LEAST_FREE * training.max_time_s),
     )
     candidates = run_race(multistart)

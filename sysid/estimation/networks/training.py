@@ -95,6 +95,12 @@ class Training(TypedFields):
         window: Samples of a window of a long record: starts are raced on eight windows, and what is chosen is trained
             on over all samples (``windows.py``). By default 5,000 where the records have more than 200,000 samples
             together; 0 for never.
+        thin: Starts of a neural state space are raced on every so-manieth sample of low-passed records, and what is
+            chosen is trained on over all of them (``thinned.py``). By default as the band of the inputs allows where
+            the records have more than 20,000 samples together; 1 for never.
+        stable: Whether the linear part of a neural state space has to die away without its neurons: where these are
+            bounded nothing runs away then, whatever drives it. By default where starts are raced on thinned records,
+            as of structures that swing; elsewhere the check of the free run tells (``StabilityOptions``).
         ensemble: Picks that unite candidates of the multistart into one network whose one-step map is the mean of
             theirs (``ensemble.py``), selected on the selection traces; 1 for none. Each member adds its neurons. Of
             hidden states so many starts at most as one model whose free run is the mean of theirs
@@ -127,6 +133,8 @@ class Training(TypedFields):
     pretraining_iterations: int = 300
     stride: int = 1
     window: int | None = None
+    thin: int | None = None
+    stable: bool | None = None
     ensemble: int = 1
     input_subsets: tuple[tuple[str, ...], ...] = ()
     shooting: str = "auto"
@@ -147,6 +155,7 @@ class Training(TypedFields):
             "workers",
             "pretraining_iterations",
             "stride",
+            "thin",
             "ensemble",
         ):
             value = getattr(self, name)

@@ -1,0 +1,105 @@
+"""Records that are sampled much faster than they move: what starts are raced on, and what all samples make of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid.errors import ConfigError
+from sysid.estimation.networks.neural_state_space import fit_neural_state_space
+from sysid.estimation.networks.thinned import LONG, band_allows, thinned
+from sysid.estimation.networks.training import Training
+from sysid.models import NeuralStateSpace, Start
+from sysid.traces import Channel, Role, Trace
+from sysid.validation import case_results
+from tests.estimation.networks.structures import MAPPING, shaken
+
+EVERY = 5
+
+
+def tones(*frequencies: float, n: int = LONG) -> Trace:
+    """Sines of the same size in both channels, in parts of half the sampling rate."""
+    t = np.arange(n)
+    wave = np.sum([np.sin(np.pi * f * t) for f in frequencies], axis=0)
+    channels = (Channel(name="u", unit="N"), Channel(name="y", unit="m/s^2"))
+    return Trace(name="tones", sample_time=0.01, channels=channels, values=np.column_stack([wave, wave]))
+
+
+@pytest.mark.parametrize(
+    ("trace", "every"),
+    [
+        (tones(0.05), 7),  # below 1 / (2.5 * 0.05), for its harmonics
+        (tones(0.05, n=LONG - 1), 1),  # an iteration over few samples is cheap
+        (tones(0.05, 0.3), 1),
+        (tones(0.001), 16),
+    ],
+)
+def test_the_band_of_the_inputs_says_how_many_samples_tell_all(trace: Trace, every: int) -> None:
+    assert band_allows([trace], MAPPING) == every
+
+
+def test_what_jumps_is_not_thinned() -> None:
+    steps = np.repeat(np.random.default_rng(0).choice([-1.0, 1.0], LONG // 100), 100)
+    trace = replace(tones(0.01), values=np.column_stack([steps, np.convolve(steps, np.full(50, 0.02))[:LONG]]))
+    assert band_allows([trace], MAPPING) == 1
+
+
+def test_a_thinned_record_has_what_is_slow_and_nothing_else() -> None:
+    trace = replace(tones(0.04, 0.5), weights=np.ones(LONG))
+    few = thinned(trace, MAPPING, EVERY, held=False)
+    slow = np.sin(np.pi * 0.04 * np.arange(LONG))[::EVERY]
+    assert few.sample_time == pytest.approx(EVERY * trace.sample_time)
+    np.testing.assert_allclose(few["y"][40:-40], slow[40:-40], atol=1e-4)
+    assert few.weights is not None
+    assert len(few.weights) == len(few)
+
+
+def test_samples_beside_masked_ones_are_masked_and_theirs_are_bridged() -> None:
+    values, usable = tones(0.04).values.copy(), np.ones(LONG, dtype=np.bool_)
+    values[1000:1010], usable[1000:1010] = 1e6, False
+    few = thinned(replace(tones(0.04), values=values, usable=usable), MAPPING, EVERY, held=False)
+    assert few.usable is not None
+    assert np.flatnonzero(~few.usable).tolist() == list(range(198, 204))
+    assert np.abs(few.values).max() < 2.0
+
+
+def test_a_channel_that_stood_before_a_record_is_held_there() -> None:
+    values = np.tile(np.concatenate([np.ones(300), 1.0 + 0.1 * np.arange(700)])[:, None], (1, 2))
+    trace = replace(tones(0.04), values=values)
+    np.testing.assert_allclose(thinned(trace, MAPPING, EVERY, held=True)["u"][:40], 1.0, atol=1e-6)
+
+
+def test_a_structure_is_found_from_few_samples_and_is_a_model_of_all() -> None:
+    records = [shaken(seed, force) for seed, force in ((0, 2.0), (1, 6.0))]
+    assert band_allows(records, MAPPING) == 1  # too short for that unasked
+    found = fit_neural_state_space(
+        records,
+        MAPPING,
+        NeuralStateSpace(states=4, neurons=4),
+        Training(starts=1, thin=EVERY, max_iterations=60),
+        start=Start.of({"measured": 40}),
+    )
+    model = found.model
+    assert model.sample_time == records[0].sample_time
+    assert any("every 5th sample" in note for note in found.notes)
+    linear = model.theta[model.recursion.sizes.linear].reshape(4, -1)[:, :4]
+    assert np.abs(np.linalg.eigvals(linear)).max() < 1.0
+    other = shaken(7, 4.0)
+    (case,) = case_results(model, other, Role.TEST, Start.of({"measured": 40}), 1).values()
+    assert case.free_run.mse < 0.02**2 * np.var(other["y"])  # a linear model leaves 0.2
+
+
+def test_a_model_that_sums_up_is_trained_on_all_samples() -> None:
+    record = shaken(0, 2.0, n=1500)
+    structure, training = NeuralStateSpace(states=2, neurons=1, integrators=1), Training(starts=1, max_iterations=2)
+    sparse, whole = (
+        fit_neural_state_space([record], MAPPING, structure, replace(training, thin=thin)) for thin in (EVERY, 1)
+    )
+    np.testing.assert_array_equal(sparse.model.theta, whole.model.theta)
+
+
+def test_a_number_that_thins_nothing_is_refused() -> None:
+    with pytest.raises(ConfigError, match="thin is too small"):
+        Training(thin=0)
