@@ -4,8 +4,8 @@ Parts of a record that are held out are of the same movement as the rest of it. 
 rest before the next, a network may meet every part and be far off where a step follows sooner. Nobody knows what the
 plant would do there, but models from other parts, starts and structures, all of which meet the record, say how well it
 is known: where they differ, most of them are wrong (query by committee: Seung, Opper and Sompolinsky 1992; ambiguity of
-an ensemble: Krogh and Vedelsby 1995). The middle of them is the best guess there is, and how far a model is from it is
-counted to its error when one is chosen.
+an ensemble: Krogh and Vedelsby 1995). The middle of them is the best guess there is, and who stands
+alone is not chosen.
 """
 
 from __future__ import annotations
@@ -25,11 +25,14 @@ from sysid.models import AbstractModel
 from sysid.reporting.sweep_record import Trial
 from sysid.traces import Trace
 
-AS_GOOD, LOOKED_AT = 1.5, 2.0
-"""Times the least error up to which a trial's models have a say in where the middle is, and up to which it is looked
-at."""
-TOLD = 1.5
-"""Times the error of the chosen model from which on that is told: elsewhere 1.8 times of it are then to be expected."""
+AS_GOOD = 1.5
+"""Times the least error up to which a trial's models are looked at: to be in the middle is no merit of one that meets
+the record worse."""
+ALONE = 1.5
+"""Times the distance of all from their middle beyond which a trial's models stand alone. Nearer ones are not told from
+each other: to count every distance like an error chose no better on ten records (``auto_beyond``)."""
+TOLD = 2.0
+"""Times the error of the chosen model from which on that is told."""
 FEWEST = 6
 """Models that have a middle."""
 MOST_TRIALS, COMMANDS = 8, 20
@@ -66,9 +69,21 @@ class Beyond:
             trial: The trial.
 
         Returns:
-            A mean square; of one that was not looked at that of all.
+            A mean square: how far from the middle its models are where they stand alone, and 0 elsewhere.
         """
-        return self.apart.get(trial.number, self.spread)
+        own = self.away(trial)
+        return own if own > ALONE**2 * self.spread else 0.0
+
+    def away(self, trial: Trial) -> float:
+        """How far a trial's models are from the middle of all.
+
+        Args:
+            trial: The trial.
+
+        Returns:
+            A mean square; 0 of one that was not looked at.
+        """
+        return self.apart.get(trial.number, 0.0)
 
     def tells(self, error: float) -> bool:
         """Whether they are further apart than the error of the one that was chosen lets expect.
@@ -103,7 +118,7 @@ class Beyond:
             "Not shown by the record: on other commands, made of pieces of its own inputs in other order, "
             f"{self.models} models that did alike are {shown(apart)} (root mean square, median) from the middle of "
             f"them, {times}. "
-            "Expect an error of that size wherever inputs follow each other in other ways than here. "
+            "An error may be as large wherever inputs follow each other in other ways than here. "
             f"{safer}Record more of these: levels and holding times at random, some shorter than the output takes to "
             "settle."
         )
@@ -132,23 +147,20 @@ def look_beyond(
         How far they are apart.
     """
     least = min(map(error, trials), default=np.inf)
-    near = sorted((t for t in trials if error(t) <= LOOKED_AT**2 * least), key=error)[:MOST_TRIALS]
+    near = sorted((t for t in trials if error(t) <= AS_GOOD**2 * least), key=error)[:MOST_TRIALS]
     found = [(trial, models) for trial in near for models in fitted(trial)]
-    counted = [error(trial) <= AS_GOOD**2 * least for trial, _ in found]
-    if not np.isfinite(least) or sum(counted) < FEWEST or not any(usable_parts(trace, ()) for trace in traces):
+    if not np.isfinite(least) or len(found) < FEWEST or not any(usable_parts(trace, ()) for trace in traces):
         return Beyond()
     count = max(2, min(COMMANDS, MOST_BYTES // (8 * LONGEST * len(sizes) * len(found))))
     runs = np.stack([_run(models, traces, count, seed) for _, models in found])
-    middle = np.median(runs[counted], axis=0)
+    middle = np.median(runs, axis=0)
     away = [float(np.mean((run - middle) ** 2 / np.asarray(sizes))) for run in runs]
     apart = {
         trial.number: median(a for a, (one, _) in zip(away, found, strict=True) if one is trial)
         for trial in near
         if any(one is trial for one, _ in found)
     }
-    return Beyond(
-        models=sum(counted), spread=median(a for a, counts in zip(away, counted, strict=True) if counts), apart=apart
-    )
+    return Beyond(models=len(found), spread=median(away), apart=apart)
 
 
 def _run(models: Models, traces: Sequence[Trace], count: int, seed: int) -> NDArray[np.float64]:

@@ -325,7 +325,7 @@ class Search:
         unit = self.bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
         said = sentence(
             choice, len(plan.trials), again=plan.n_again, raced=raced, unit=unit, ended=plan.ended, error=error,
-            beyond=beyond.of,
+            beyond=beyond.away,
         )  # fmt: skip
         said += told.last_fit(plan, choice.chosen) if united else ""
         linear = choice.linear

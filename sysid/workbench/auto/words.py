@@ -37,8 +37,7 @@ class Choice:
             why it comes before one of less error; empty elsewhere.
         stable: The best stable one, where that was passed over for one whose training goes on.
         alone: Of an ensemble the best trial of its structure without one.
-        nearer: The one of the least error, where it was passed over as it is further from the middle of all on other
-            commands.
+        nearer: The one of the least error, where it was passed over as it stands alone on other commands.
     """
 
     chosen: Trial
@@ -72,8 +71,8 @@ def choose(
         tolerance: As for :func:`~sysid.workbench.auto.plan.ranked_by`.
         goes_on: Whether a trial's training goes on once it is chosen. A network that few iterations have brought far
             ahead of all that is stable is not passed over for what those few iterations have left in it.
-        beyond: How far its models are from the middle of all on other commands, a mean square: it counts like the
-            error.
+        beyond: How far its models are from the middle of all on other commands where they stand alone, a mean square:
+            it counts like the error.
 
     Returns:
         The choice.
@@ -172,7 +171,7 @@ def sentence(
         unit: Of the output.
         ended: Why the search ended.
         error: What chooses.
-        beyond: As for :func:`choose`.
+        beyond: How far a trial's models are from the middle of all on other commands, a mean square.
 
     Returns:
         One sentence, and another where some were passed over.

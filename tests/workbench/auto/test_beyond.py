@@ -53,15 +53,15 @@ def test_models_that_are_one_are_not_apart() -> None:
     assert found.sentence(0.01, str) == ""
 
 
-def test_of_those_that_did_alike_the_one_in_the_middle_is_chosen() -> None:
+def test_of_those_that_did_alike_the_one_that_stands_alone_is_not_chosen() -> None:
     found = looked({1: ALIKE, 2: [0.99, 0.5, 0.98, 0.8]}, TRIALS)
-    assert found.of(TRIALS[0]) < found.of(TRIALS[1])
+    assert found.of(TRIALS[0]) == 0.0 < found.of(TRIALS[1])
     assert choose(TRIALS[::-1], error, lambda some: (some[0], 0)).chosen.number == 1  # the smaller within 3 %
     far = [network(1, 0.110), network(2, 0.100)]
     assert choose(far, error, lambda some: (some[0], 0)).chosen.number == 2
     choice = choose(far, error, lambda some: (some[0], 0), beyond=found.of)
     assert choice.chosen.number == 1
-    said = sentence(choice, 2, unit="V", ended="the end", error=error, beyond=found.of)
+    said = sentence(choice, 2, unit="V", ended="the end", error=error, beyond=found.away)
     assert f"of {shown_in('V', 0.11)} on what chose and {shown_in('V', 0.0)} from the middle of all on other" in said
     assert f"NSS 2/2, of the least error, has {shown_in('V', 0.1)}" in said
 
@@ -80,13 +80,12 @@ def test_what_the_record_does_not_show_is_told_with_its_size() -> None:
     assert "linear model, ARX, which leaves" in found.sentence(found.spread / 9.0, str, ("ARX", 0.9 * found.spread))
 
 
-def test_the_middle_is_that_of_those_that_did_alike() -> None:
-    """A trial of twice the error is looked at, and has no say."""
-    trials = [*TRIALS, network(3, 0.19), network(4, 0.3)]
-    found = looked({1: ALIKE, 2: ALIKE, 3: [0.99] * 20, 4: [0.99]}, trials)
+def test_the_middle_is_that_of_those_that_did_alike_and_no_merit_of_others() -> None:
+    trials = [*TRIALS, network(3, 0.19)]
+    found = looked({1: ALIKE, 2: [0.99] * 4, 3: [0.8] * 20}, trials)
     assert found.models == 8
-    assert found.of(trials[2]) > 0.0
-    assert 4 not in found.apart
+    assert (found.of(trials[2]), found.away(trials[2])) == (0.0, 0.0)
+    assert min(map(found.away, TRIALS)) > 0.0
 
 
 def test_a_run_that_is_lost_is_far_away_and_bounded() -> None:
