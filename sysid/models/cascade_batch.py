@@ -13,20 +13,13 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.kernels import cascade as one_record
 from sysid.kernels import cascade_lanes as kernel
+from sysid.kernels.cascade_layout import Program
 from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage
 from sysid.models.wiring import Wiring
 
 MAX_LANES = 32
 """Records in lockstep at most: their past must stay in the second-level cache."""
-
-MIN_LANES = 20
-"""Records from which lockstep pays (measured: 8 records take 14 ms each, 20 records 7.2, 24 records 5.9; alone 7.1)."""
-
-MOST_NEURONS = 12
-"""Neurons of a member up to which lockstep pays: with more the sums of all lanes no longer stay in registers (measured,
-three members of as many neurons, 50 records of 4,000 samples: with 4 neurons 0.42 ms a record, one by one 0.52; with 12
-as long; with 16 0.68 and 0.57, with 40 1.15 and 0.79; with none, 0.34 and 0.21)."""
 
 
 class Batched(Protocol):
@@ -75,7 +68,7 @@ def simulate_records(
 ) -> CascadeRun:
     """Free runs of one cascade over independent records of equal length.
 
-    Many records of small networks run in lockstep, whose sums are taken in another order: results agree with those of
+    Where that takes less time they run in lockstep, whose sums are taken in another order: results agree with those of
     single runs to rounding, not to the last digit.
 
     Args:
@@ -92,19 +85,68 @@ def simulate_records(
         ChannelError: If a level names a channel that it cannot.
     """
     inputs = cascade.checked(inputs, 3)
-    n, workers = len(inputs), max(1, workers)
-    stage = cascade.stages[0]
-    if len(cascade.stages) > 1 or not isinstance(stage, CompiledStage) or n < MIN_LANES * workers:
+    n, workers, stage = len(inputs), max(1, workers), cascade.stages[0]
+    if (
+        len(cascade.stages) > 1
+        or not isinstance(stage, CompiledStage)
+        or not lockstep_pays(stage.program, n / _groups(n, workers))
+    ):
         return simulate_family([cascade] * n, inputs, rest=rest, workers=workers)
-    if not 0 < stage.program.neurons.max(initial=0) <= MOST_NEURONS:
-        return simulate_family([cascade] * n, inputs, rest=rest, workers=workers)
+    return run_in_lockstep(cascade, stage, inputs, rest, workers)
+
+
+def lockstep_pays(program: Program, records: float) -> bool:
+    """Whether records in lockstep take less time than one by one, by what either was measured to take.
+
+    In lockstep no record waits for itself, and every member's sums are taken for all lanes, whether they have a record
+    or not; one by one, members without neurons are next to nothing, and those that do not read each other run as one.
+    What it chooses is 1 % off the better way on average, and 11 % at most (``python -m tests.benchmarks lockstep``).
+
+    Args:
+        program: The members.
+        records: How many run side by side.
+
+    Returns:
+        Whether they do; never without networks.
+    """
+    x, y, n = np.diff(program.regressor_first), np.diff(program.output_first), program.neurons
+    gated = np.diff(program.theta_first) > n * (x + 1 + y) + y * (x + 1)
+    networks, members, read = int(np.count_nonzero(n)), len(n), int(x.sum())
+    # Times a sample, to a common factor.
+    alone = 60 + 20 * members + 1.7 * read + 85 + 38 * networks + 3.2 * int(x[n > 0].sum()) + 0.7 * int(n.sum())
+    together = 11 + 80 * members + 2.3 * read + 6.7 * int((n * (1 + gated)).sum())
+    return networks > 0 and together * MAX_LANES < alone * records
+
+
+def _groups(n: int, workers: int) -> int:
+    """As many groups of records as a multiple of the workers, so that all end together."""
+    return workers * -(-n // (workers * MAX_LANES))
+
+
+def run_in_lockstep(
+    cascade: Batched,
+    stage: CompiledStage,
+    inputs: NDArray[np.float64],
+    rest: Dict[str, Level] | None,
+    workers: int,
+) -> CascadeRun:
+    """Free runs over independent records, many at a time in the lanes of the vector registers.
+
+    Args:
+        cascade: The cascade.
+        stage: All of its members.
+        inputs: As for :func:`simulate_records`, checked.
+        rest: As there.
+        workers: Threads.
+
+    Returns:
+        As there.
+    """
+    n, groups = len(inputs), _groups(len(inputs), workers)
     values, held = cascade.empty(*inputs.shape[:2])
     values[..., : len(cascade.inputs)] = inputs
     levels = np.stack([cascade.levels(record[0], rest) for record in inputs])
-    # As many groups as a multiple of the workers, so that all end together.
-    groups = workers * -(-n // (workers * MAX_LANES))
     ends = [round(n * i / groups) for i in range(groups + 1)]
-
     acting = one_record.acting(*stage.planned), stage.program.bounds_in_units
 
     def work(group: int) -> None:

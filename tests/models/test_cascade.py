@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from sysid.models import (
     cascade_from_dict,
     simulate_family,
 )
-from sysid.models.cascade_batch import MIN_LANES, MOST_NEURONS
+from sysid.models.cascade_batch import lockstep_pays, run_in_lockstep
 from sysid.models.orthonormal_basis import basis_of, numerators
 from sysid.testing import simulate_cascade
 from sysid.traces import Channel, Trace
@@ -265,56 +266,64 @@ def test_a_model_with_a_state_of_its_own_is_wired_like_any_other():
     assert np.ptp(run["AR"]) > 1.0
 
 
-MANY = 2 * MIN_LANES + 3
-"""Records enough for two threads to run them in lockstep, and no multiple of the lanes."""
+MANY = 43
+"""Records of two groups, and no multiple of the lanes."""
 
 
-def check_records(cascade, inputs, **options):
-    batch = cascade.simulate_batch(inputs, **options)
+def check_records(cascade, inputs, batch):
     assert batch["BC"].shape == inputs.shape[:2]
     for i, one in enumerate(inputs):
         alone = cascade.simulate(one)
         assert_allclose(batch.values[i], alone.values, rtol=0.0, atol=1e-10)
         assert_array_equal(batch.held[i], alone.held)
-    return batch
 
 
-@pytest.mark.parametrize("name", [name for name in CASCADES if name not in {"a linear member", "no neurons"}])
+@pytest.mark.parametrize("name", CASCADES)
 def test_records_in_lockstep_are_the_records_one_by_one(name):
     # Two groups, whose last lanes have no record of their own; several chunks of samples.
     cascade = CASCADES[name]
     inputs = np.stack([command(300, len(cascade.inputs), seed) for seed in range(MANY)])
-    batch = check_records(cascade, inputs)
+    batch = run_in_lockstep(cascade, cascade.stages[0], inputs, None, workers=2)
+    check_records(cascade, inputs, batch)
     if cascade.limits:
         assert np.count_nonzero(batch.held) > 100
 
 
-@pytest.mark.parametrize("n", [1, 5, MIN_LANES])
-def test_few_records_are_the_records_one_by_one(n):
-    check_records(CASCADES["limits"], np.stack([command(seed=seed) for seed in range(n)]), workers=1)
+@pytest.mark.parametrize("n", [1, 5, 20, 43, 64])
+def test_many_records_are_the_records_one_by_one(n):
+    cascade, inputs = CASCADES["limits"], np.stack([command(seed=seed) for seed in range(n)])
+    check_records(cascade, inputs, cascade.simulate_batch(inputs, workers=1))
 
 
-@pytest.mark.parametrize("neurons", [0, MOST_NEURONS + 1])
-def test_many_records_of_networks_for_which_lockstep_does_not_pay_are_run_one_by_one(neurons):
-    cascade = Cascade(models=(network("STP -> BP", neurons=neurons), network("BP -> BC", seed=3, neurons=neurons)))
-    inputs = np.stack([command(seed=seed) for seed in range(MANY)])
-    batch = cascade.simulate_batch(inputs)
-    for i in (0, MANY - 1):
-        assert_array_equal(batch.values[i], cascade.simulate(inputs[i]).values)
+@pytest.mark.parametrize(
+    ("neurons", "members", "records", "pays"),
+    [(0, 3, 32, False), (4, 1, 32, True), (4, 1, 10, False), (8, 3, 25, False), (40, 3, 32, False), (8, 4, 32, False)],
+)
+def test_lockstep_is_for_few_small_networks_whose_records_fill_the_registers(neurons, members, records, pays):
+    """As measured: others run one by one, to the last digit."""
+    chain = pairwise(("STP", "BP", "AR", "ER", "BC")[: members + 1])
+    models = tuple(network(f"{a} -> {b}", neurons=neurons, seed=1) for a, b in chain)
+    cascade = Cascade(models=models)
+    assert lockstep_pays(cascade.stages[0].program, records) is pays
+    if not pays:
+        inputs = np.stack([command(seed=seed) for seed in range(records)])
+        batch = cascade.simulate_batch(inputs, workers=1)
+        assert_array_equal(batch.values[-1], cascade.simulate(inputs[-1]).values)
 
 
 def test_many_records_of_a_model_with_a_state_of_its_own():
     cascade = Cascade(models=(lag("STP -> BP"), network("BP -> BC", seed=3)))
-    check_records(cascade, np.stack([command(seed=seed) for seed in range(MANY)]))
+    inputs = np.stack([command(seed=seed) for seed in range(MANY)])
+    check_records(cascade, inputs, cascade.simulate_batch(inputs))
 
 
 def test_a_value_that_is_not_a_number_stays_in_its_record():
     cascade = service()
     inputs = np.stack([command(seed=seed) for seed in range(MANY)])
     inputs[3, 50:] = np.nan
-    batch = cascade.simulate_batch(inputs)
-    assert np.isnan(batch["BC"][3, 60:]).all()
-    assert np.isfinite(np.delete(batch["BC"], 3, axis=0)).all()
+    for batch in (cascade.simulate_batch(inputs), run_in_lockstep(cascade, cascade.stages[0], inputs, None, workers=2)):
+        assert np.isnan(batch["BC"][3, 60:]).all()
+        assert np.isfinite(np.delete(batch["BC"], 3, axis=0)).all()
 
 
 def test_a_family_has_a_cascade_for_each_record():
