@@ -1,4 +1,5 @@
-"""``make bench``: which benchmarks there are; ``python -m tests.benchmarks training rail`` runs the named ones.
+"""``make bench``: which benchmarks there are; ``python -m tests.benchmarks training rail`` runs the named ones, and
+``--help`` beside a name says what it measures and with which options, in place of hours of it.
 
 ``--publish=REPORT`` writes what they find into ``reports/REPORT`` too, with the data, the commit, the machine and the
 date; what that report holds of other benchmarks stays.
@@ -33,11 +34,12 @@ def main(names: list[str]) -> int:
         print(f"no benchmark named {', '.join(strangers)}; there are {', '.join(known)}")
         return 2
     if not names:
-        for name, file in known.items():
-            print(
-                f"{name:<20} {(ast.get_docstring(ast.parse(file.read_text(encoding='utf-8'))) or '').splitlines()[0]}"
-            )
+        for name in known:
+            print(f"{name:<20} {_docstring(name).splitlines()[0]}")
         print("\nrun one with: python -m tests.benchmarks NAME")
+        return 0
+    if {"-h", "--help"} & set(sys.argv):
+        print("\n\n".join(_docstring(name) for name in names))
         return 0
     for name in names:
         sys.argv = [str(known[name]), *sys.argv[2:]] if len(names) == 1 else [str(known[name])]
@@ -78,9 +80,7 @@ def record(name: str, options: list[str]) -> Benchmark | None:
         if process.returncode != 0:
             return None
         said = [json.loads(line) for line in file.read_text("utf-8").splitlines()] if file.exists() else []
-    title, _, protocol = (ast.get_docstring(ast.parse((HERE / f"{name}.py").read_text("utf-8"))) or name).partition(
-        "\n"
-    )
+    title, _, protocol = _docstring(name).partition("\n")
     return Benchmark(
         title=title.rstrip("."),
         protocol=prose(protocol),
@@ -93,6 +93,10 @@ def record(name: str, options: list[str]) -> Benchmark | None:
         scores=[Score.model_validate(entry["score"]) for entry in said if "score" in entry],
         printed="".join(lines),
     )
+
+
+def _docstring(name: str) -> str:
+    return ast.get_docstring(ast.parse((HERE / f"{name}.py").read_text("utf-8"))) or name
 
 
 def prose(docstring: str) -> str:
@@ -108,4 +112,5 @@ if __name__ == "__main__":
     rest = [option for option in options if not option.startswith("--publish=")]
     if into and rest and len(chosen) > 1:
         sys.exit("options go to one benchmark: name one")
-    sys.exit(publish(into[0], chosen, rest) if into and chosen else main(chosen))
+    asked = bool({"-h", "--help"} & set(rest))
+    sys.exit(publish(into[0], chosen, rest) if into and chosen and not asked else main(chosen))
