@@ -188,6 +188,30 @@ def run_auto(
     return carry_out(done, folder, command=command, fresh=fresh, watchers=watchers)
 
 
+def warned(given: GivenFit, warning: str) -> GivenFit:
+    """A fit with a warning of the search that found it, which then stands wherever those of fits do, its card included.
+
+    Args:
+        given: The fit.
+        warning: The sentence; empty for none.
+
+    Returns:
+        The fit.
+    """
+    if not warning:
+        return given
+
+    def made(fit: FitResult) -> FitResult:
+        return replace(fit, notes=(*fit.notes, warning), warnings=(warning, *fit.warnings))
+
+    bare = given.bare
+    return GivenFit(
+        key=digest(strict({"fit": given.key, "warning": warning})),
+        make=lambda work: made(given.make(work)),
+        bare=None if bare is None else lambda: made(bare()),
+    )
+
+
 def closing(searched: Searched, folder: Path) -> Closing:
     """What is said at the end: the front, the fits by case, why this one, and what to look at.
 
@@ -252,7 +276,8 @@ class _AutoSteps:
                 last = (parts.partial or further) and seconds[fit.name] > 0.0
                 if (parts.partial or further) and not last:
                     told.append(NO_TIME.format(fit.name, model.fit.structure.label))
-                given[model.fit.name] = self._again(model, made, loaded.value, further=further) if last else made
+                fitted = self._again(model, made, loaded.value, further=further) if last else made
+                given[model.fit.name] = warned(fitted, found.warning) if fit.name == FOUND else fitted
         choice = Choice(name=FOUND, chosen_by=found.record.chosen_by)
         work = FitSteps(
             pipeline=pipeline, given=given, chosen=choice, page=self.auto.page, before_page=self.auto.before_page,

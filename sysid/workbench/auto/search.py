@@ -74,6 +74,7 @@ class Found:
         ends_s: Seconds by the clock by which the last fit has to be over; infinite where iterations are counted.
         slowed: Seconds by the clock that a second of training takes.
         told: What a reader has to know.
+        warning: What the record does not show of what was chosen; empty where it shows enough.
         hurried: Of that, that there was no search, as the time was up before structures were compared; empty elsewhere.
         needs_s: Seconds that a search takes at least, where there was no time for one; 0 elsewhere.
         done_now: Trials that this session has done itself.
@@ -88,6 +89,7 @@ class Found:
     ends_s: float
     slowed: float
     told: tuple[str, ...]
+    warning: str
     hurried: str
     needs_s: float
     done_now: int
@@ -282,6 +284,7 @@ class Search:
                 *told.left_out(plan),
                 *(f"Look at the data: {one}" for one in self.looked.cautions),
             ),
+            warning=self._warning(choice, beyond),
             hurried=hurried,
             needs_s=needs_s,
             done_now=trials.done_now,
@@ -317,32 +320,37 @@ class Search:
             self.data.estimation, sizes, seed=self.config.seed,
         )  # fmt: skip
 
+    def _warning(self, choice: Choice, beyond: Beyond) -> str:
+        linear = choice.linear
+        other = None if linear is None or linear is choice.chosen else (linear.label, error(linear))
+        return beyond.sentence(error(choice.chosen), partial(shown_in, self._unit), other)
+
+    @property
+    def _unit(self) -> str:
+        """Of errors: those of several outputs count over their variances, in standard deviations."""
+        outputs = self.config.mapping.outputs
+        return self.bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
+
     def _record(
         self, plan: Plan, choice: Choice, beyond: Beyond, wall_s: float, raced: int, *, united: bool
     ) -> SweepRecord:
-        outputs = self.config.mapping.outputs
-        # Errors of several outputs count over their variances: in standard deviations.
-        unit = self.bench.traces.traces[0].channel(outputs[0]).unit if len(outputs) == 1 else "σ"
         said = sentence(
-            choice, len(plan.trials), again=plan.n_again, raced=raced, unit=unit, ended=plan.ended, error=error,
+            choice, len(plan.trials), again=plan.n_again, raced=raced, unit=self._unit, ended=plan.ended, error=error,
             beyond=beyond.away,
         )  # fmt: skip
         said += told.last_fit(plan, choice.chosen) if united else ""
-        linear = choice.linear
-        other = None if linear is None or linear is choice.chosen else (linear.label, error(linear))
-        beyond_told = beyond.sentence(error(choice.chosen), partial(shown_in, unit), other)
         young = young_told(plan.trials, self._rank, self._n_outputs, len(self.parts.folds))
         return SweepRecord(
             name=self.config.name,
             mapping=str(self.config.mapping),
-            unit=unit,
+            unit=self._unit,
             method="auto",
             loop="closed",
             points=len(plan.trials),
             objectives=list(OBJECTIVES),
             choose_by="free_run_mse",
             choose_on="selection",
-            chosen_by=" ".join(one for one in (said, beyond_told, young, *self.parts.told) if one),
+            chosen_by=" ".join(one for one in (said, young, *self.parts.told) if one),
             workers=self.config.workers,
             wall_s=wall_s,
             winner=choice.chosen.number,

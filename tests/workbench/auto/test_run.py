@@ -24,12 +24,13 @@ from sysid.workbench.auto import run
 from sysid.workbench.auto.budget import Budget
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.refit import ENOUGH, GONE_ON, _error
-from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto
+from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto, warned
 from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
+from sysid.workbench.fits.fit_steps import GivenFit
 from sysid.workbench.runner.events import Event, StepProgress
 from sysid.workbench.sweep.store import Clock, TrialStore
 from sysid.workbench.sweep.trial import Bench
@@ -350,3 +351,16 @@ def test_the_last_fits_end_in_time(
     assert (FOUND in limits) is again
     assert sum(limits.values()) <= max(60.0 - spent, 0.0)
     assert any("No time was left" in one and FOUND in one for one in found.told) is not again
+
+
+def test_what_a_search_warns_of_stands_with_the_fit_however_it_is_given() -> None:
+    """Its notes go into the model card, its warnings into the verdict of the report."""
+    fit = sysid.fit(traces(record("one", 100)), "u -> y", sysid.ARX(na=1, nb=[1], nk=[1])).result
+    given = GivenFit(key="one", make=lambda _: fit, bare=lambda: fit)
+    assert warned(given, "") is given
+    found = warned(given, "Look here.")
+    assert found.key != given.key
+    assert found.bare is not None
+    for one in (found.make(lambda _: None), found.bare()):
+        assert (one.notes[-1], one.warnings[0]) == ("Look here.", "Look here.")
+    assert warned(replace(given, bare=None), "Look here.").bare is None
