@@ -355,7 +355,7 @@ def test_the_last_fits_end_in_time(
 
 def test_what_a_search_warns_of_stands_with_the_fit_however_it_is_given() -> None:
     """Its notes go into the model card, its warnings into the verdict of the report."""
-    fit = sysid.fit(traces(record("one", 100)), "u -> y", sysid.ARX(na=1, nb=[1], nk=[1])).result
+    fit = sysid.fit(traces(record("one", 100)), "u -> y", sysid.ARX(na=1, nb=[1], nk=[1]))
     given = GivenFit(key="one", make=lambda _: fit, bare=lambda: fit)
     assert warned(given, "") is given
     found = warned(given, "Look here.")
