@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -74,12 +74,35 @@ def check(model: type[Model], data: Mapping[str, Any], *, where: object) -> Mode
         ConfigError: Naming the first field at fault, what was expected, what came and, for a
             misspelt field, what was probably meant; further fields at fault are named too.
     """
+    origins = where if isinstance(where, Origins) else Origins(file=where)
     try:
-        return model.model_validate(data)
+        checked = model.model_validate(data)
     except ValidationError as error:
-        origins = where if isinstance(where, Origins) else Origins(file=where)
         found = [{**one, "loc": _in_data(one["loc"], data)} for one in error.errors(include_url=False)]
         raise _config_error(found, model, origins) from None
+    for loc, given in _misread(data, checked, ()):
+        number = isinstance(given, bool)
+        raise ConfigError(
+            f"{path_text(origins.of(loc)[1])} cannot be used as it is", where=origins.place(loc),
+            expected="a number" if number else "true or false", got=given,
+            remedy="write a number" if number else "write true or false",
+        )  # fmt: skip
+    return checked
+
+
+def _misread(data: object, found: object, loc: Loc) -> Iterator[tuple[Loc, object]]:
+    """Where ``true`` became a number, or a number ``true``: pydantic reads one as the other, Python's door neither."""
+    kinds = (bool, int, float)
+    if isinstance(data, kinds) and isinstance(found, kinds):
+        if isinstance(data, bool) != isinstance(found, bool):
+            yield loc, data
+    elif isinstance(data, Mapping) and isinstance(found, Mapping | BaseModel):
+        for name, value in data.items():
+            inner = found.get(name) if isinstance(found, Mapping) else getattr(found, str(name), None)
+            yield from _misread(value, inner, (*loc, name))
+    elif isinstance(data, list | tuple) and isinstance(found, list | tuple) and len(data) == len(found):
+        for number, pair in enumerate(zip(data, found, strict=True)):
+            yield from _misread(*pair, (*loc, number))
 
 
 _FORM = re.compile(r"(str|int|float|bool|none)$|[a-z-]+\[")

@@ -50,6 +50,40 @@ def test_a_field_at_fault_is_named_with_its_path(data: dict[str, object], where:
     assert str(caught.value.remedy).startswith(remedy)
 
 
+class Truths(BaseModel):
+    on: bool = False
+    count: int | None = None
+    share: float = 0.5
+    either: bool | float = 1.0
+    inner: Inner = Inner()
+    listed: tuple[float, ...] = ()
+    named: dict[str, int] = {}
+
+
+@pytest.mark.parametrize(
+    ("data", "field", "expected"),
+    [
+        ({"count": True}, "count", "a number"),
+        ({"share": False}, "share", "a number"),
+        ({"on": 1}, "on", "true or false"),
+        ({"on": 0.0}, "on", "true or false"),
+        ({"inner": {"neurons": True}}, "inner.neurons", "a number"),
+        ({"listed": [0.5, True]}, "listed[1]", "a number"),
+        ({"named": {"a": 1, "b": True}}, "named.b", "a number"),
+    ],
+)
+def test_a_truth_is_no_number_and_a_number_no_truth(data: dict[str, object], field: str, expected: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        check(Truths, data, where="x.yaml")
+    assert caught.value.where == f"x.yaml, field {field}"
+    assert caught.value.expected == expected
+
+
+def test_a_field_that_may_be_either_takes_both() -> None:
+    assert check(Truths, {"either": True, "on": True, "count": 3, "share": 1}, where="x.yaml").either is True
+    assert check(Truths, {"either": 1.0}, where="x.yaml").either == 1.0
+
+
 def test_a_list_of_too_few_is_told_in_words_of_lists() -> None:
     """They had been the words of the library that checks: a tuple, after validation."""
 

@@ -46,7 +46,7 @@ from sysid.estimation.networks.neural_state_space import (
     fit_neural_state_space,
     fit_vector_neural_state_space,
 )
-from sysid.estimation.networks.training import FitProgress, Training, check_shooting
+from sysid.estimation.networks.training import FitProgress, Training, check_lagged
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial
 from sysid.estimation.result import FitResult
@@ -95,7 +95,7 @@ ESTIMATORS: dict[str, Estimator] = {
             structure=NARX,
             name="a NARX network",
             fit=fit_narx,
-            check_training=partial(check_shooting, "a NARX network"),
+            check_training=partial(check_lagged, "a NARX network"),
             initial=check_initial,
             joins=True,
         ),

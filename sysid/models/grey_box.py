@@ -282,7 +282,12 @@ def lowered(
 
 def _tables(given: Any) -> tuple[Table, ...]:
     """Tables from what people write."""
-    pairs = given.items() if isinstance(given, Dict) else given
+    pairs = list(given.items()) if isinstance(given, Dict) else given
+    if not isinstance(pairs, list | tuple) or not all(isinstance(one, list | tuple) and len(one) == 2 for one in pairs):
+        raise ConfigError(
+            "not tables", where="tables", expected="names with points [[x, y], ...]", got=shortened(given),
+            remedy="write for example {valve: [[0, 0], [1, 0.4], [2, 1]]}",
+        )  # fmt: skip
     found: list[Table] = []
     for name, points in pairs:
         rows = (

@@ -59,6 +59,8 @@ EQUATION = "dx/dt = -k*x + u\ny = x"
         ({"initial": {"x": {"start": -1, "low": 0}}}, "x begins outside its bounds"),
         ({"tables": {"f": [[0, 1]]}}, "f is no table"),
         ({"tables": {"f": [[0, 1], [0, 2]]}}, "f is no table"),
+        ({"tables": [1]}, "not tables"),
+        ({"tables": 2}, "not tables"),
         ({"tables": {"f": "no"}}, "f is no table"),
         ({"substeps": 0}, "not a number of steps"),
         ({"substeps": 2.5}, "not a number of steps"),

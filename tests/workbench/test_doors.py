@@ -319,6 +319,48 @@ def test_an_initial_fit_that_cannot_be_is_refused_in_the_same_words(
     assert yaml.value.remedy == python.value.remedy
 
 
+@pytest.mark.parametrize(
+    ("structure", "training", "words"),
+    [
+        (NARX, {"ensemble": 2}, "an ensemble of a single start"),
+        (GREY, {"regularisation": 0.1}, "nothing to regularise"),
+        (POLYNOMIAL_NARX, {"regularisation": 0.1}, "nothing to regularise"),
+        (HW, {"regularisation": 0.1}, "nothing to regularise"),
+        (TF, {"max_delay": 3}, "no dead time is searched"),
+        (SS, {"max_delay": 3}, "no dead time is searched"),
+    ],
+    ids=["ensemble of one", "equations", "polynomial", "blocks", "transfer function", "state space"],
+)
+def test_an_option_that_changes_nothing_is_refused_and_not_ignored(
+    place: Path, structure: dict[str, Any], training: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(ConfigError, match=words) as python:
+        in_python(place, structure, training)
+    with pytest.raises(ConfigError, match=words) as yaml:
+        in_a_pipeline(place, as_request(structure, training))
+    assert yaml.value.remedy == python.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("structure", "training"),
+    [
+        (NARX, {"max_iterations": True}),
+        (NARX, {"tolerance": True}),
+        (NARX, {"seed": True}),
+        (TF, {"stable": 0}),
+        (SS, {"max_time_s": True}),
+        (VECTOR, {"starts": True}),
+    ],
+)
+def test_a_truth_is_no_number_at_any_door(structure: dict[str, Any], training: dict[str, Any]) -> None:
+    """``max_iterations: true`` was one iteration in YAML, and is refused in Python."""
+    with pytest.raises(ConfigError):
+        options_of(structure, training)
+    text = yaml_text({"name": "doors", **SHARED, "fits": [{"name": "one", **as_request(structure, training)}]})
+    with pytest.raises(ConfigError, match="cannot be used as it is"):
+        parse_pipeline(text)
+
+
 def test_an_initial_fit_of_other_channels_is_refused(place: Path) -> None:
     traces = sysid.load(place / "datasets" / "rig" / "dataset.yaml")
     other = sysid.fit(traces, "valve+inlet -> outlet", structure_from_dict(ARX))

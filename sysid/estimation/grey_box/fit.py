@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import ConfigError
 from sysid.estimation.clock import now
 from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.grey_box.by_case import with_cases
@@ -273,6 +274,13 @@ def _prepared(
     windows = Windows.of(experiments, replace(training, window=0) if template.grey.by_case else training)
     ready = ready_for(template, windows.experiments, shoots=may_shoot(training, template, begins))
     starts.check_samples(ready.provider)
+    priors = any(one.parameter.prior is not None for one in ready.named)
+    if training.regularisation and not ready.template.lowered.nets and not priors:
+        raise ConfigError(
+            "there is nothing to regularise", where="regularisation",
+            expected="networks among the equations, or parameters with a prior", got=training.regularisation,
+            remedy="leave regularisation out",
+        )  # fmt: skip
     if not len(ready.theta):  # nothing to estimate, and one start is as good as another
         training = replace(training, starts=1, shooting=SINGLE)
     way = way_of(training, ready.template, begins, runs=ready.runs)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from sysid.errors import ConfigError
 from sysid.estimation.nonparametric.dead_time import AROUND, descend
 
 FEW = 4
@@ -20,6 +21,24 @@ READ_BACKWARDS = (
     "The output answers within the sample: a dead time of 0 leaves clearly less than 1. Where a controller sets the "
     "input from the output of its own sample, this is the controller read backwards: give delays: 1 then."
 )
+
+
+def check_max_delay(most: int | None, *, searched: bool, field: str) -> None:
+    """Refuse a bound of a search that is not made.
+
+    Args:
+        most: Largest dead time that is asked to be tried; ``None`` for the usual.
+        searched: Whether the structure leaves dead times open.
+        field: Of the structure, which says so.
+
+    Raises:
+        ConfigError: If dead times are given, and a largest one to try beside them.
+    """
+    if most is not None and not searched:
+        raise ConfigError(
+            "no dead time is searched for", where="max_delay", expected=f"nothing, beside {field} that are given",
+            got=most, remedy=f"leave max_delay out, or write {field}: auto",
+        )  # fmt: skip
 
 
 def searched_delays(

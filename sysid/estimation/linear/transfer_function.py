@@ -16,7 +16,7 @@ from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.delay_search import without_dead_time
+from sysid.estimation.linear.delay_search import check_max_delay, without_dead_time
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.segments import delayed_inputs, scaling_of
@@ -75,6 +75,7 @@ def fit_transfer_function(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
+        ConfigError: If a largest dead time is asked for and none is searched.
         TraceError: If the orders do not fit the inputs, or there are fewer samples than parameters.
         FitDivergedError: If no start gives a finite free run.
     """
@@ -83,13 +84,15 @@ def fit_transfer_function(
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     whole = experiments_of(traces, mapping, start, rest)
     _check(orders, mapping, whole)
+    training = training or TransferFunctionTraining()
+    check_max_delay(training.max_delay, searched=orders.delays is None, field="delays")
     determined = Determined.of(whole)
     experiments, own = tuple(determined.only(e) for e in whole), determined.narrowed(orders)
     problem = _Problem(
         experiments=experiments,
         scaling=scaling_of(experiments, constant=orders.intercept),
         orders=own,
-        training=training or TransferFunctionTraining(),
+        training=training,
         terms=Terms(
             mapping=replace(mapping, inputs=tuple(mapping.inputs[j] for j in determined.kept)),
             sample_time=traces[0].sample_time,

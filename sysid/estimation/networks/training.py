@@ -257,6 +257,25 @@ def check_shooting(name: str, training: Training) -> None:
         )
 
 
+def check_lagged(name: str, training: Training) -> None:
+    """Refuse what does not apply to a network of lagged regressors.
+
+    Args:
+        name: What is trained, with an article.
+        training: How to train.
+
+    Raises:
+        ConfigError: If it says how to shoot, or asks for an ensemble of a single start.
+    """
+    check_shooting(name, training)
+    if training.ensemble > 1 and training.n_starts < 2:
+        raise ConfigError(
+            "an ensemble of a single start is that start", where="ensemble", expected="starts of 2 or more beside it",
+            got=f"ensemble {training.ensemble} of {training.n_starts} start",
+            remedy=f"write starts: {2 * training.ensemble}, or leave ensemble out",
+        )  # fmt: skip
+
+
 def check_hidden_states(name: str, training: Training, *, unites: bool = False, shoots: bool = False) -> None:
     """Refuse what does not apply to hidden states.
 

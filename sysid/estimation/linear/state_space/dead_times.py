@@ -10,7 +10,7 @@ import numpy as np
 from sysid.errors import TraceError, UserError
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.threads import one_blas_thread
-from sysid.estimation.linear.delay_search import searched_delays
+from sysid.estimation.linear.delay_search import check_max_delay, searched_delays
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.search import quick_size
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
@@ -34,8 +34,10 @@ def behind_dead_times(
         The structure with its dead times, the records with inputs that are as late, and what is to be said of it.
 
     Raises:
+        ConfigError: If a largest dead time is asked for and none is searched.
         TraceError: If no record is longer than the dead times.
     """
+    check_max_delay(training.max_delay, searched=orders.nk == AUTO, field="nk")
     if orders.nk != AUTO:
         return orders, late(segments, orders), ()
     m = segments[0].inputs.shape[1]
