@@ -17,13 +17,13 @@ from typing import Any
 from sysid.errors import ConfigError, shortened
 from sysid.estimation.blocks.fit import STARTS as BLOCK_STARTS
 from sysid.estimation.blocks.fit import check_training as check_block_training
-from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
+from sysid.estimation.blocks.fit import fit_blocks
 from sysid.estimation.blocks.polynomial_narx import check_training as check_polynomial_narx
 from sysid.estimation.blocks.polynomial_narx import fit_polynomial_narx
 from sysid.estimation.estimator import Estimator, Options
 from sysid.estimation.grey_box.fit import STARTS as GREY_STARTS
 from sysid.estimation.grey_box.fit import check_training as check_grey_training
-from sysid.estimation.grey_box.fit import fit_grey_box, fit_vector_grey_box
+from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
@@ -119,29 +119,29 @@ ESTIMATORS: dict[str, Estimator] = {
             _trained(
                 structure=structure,
                 name=name,
-                fit=fit,
+                fit=fit_grey_box,
                 check_training=check_grey_training,
                 begins="a grey box begins at the starts of its parameters",
                 starts=GREY_STARTS,
                 each=True,
             )
-            for structure, name, fit in (
-                (GreyBox, "a grey box", fit_grey_box),
-                (VectorGreyBox, "a grey box of several outputs", fit_vector_grey_box),
+            for structure, name in (
+                (GreyBox, "a grey box"),
+                (VectorGreyBox, "a grey box of several outputs"),
             )
         ),
         *(
             _trained(
                 structure=structure,
                 name=name,
-                fit=fit,
+                fit=fit_blocks,
                 check_training=check_block_training,
                 begins="a block-oriented model begins at the best linear one",
                 starts=BLOCK_STARTS,
             )
-            for structure, name, fit in (
-                (HammersteinWiener, "a Hammerstein-Wiener model", fit_hammerstein_wiener),
-                (WienerHammerstein, "a Wiener-Hammerstein model", fit_wiener_hammerstein),
+            for structure, name in (
+                (HammersteinWiener, "a Hammerstein-Wiener model"),
+                (WienerHammerstein, "a Wiener-Hammerstein model"),
             )
         ),
         _trained(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
+from sysid.estimation.blocks.fit import fit_blocks
 from sysid.estimation.networks.training import Training
 from sysid.models import BuiltModel, HammersteinWiener, History, Mapping, WienerHammerstein
 from sysid.models.curve_values import curve_values
@@ -28,8 +28,7 @@ def a_trace() -> Trace:
 
 
 def a_model(structure: HammersteinWiener | WienerHammerstein) -> BuiltModel:
-    fit = fit_hammerstein_wiener if isinstance(structure, HammersteinWiener) else fit_wiener_hammerstein
-    model = fit([a_trace()], MAPPING, structure, BRIEF).model  # type: ignore[arg-type]
+    model = fit_blocks([a_trace()], MAPPING, structure, BRIEF).model
     assert isinstance(model, BuiltModel)
     return model
 

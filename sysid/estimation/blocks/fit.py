@@ -55,10 +55,10 @@ check_training = partial(check_hidden_states, "a block-oriented model")
 """Refuses options that do not apply to hidden states."""
 
 
-def fit_hammerstein_wiener(
+def fit_blocks(
     traces: Sequence[Trace],
     mapping: Mapping,
-    structure: HammersteinWiener,
+    structure: BlockStructure,
     training: Training | None = None,
     *,
     start: Start | None = None,
@@ -67,7 +67,9 @@ def fit_hammerstein_wiener(
     vet: Callable[[Any], bool] | None = None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> FitResult:
-    """Fit a linear block with curves around it by the least error of the free run.
+    """Fit a linear block with curves around it, or a curve between two linear blocks, by the least free-run error.
+
+    The starts of two blocks are ways to part the best linear model around the curve, the most promising first.
 
     Args:
         traces: Estimation traces; never concatenated.
@@ -89,27 +91,12 @@ def fit_hammerstein_wiener(
         TraceError: If no sample counts, or there is no linear model to start from.
     """
     records = _Records(traces=traces, mapping=mapping, start=start or Start(), rest_output=rest_output)
-    return _fitted(records, structure, training, selection=selection, vet=vet, on_progress=on_progress)
-
-
-def fit_wiener_hammerstein(
-    traces: Sequence[Trace],
-    mapping: Mapping,
-    structure: WienerHammerstein,
-    training: Training | None = None,
-    *,
-    start: Start | None = None,
-    rest_output: float | None = None,
-    selection: Sequence[Trace] = (),
-    vet: Callable[[Any], bool] | None = None,
-    on_progress: Callable[[FitProgress], None] = lambda _: None,
-) -> FitResult:
-    """Fit a curve between two linear blocks; see :func:`fit_hammerstein_wiener`.
-
-    The starts are ways to part the best linear model around the curve, the most promising first.
-    """
-    records = _Records(traces=traces, mapping=mapping, start=start or Start(), rest_output=rest_output)
-    return _fitted(records, structure, training, selection=selection, vet=vet, on_progress=on_progress)
+    race = _Race.of(records, structure, (training or Training()).with_starts(STARTS), began=now())
+    found = fit_equations(
+        *race.template, race.training, (records.traces, selection, records.start),
+        begins=race.begins, scattered=race.scattered, began=race.began, vet=vet, on_progress=on_progress,
+    )  # fmt: skip
+    return with_equations(found)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -272,18 +259,6 @@ class _Race:
         return raced_equations(
             *self.template, self.training, self.data, begins=self.begins, scattered=self.scattered, began=self.began
         )
-
-
-def _fitted(
-    records: _Records, structure: BlockStructure, training: Training | None, *, selection: Sequence[Trace],
-    vet: Callable[[Any], bool] | None, on_progress: Callable[[FitProgress], None],
-) -> FitResult:  # fmt: skip
-    race = _Race.of(records, structure, (training or Training()).with_starts(STARTS), began=now())
-    found = fit_equations(
-        *race.template, race.training, (records.traces, selection, records.start),
-        begins=race.begins, scattered=race.scattered, began=race.began, vet=vet, on_progress=on_progress,
-    )  # fmt: skip
-    return with_equations(found)
 
 
 def _cheaper(training: Training) -> Training:

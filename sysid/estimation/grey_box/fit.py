@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult
 from sysid.models import History, Mapping, Start, beginning
 from sysid.models.built_model import BuiltModel
-from sysid.models.grey_box import GreyBox, VectorGreyBox
+from sysid.models.grey_box import GreyBox
 from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
 
@@ -62,7 +63,7 @@ def fit_grey_box(
     training: Training | None = None,
     *,
     start: Start | None = None,
-    rest_output: float | None = None,
+    rest_output: float | Dict[str, float] | None = None,
     selection: Sequence[Trace] = (),
     vet: Callable[[starts.Network], bool] | None = None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
@@ -70,89 +71,56 @@ def fit_grey_box(
     """Fit the parameters of equations, and the weights of networks in them, by the least error of the free run.
 
     A record whose start is estimated has its own initial state, estimated with the parameters; the others begin at
-    rest, or where the structure says.
+    rest, or where the structure says. Of several outputs each counts over what is left of it.
 
     Args:
         traces: Estimation traces; never concatenated.
-        mapping: Which channels go in, which comes out.
+        mapping: Which channels go in, which come out.
         grey: The equations.
         training: How to train; options for lagged regressors do not apply.
         start: What stands before each trace; at rest by default.
-        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        rest_output: Output at rest in its unit, or by name; the mean of the traces' first samples where not given.
         selection: Traces that choose between starts; without them the evidence chooses.
         vet: Whether a model's free run is stable; the best stable one of the ten best candidates is then chosen.
         on_progress: Called after every iteration, from the threads that train.
 
     Returns:
-        The fit, with the uncertainty of its parameters and the posterior of its output.
+        The fit, with the uncertainty of its parameters and the posterior of its output. Of several outputs its errors
+        are mean squares over them, in scaled numbers.
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
         ConfigError: If the equations do not know a channel of the mapping, or an option does not apply.
         TraceError: If no sample counts, or the equations have no free run at their declared start.
     """
-    rest = first_output(traces, mapping) if rest_output is None else rest_output
-    experiments = experiments_of(traces, mapping, start or Start(), rest)
-    grey.check_mapping(mapping)
-    n = len(mapping.inputs)  # which are read as they are
-    template = GreyBoxModel(
-        **common(traces[0], mapping, grey),
-        scaling=replace(unit_range(experiments), input_offset=(0.0,) * n, input_scale=(1.0,) * n),
-        output_unit=traces[0].channel(mapping.output).unit,
-        rest_output=rest,
+    given = (
+        rest_output if isinstance(rest_output, Dict) else {} if rest_output is None else {mapping.output: rest_output}
     )
-    return fit_equations(
-        template, experiments, training, (traces, selection, start or Start()), vet=vet, on_progress=on_progress
-    )
-
-
-def fit_vector_grey_box(
-    traces: Sequence[Trace],
-    mapping: Mapping,
-    grey: VectorGreyBox,
-    training: Training | None = None,
-    *,
-    start: Start | None = None,
-    rest_output: Dict[str, float] | None = None,
-    selection: Sequence[Trace] = (),
-    vet: Callable[[starts.Network], bool] | None = None,
-    on_progress: Callable[[FitProgress], None] = lambda _: None,
-) -> FitResult:
-    """Fit equations of several outputs, each of which counts over what is left of it; see :func:`fit_grey_box`.
-
-    Args:
-        traces: Estimation traces.
-        mapping: Which channels go in, which come out.
-        grey: The equations.
-        training: How to train.
-        start: What stands before each trace.
-        rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
-        selection: Traces that choose between starts.
-        vet: Whether a model's free run is stable.
-        on_progress: Called after every iteration.
-
-    Returns:
-        The fit. Its errors are mean squares over the outputs, in scaled numbers.
-
-    Raises:
-        ChannelError: As for one output.
-        ConfigError: Likewise.
-        TraceError: Likewise.
-    """
-    given = rest_output or {}
     rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
-    experiments = experiments_of(traces, mapping, start or Start(), np.array(rests))
+    several, begun = grey.several_outputs, start or Start()
+    experiments = experiments_of(traces, mapping, begun, np.array(rests) if several else rests[0])
     grey.check_mapping(mapping)
-    n = len(mapping.inputs)  # which are read as they are
-    template = VectorGreyBoxModel(
-        **common(traces[0], mapping, grey),
-        scaling=replace(unit_ranges(experiments), input_offset=(0.0,) * n, input_scale=(1.0,) * n),
-        output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
-        rest_outputs=rests,
-    )
-    return fit_equations(
-        template, experiments, training, (traces, selection, start or Start()), vet=vet, on_progress=on_progress
-    )
+    units = tuple(traces[0].channel(name).unit for name in mapping.outputs)
+    as_read: dict[str, Any] = {
+        "input_offset": (0.0,) * len(mapping.inputs),
+        "input_scale": (1.0,) * len(mapping.inputs),
+    }
+    template: GreyBoxModel | VectorGreyBoxModel
+    if several:
+        template = VectorGreyBoxModel(
+            **common(traces[0], mapping, grey),
+            scaling=replace(unit_ranges(experiments), **as_read),
+            output_units=units,
+            rest_outputs=rests,
+        )
+    else:
+        template = GreyBoxModel(
+            **common(traces[0], mapping, grey),
+            scaling=replace(unit_range(experiments), **as_read),
+            output_unit=units[0],
+            rest_output=rests[0],
+        )
+    return fit_equations(template, experiments, training, (traces, selection, begun), vet=vet, on_progress=on_progress)
 
 
 def fit_equations(

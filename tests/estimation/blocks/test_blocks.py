@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Status
-from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
+from sysid.estimation.blocks.fit import fit_blocks
 from sysid.estimation.blocks.polynomial_narx import fit_polynomial_narx
 from sysid.estimation.blocks.sections import block_of, responses, sections_of
 from sysid.estimation.blocks.selection import choose_terms, products
@@ -90,14 +90,14 @@ def late(u: np.ndarray) -> np.ndarray:
 )
 def test_blocks_and_curves_are_found(system: Any, structure: dict[str, Any]) -> None:
     u = steps(1)
-    fit = fit_hammerstein_wiener([a_trace(u, system(u))], MAPPING, HammersteinWiener(states=2, **structure), ONE)
+    fit = fit_blocks([a_trace(u, system(u))], MAPPING, HammersteinWiener(states=2, **structure), ONE)
     assert error(fit, system) < 2e-3
 
 
 def test_the_limits_of_a_saturation_have_intervals_that_hold_them() -> None:
     u = steps(1)
     y = saturated(u) + 0.005 * np.random.default_rng(0).standard_normal(len(u))
-    fit = fit_hammerstein_wiener([a_trace(u, y)], MAPPING, HammersteinWiener(states=2, input="saturation"), ONE)
+    fit = fit_blocks([a_trace(u, y)], MAPPING, HammersteinWiener(states=2, input="saturation"), ONE)
     known, middle, half = fit.uncertainty, (u.max() + u.min()) / 2.0, (u.max() - u.min()) / 2.0
     assert known is not None
     places = [known.names.index(name) for name in ("f_low", "f_high")]
@@ -125,9 +125,7 @@ def test_a_curve_that_acts_between_the_samples_is_followed_there() -> None:
     noise = 1e-4 * np.random.default_rng(1).standard_normal(400)
     trace = a_trace(steps(1), circuit(steps(1)) + noise)
     fits = [
-        fit_wiener_hammerstein(
-            [trace], MAPPING, WienerHammerstein(first=1, second=1, curve="piecewise 1", between=between), ONE
-        )
+        fit_blocks([trace], MAPPING, WienerHammerstein(first=1, second=1, curve="piecewise 1", between=between), ONE)
         for between in (0, 2)
     ]
     at_samples, between = (error(fit, circuit) for fit in fits)
@@ -140,7 +138,7 @@ def test_a_rounded_corner_is_as_wide_as_it_was() -> None:
     def system(u: np.ndarray) -> np.ndarray:
         return block(u - 0.12 * (np.logaddexp(0.0, (u - 0.3) / 0.15) - np.logaddexp(0.0, -2.0)))
 
-    fit = fit_hammerstein_wiener(
+    fit = fit_blocks(
         [a_trace(steps(1), system(steps(1)))], MAPPING, HammersteinWiener(states=2, input="rounded 1"), ONE
     )
     assert error(fit, system) < 1e-4
@@ -153,9 +151,7 @@ def test_a_rounded_corner_is_as_wide_as_it_was() -> None:
 def test_poles_are_parted_around_the_curve() -> None:
     u = steps(1)
     structure = WienerHammerstein(first=2, second=1, curve="polynomial 3")
-    fit = fit_wiener_hammerstein(
-        [a_trace(u, sandwich(u))], MAPPING, structure, Training(starts=3, max_iterations=80, workers=1)
-    )
+    fit = fit_blocks([a_trace(u, sandwich(u))], MAPPING, structure, Training(starts=3, max_iterations=80, workers=1))
     assert error(fit, sandwich) < 2e-3
     found = fit.model.parameters  # type: ignore[attr-defined]
     assert [found["g1_a1_1"], found["g1_a1_2"], found["g2_a1_1"]] == pytest.approx([*POLES[1:], 0.5], abs=1e-3)
@@ -165,7 +161,7 @@ def test_a_scale_that_no_record_can_tell_is_no_fault_of_the_record() -> None:
     """How large what lies between two blocks is has no meaning: all gains were told as open, twice as wide as large."""
     y = sandwich(u := steps(5)) + 1e-3 * np.random.default_rng(1).standard_normal(400)
     structure = WienerHammerstein(first=2, second=1, curve="polynomial 3")
-    fit = fit_wiener_hammerstein([a_trace(u, y)], MAPPING, structure, Training(starts=1, max_iterations=60))
+    fit = fit_blocks([a_trace(u, y)], MAPPING, structure, Training(starts=1, max_iterations=60))
     assert not [note for note in fit.notes if "do not tell" in note]
     known = fit.uncertainty
     assert known is not None
@@ -178,7 +174,7 @@ def test_a_scale_that_no_record_can_tell_is_no_fault_of_the_record() -> None:
 def test_a_model_is_stored_and_read_again() -> None:
     u = steps(1)
     structure = HammersteinWiener(states=2, input="network 2")
-    fit = fit_hammerstein_wiener([a_trace(u, saturated(u))], MAPPING, structure, Training(starts=1, max_iterations=2))
+    fit = fit_blocks([a_trace(u, saturated(u))], MAPPING, structure, Training(starts=1, max_iterations=2))
     again = model_from_dict(fit.model.to_dict())
     assert isinstance(again, BuiltModel)
     assert again.structure == structure
@@ -228,7 +224,7 @@ def test_files_of_one_compute_what_it_computes(name: str, tmp_path: Path) -> Non
     brief = Training(starts=1, max_iterations=2)
     blocks = HammersteinWiener(states=2, input="network 2", output="saturation")
     for fit in (
-        fit_hammerstein_wiener([a_trace(u, saturated(u))], MAPPING, blocks, brief),
+        fit_blocks([a_trace(u, saturated(u))], MAPPING, blocks, brief),
         fit_polynomial_narx([a_trace(u, polynomial(u))], MAPPING, PolynomialNARX(degree=2, terms=4), brief),
     ):
         whole = Surrogate.of(fit.model)
@@ -312,7 +308,7 @@ def test_what_the_time_cuts_is_told() -> None:
     fit = fit_polynomial_narx([a_trace(u, y)], MAPPING, rich, Training(max_time_s=1e-3))
     assert "The time ended before all was tried: 1 terms were chosen" in fit.notes[-1]
     assert fit.status is Status.TIME_LIMIT
-    wiener = fit_hammerstein_wiener(
+    wiener = fit_blocks(
         [a_trace(u, y)], MAPPING, HammersteinWiener(states=2, input="polynomial 3"), Training(max_time_s=1e-3)
     )
     assert wiener.status is Status.TIME_LIMIT
@@ -335,7 +331,7 @@ def test_a_plant_that_integrates_behind_a_valve_and_a_lag_is_found() -> None:
     y = tank(u)
     y = y + 0.01 * np.std(y) * np.random.default_rng(0).standard_normal(len(u))
     structure = HammersteinWiener(states=2, input="saturation")
-    fit = fit_hammerstein_wiener([a_trace(u, y)], MAPPING, structure, Training(starts=1, max_iterations=60))
+    fit = fit_blocks([a_trace(u, y)], MAPPING, structure, Training(starts=1, max_iterations=60))
     assert error(fit, tank) < 0.05  # its pole is estimated, and sums up what is wrong with it
     assert fit.status.usable
 
@@ -343,10 +339,10 @@ def test_a_plant_that_integrates_behind_a_valve_and_a_lag_is_found() -> None:
 def test_a_curve_with_more_pieces_than_the_record_shows_is_told_in_one_sentence() -> None:
     u = steps(1)
     y = first_order(u, 0.8, 0.0)
-    fit = fit_wiener_hammerstein([a_trace(u, y)], MAPPING, WienerHammerstein(first=1, second=1), ONE)
+    fit = fit_blocks([a_trace(u, y)], MAPPING, WienerHammerstein(first=1, second=1), ONE)
     (told,) = fit.warnings
     assert "simpler curve" in told
-    plain = fit_hammerstein_wiener([a_trace(u, block(u))], MAPPING, HammersteinWiener(states=2), Training(starts=1))
+    plain = fit_blocks([a_trace(u, block(u))], MAPPING, HammersteinWiener(states=2), Training(starts=1))
     assert plain.warnings == ()
 
 
@@ -354,7 +350,7 @@ def test_a_curve_with_more_pieces_than_the_record_shows_is_told_in_one_sentence(
 def test_a_block_may_integrate_an_input_that_is_off(kind: StartKind, drift: float) -> None:
     u = steps(7)
     y = 5.0 + np.concatenate([[0.0], np.cumsum(0.05 * u + drift)[:-1]])
-    found = fit_hammerstein_wiener(
+    found = fit_blocks(
         [a_trace(u + 3.0, y)], MAPPING, HammersteinWiener(states=1), ONE, start=Start(kind=kind), rest_output=5.0
     )
     run = found.model.simulate(u[4:, None] + 3.0, History(inputs=u[:4, None] + 3.0, output=y[:4]))

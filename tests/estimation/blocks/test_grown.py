@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from scipy.signal import lfilter
 
 from sysid.equations.lowered import Net
 from sysid.estimation.blocks.equations import hammerstein_wiener, wiener_hammerstein
-from sysid.estimation.blocks.fit import fit_hammerstein_wiener, fit_wiener_hammerstein
+from sysid.estimation.blocks.fit import fit_blocks
 from sysid.estimation.blocks.grown import grown, states_of
 from sysid.estimation.blocks.linear_start import LinearStart
 from sysid.estimation.blocks.sections import Pair, block_of
@@ -51,14 +50,10 @@ def steps(rng: np.random.Generator, n: int = 300) -> np.ndarray:
     return u
 
 
-def fit_of(structure: BlockStructure) -> Any:
-    return fit_hammerstein_wiener if isinstance(structure, HammersteinWiener) else fit_wiener_hammerstein
-
-
 def fitted(structure: BlockStructure, u: np.ndarray, y: np.ndarray) -> BuiltModel:
     channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
     trace = Trace(name="record", sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
-    model = fit_of(structure)([trace], Mapping.parse("u -> y"), structure, BRIEF).model
+    model = fit_blocks([trace], Mapping.parse("u -> y"), structure, BRIEF).model
     assert isinstance(model, BuiltModel)
     return model
 

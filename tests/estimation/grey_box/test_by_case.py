@@ -12,7 +12,7 @@ import scipy
 import sysid
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.grey_box.by_case import for_case
-from sysid.estimation.grey_box.fit import fit_equations, fit_grey_box, fit_vector_grey_box
+from sysid.estimation.grey_box.fit import fit_equations, fit_grey_box
 from sysid.estimation.result import FitResult
 from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Start, StartKind
 from sysid.traces import Channel, Role, Trace, TraceSet
@@ -207,7 +207,7 @@ def test_several_outputs_share_the_cases() -> None:
     ]
     grey = GreyBox(equations=f"{EQUATIONS}; z = b*x", parameters=BY_CASE | {"b": 1.0}).for_outputs(2)
     mapping = Mapping.parse("u -> y+z")
-    fit = fit_vector_grey_box(both, mapping, grey, sysid.Training(starts=1), start=ESTIMATED)  # type: ignore[arg-type]
+    fit = fit_grey_box(both, mapping, grey, sysid.Training(starts=1), start=ESTIMATED)  # type: ignore[arg-type]
     assert list(fit.model.by_case["gain"].values()) == pytest.approx(list(TRUE.values()), rel=0.02)  # type: ignore[attr-defined]
     assert fit.model.for_case("run1").simulate(np.ones((9, 1))).shape == (9, 2)  # type: ignore[attr-defined]
 

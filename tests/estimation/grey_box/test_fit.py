@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import sysid
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation.grey_box.fit import fit_grey_box, fit_vector_grey_box
+from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.result import FitResult, Status
 from sysid.models import GreyBox, GreyBoxModel, Mapping, Start, StartKind, VectorGreyBox
 from sysid.traces import Channel, Trace
@@ -224,7 +224,7 @@ def test_several_outputs_share_states_and_parameters_and_count_over_their_noise(
         equations="x[k+1] = a*x + b*u; z[k+1] = c*z + d*x", parameters={"a": 0.5, "b": 0.5, "c": 0.5, "d": 0.1}
     ).for_outputs(2)
     assert isinstance(grey, VectorGreyBox)
-    fit = fit_vector_grey_box([record], Mapping.parse("u -> x+z"), grey, sysid.Training(starts=1), start=ESTIMATED)
+    fit = fit_grey_box([record], Mapping.parse("u -> x+z"), grey, sysid.Training(starts=1), start=ESTIMATED)
     assert fit.uncertainty is not None
     away = np.abs(fit.uncertainty.values - [0.8, 0.4, 0.9, 0.05]) / fit.uncertainty.standard_deviations
     assert (away < 3.5).all()
