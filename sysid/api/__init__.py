@@ -17,42 +17,47 @@ Example:
     ARX [1; 1; 1]              100.00
 """
 
-from sysid.api.comparison import Comparison, compare
-from sysid.api.fits import Fit, SystemFit
-from sysid.api.fitting import fit, load
-from sysid.api.looking import advise, excite, frequency_response, impulse_response
-from sysid.api.orders import OrderSearch, search_orders
-from sysid.api.responses import bode, poles, step
-from sysid.api.saving import read_bundle, save
-from sysid.estimation import (
-    JointTraining,
-    PolynomialTraining,
-    StabilityOptions,
-    StateSpaceTraining,
-    Training,
-    TransferFunctionTraining,
-)
-from sysid.ingest.arrays import data
-from sysid.models import (
-    ARMAX,
-    ARX,
-    BJ,
-    NARX,
-    OE,
-    GreyBox,
-    HammersteinWiener,
-    LinearStateSpace,
-    NeuralStateSpace,
-    PolynomialNARX,
-    Start,
-    TransferFunction,
-    VectorGreyBox,
-    VectorNARX,
-    VectorNeuralStateSpace,
-    VectorStateSpace,
-    WienerHammerstein,
-)
-from sysid.traces import Role
+from typing import TYPE_CHECKING
+
+from sysid.lazy_names import imported_when_asked
+
+if TYPE_CHECKING:
+    from sysid.api.comparison import Comparison, compare
+    from sysid.api.fits import Fit, SystemFit
+    from sysid.api.fitting import fit, load
+    from sysid.api.looking import advise, excite, frequency_response, impulse_response
+    from sysid.api.orders import OrderSearch, search_orders
+    from sysid.api.responses import bode, poles, step
+    from sysid.api.saving import read_bundle, save
+    from sysid.estimation import (
+        JointTraining,
+        PolynomialTraining,
+        StabilityOptions,
+        StateSpaceTraining,
+        Training,
+        TransferFunctionTraining,
+    )
+    from sysid.ingest.arrays import data
+    from sysid.models import (
+        ARMAX,
+        ARX,
+        BJ,
+        NARX,
+        OE,
+        GreyBox,
+        HammersteinWiener,
+        LinearStateSpace,
+        NeuralStateSpace,
+        PolynomialNARX,
+        Start,
+        TransferFunction,
+        VectorGreyBox,
+        VectorNARX,
+        VectorNeuralStateSpace,
+        VectorStateSpace,
+        WienerHammerstein,
+    )
+    from sysid.traces import Role
 
 __all__ = [
     "ARX",
@@ -71,3 +76,68 @@ __all__ += ["HammersteinWiener", "PolynomialNARX", "VectorGreyBox", "VectorNeura
 __all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
 __all__ += ["advise", "bode", "excite", "frequency_response", "impulse_response", "poles", "step"]
 __all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]
+
+_WHERE = {
+    "sysid.api.comparison": (
+        "Comparison",
+        "compare",
+    ),
+    "sysid.api.fits": (
+        "Fit",
+        "SystemFit",
+    ),
+    "sysid.api.fitting": (
+        "fit",
+        "load",
+    ),
+    "sysid.api.looking": (
+        "advise",
+        "excite",
+        "frequency_response",
+        "impulse_response",
+    ),
+    "sysid.api.orders": (
+        "OrderSearch",
+        "search_orders",
+    ),
+    "sysid.api.responses": (
+        "bode",
+        "poles",
+        "step",
+    ),
+    "sysid.api.saving": (
+        "read_bundle",
+        "save",
+    ),
+    "sysid.estimation": (
+        "JointTraining",
+        "PolynomialTraining",
+        "StabilityOptions",
+        "StateSpaceTraining",
+        "Training",
+        "TransferFunctionTraining",
+    ),
+    "sysid.ingest.arrays": ("data",),
+    "sysid.models": (
+        "ARMAX",
+        "ARX",
+        "BJ",
+        "NARX",
+        "OE",
+        "GreyBox",
+        "HammersteinWiener",
+        "LinearStateSpace",
+        "NeuralStateSpace",
+        "PolynomialNARX",
+        "Start",
+        "TransferFunction",
+        "VectorGreyBox",
+        "VectorNARX",
+        "VectorNeuralStateSpace",
+        "VectorStateSpace",
+        "WienerHammerstein",
+    ),
+    "sysid.traces": ("Role",),
+}
+
+__getattr__ = imported_when_asked(_WHERE)

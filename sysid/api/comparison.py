@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sysid.api.given import TracesLike, traces_of
+from sysid.api.given import ESTIMATED, TracesLike, traces_of
 from sysid.api.several import Several
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.export.bundle import Bundle
 from sysid.export.own_figures import side_by_side
 from sysid.extras import need
-from sysid.models import Cascade, Start, StartKind, StartLike
+from sysid.models import Cascade, Start, StartLike
 from sysid.traces import Role, TraceSet
 from sysid.validation import Evaluation, evaluate_cascade, evaluate_outputs
 from sysid.validation.beyond import beyond
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 Compared = FitResult | Several | Bundle
 """What is compared."""
 
-ESTIMATED = Start(kind=StartKind.ESTIMATED)
 """How a free run begins unless told otherwise: its initial state is estimated from the first samples of each record."""
 
 

@@ -13,16 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.api.comparison import compare
 from sysid.api.given import TracesLike, traces_of
-from sysid.api.responses import Bode, Poles, StepResponse, bode, poles, step
-from sysid.api.saving import save
 from sysid.errors import ChannelError, TraceError, shortened
 from sysid.estimation import FitResult
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.grey_box.again import profile_again
-from sysid.estimation.grey_box.by_case import for_case
-from sysid.estimation.grey_box.profile import Profile
 from sysid.ingest.frames import as_array
 from sysid.ingest.run_inputs import inputs_of
 from sysid.ingest.run_records import before_a_run, level_of
@@ -30,14 +24,16 @@ from sysid.models import Cascade, History, Start
 from sysid.models.curve_values import curve_values
 from sysid.models.form import unheeded
 from sysid.traces import Role, TraceSet
-from sysid.validation.residuals import ResidualAnalysis, analyse_residuals
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.figure import Figure
 
+    from sysid.api.responses import Bode, Poles, StepResponse
+    from sysid.estimation.grey_box.profile import Profile
     from sysid.export import Bundle
+    from sysid.validation.residuals import ResidualAnalysis
 
 Initial = float | Dict[str, float] | History | tuple[Any, Any] | None
 """What stands before a run; see :meth:`Fit.simulate`."""
@@ -127,6 +123,8 @@ class Fit(FitResult):
         Raises:
             ConfigError: If no parameter differs by case, or that case was not fitted.
         """
+        from sysid.estimation.grey_box.by_case import for_case
+
         return Fit.of(for_case(self, name), self.traces, self.start)
 
     def profile(self, name: str, *, level: float = 0.95) -> Profile:
@@ -142,6 +140,8 @@ class Fit(FitResult):
         Raises:
             ConfigError: If the fit is none of equations, or has no such parameter.
         """
+        from sysid.estimation.grey_box.again import profile_again
+
         return profile_again(self, self.traces.with_role(Role.ESTIMATION), self.start, name, level)
 
     def residuals(
@@ -158,6 +158,8 @@ class Fit(FitResult):
             Correlations with their bounds, and the Ljung-Box test.
         """
         records = self.traces.with_role(Role.ESTIMATION) if traces is None else traces_of(traces, word="fit").traces
+        from sysid.validation.residuals import analyse_residuals
+
         return analyse_residuals(self.model, records, self.start, free_run=free_run, output=output)
 
     def plot(self, traces: TraceSet | None = None) -> Figure:
@@ -169,18 +171,26 @@ class Fit(FitResult):
         Returns:
             A figure of matplotlib's, to restyle, show or save.
         """
+        from sysid.api.comparison import compare
+
         return compare(traces or self.traces, self, start=self.start).plot()
 
     def step(self, *, seconds: float | None = None) -> StepResponse:
         """Its step responses with their intervals; see :func:`sysid.step`."""
+        from sysid.api.responses import step
+
         return step(self, seconds=seconds)
 
     def bode(self, *, frequency: Any = None) -> Bode:
         """Its Bode diagram with its intervals; see :func:`sysid.bode`."""
+        from sysid.api.responses import bode
+
         return bode(self, frequency=frequency)
 
     def poles(self) -> Poles:
         """Its poles with their intervals; see :func:`sysid.poles`."""
+        from sysid.api.responses import poles
+
         return poles(self)
 
     def plot_curves(self, traces: TraceSet | None = None) -> Figure:
@@ -215,6 +225,8 @@ class Fit(FitResult):
         Returns:
             The bundle.
         """
+        from sysid.api.saving import save
+
         return save(self, traces or self.traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
@@ -244,6 +256,8 @@ class Fit(FitResult):
 
     @cached_property
     def _compared(self) -> Any:
+        from sysid.api.comparison import compare
+
         return compare(self.traces, self, start=self.start)
 
     def _inputs(self, u: Any) -> NDArray[np.float64]:
@@ -360,24 +374,34 @@ class SystemFit:
 
     def step(self, *, seconds: float | None = None) -> StepResponse:
         """The step responses of all outputs with their intervals; see :func:`sysid.step`."""
+        from sysid.api.responses import step
+
         return step(self, seconds=seconds)
 
     def bode(self, *, frequency: Any = None) -> Bode:
         """The Bode diagrams of all outputs with their intervals; see :func:`sysid.bode`."""
+        from sysid.api.responses import bode
+
         return bode(self, frequency=frequency)
 
     def poles(self) -> Poles:
         """The poles of all models with their intervals; see :func:`sysid.poles`."""
+        from sysid.api.responses import poles
+
         return poles(self)
 
     def plot(self, traces: TraceSet | None = None) -> Figure:
         """The free run of each output over its measurement, case by case."""
+        from sysid.api.comparison import compare
+
         return compare(traces or self.traces, self, start=self.start).plot()
 
     def save(
         self, folder: str | Path, traces: TracesLike | None = None, *, formats: tuple[str, ...] | None = None
     ) -> Bundle:
         """Write it as files of several outputs that run elsewhere; see :meth:`Fit.save`."""
+        from sysid.api.saving import save
+
         return save(self, traces or self.traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:

@@ -9,8 +9,10 @@ from typing import Any
 
 from sysid.errors import ConfigError, shortened
 from sysid.estimation import FitResult
-from sysid.models import AbstractStructure, Mapping
+from sysid.models import AbstractStructure, Mapping, Start, StartKind
 from sysid.traces import Role, Trace, TraceSet
+
+ESTIMATED = Start(kind=StartKind.ESTIMATED)
 
 TracesLike = TraceSet | Trace | Sequence[Trace]
 """A data set; or a record or several, all of them for estimation."""

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from sysid.api.comparison import ESTIMATED
 from sysid.api.fits import Fit
-from sysid.api.given import TracesLike, traces_of
+from sysid.api.given import ESTIMATED, TracesLike, traces_of
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, estimators
 from sysid.estimation.least_squares.threads import one_blas_thread

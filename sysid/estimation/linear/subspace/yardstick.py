@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from sysid.estimation.linear.subspace.projections import regress
 from sysid.estimation.linear.subspace.windows import Windows
@@ -73,7 +73,7 @@ class Yardstick:
         more, size = self.n_parameters - n_parameters, np.linalg.slogdet(covariance)[1]
         if more < 1 or not np.isfinite(self.size) or not np.isfinite(size):
             return False
-        return bool(self.n_rows * (size - self.size) <= chdtri(more, CHANCE))
+        return bool(self.n_rows * (size - self.size) <= scipy.special.chdtri(more, CHANCE))
 
 
 def beyond_chance(size: float, than: float, *, n_rows: int, n_parameters: int) -> float:
@@ -89,4 +89,4 @@ def beyond_chance(size: float, than: float, *, n_rows: int, n_parameters: int) -
         What is left of the difference of the logarithms, by the test of the likelihood ratio; the model is clearly
         worse where it is positive.
     """
-    return float(size - than - chdtri(max(n_parameters, 1), CHANCE) / n_rows)
+    return float(size - than - scipy.special.chdtri(max(n_parameters, 1), CHANCE) / n_rows)
