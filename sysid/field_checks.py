@@ -7,14 +7,18 @@ import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from sysid.errors import ConfigError, did_you_mean, shortened
+from sysid.names import slug
 from sysid.yaml_files import line_of
 
 Model = TypeVar("Model", bound=BaseModel)
+_FOLDER = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+FolderName = Annotated[str, Field(pattern=_FOLDER, max_length=100)]
+"""A name that folders are called by, on any file system."""
 Loc = tuple[str | int, ...]
 """Where something stands in plain data: keys and indices."""
 
@@ -157,6 +161,13 @@ def _config_error(found: list[dict[str, Any]], model: type[BaseModel], origins: 
             shortened(first["input"]),
         )
         expected, remedy = _CHANGES.get(first["type"], (expected, remedy))
+        if first["input"] is None:
+            remedy = f"give {loc[-1]} a value" if loc else remedy
+        elif first["type"] == "string_type" and isinstance(first["input"], list | tuple | Mapping):
+            remedy = "write one text, without brackets"
+        elif first.get("ctx", {}).get("pattern") == _FOLDER:
+            expected = "a name of letters, digits, dots, dashes and underscores, that begins with a letter or a digit"
+            remedy = f"write for example {slug(str(first['input']))}"
         if first["type"] in {"too_short", "too_long"}:  # its own words are Python's
             least, most = (first.get("ctx", {}).get(f"{end}_length") for end in ("min", "max"))
             expected = f"at least {_counted(least)}" if most is None else f"at most {_counted(most)}"

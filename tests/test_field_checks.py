@@ -9,7 +9,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
 from sysid.errors import ConfigError
-from sysid.field_checks import Origins, check
+from sysid.field_checks import FolderName, Origins, check
 
 
 class Inner(BaseModel):
@@ -23,6 +23,7 @@ class Outer(BaseModel):
     name: str
     steps: tuple[Inner, ...] = ()
     models: dict[str, Inner | None] = {}
+    folder: FolderName = "a"
     form: Literal["round", "square"] | dict[str, Literal["round", "square"]] = "round"
 
 
@@ -37,6 +38,11 @@ class Few(BaseModel):
         ({"name": "a", "steps": [{}, {"neuronz": 3}]}, "field steps[1].neuronz", "did you mean neurons?"),
         ({"name": "a", "models": {"m": {"delay": 3}}}, "field models.m.delay", "did you mean delays?"),
         ({"name": "a", "models": {"m": {"xyz": 3}}}, "field models.m.xyz", "remove it"),
+        ({"name": None}, "field name", "give name a value"),
+        ({"name": ["a"]}, "field name", "write one text, without brackets"),
+        ({"name": 5}, "field name", "write it in quotes"),
+        ({"name": "a", "folder": "../Tank 1"}, "field folder", "write for example tank-1"),
+        ({"name": "a", "folder": "x" * 101}, "field folder", "correct the value"),
         ({"name": "a", "form": "squar"}, "field form", "did you mean square?"),
         ({"name": "a", "form": {"u": "squar"}}, "field form.u", "did you mean square?"),
         ({"nam": "a"}, "field nam", "did you mean name? (also at fault: name)"),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from sysid.composite import Composite, Member, TrainingPlan
 from sysid.errors import ConfigError
-from sysid.field_checks import FieldError
+from sysid.field_checks import FieldError, FolderName
 from sysid.models import Limit
 from sysid.models.declared import Parameter, parameters_from
 from sysid.workbench.assembly.extending import extending_schema
@@ -99,7 +99,7 @@ class AssemblyConfig(Words):
 
     kind: Literal["assembly"]
     extends: str | None = None
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: FolderName
     description: str = ""
     data: str
     training: str | Annotated[tuple[str, ...], Field(min_length=1)]
@@ -110,7 +110,7 @@ class AssemblyConfig(Words):
     members: tuple[MemberConfig, ...] = Field(min_length=1)
     fixed: tuple[FixedConfig, ...] = ()
     warm_start: str | None = None
-    rest: dict[str, float | str] = Field(default_factory=dict)
+    rest: dict[str, FiniteFloat | str] = Field(default_factory=dict)
     limits: dict[str, LimitConfig] = Field(default_factory=dict)
     stability: ExcursionConfig = ExcursionConfig(choose=False)
     one_step: OneStepConfig | None = None

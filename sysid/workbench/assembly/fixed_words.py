@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, FiniteFloat
 
 from sysid.composite import FixedMember, equation_of, fixed_by_equations
 from sysid.errors import ConfigError
@@ -40,7 +40,7 @@ class FixedEquations(BaseModel):
     equations: str
     instances: Annotated[tuple[str, ...], Field(min_length=1)] = ("",)
     shared: tuple[str, ...] = ()
-    rest: float | dict[str, float] = 0.0
+    rest: FiniteFloat | dict[str, FiniteFloat] = 0.0
     unit: str | dict[str, str] = "1"
     tables: TablesField = Field(default_factory=dict)
     parameters: ParametersField = Field(default_factory=dict)

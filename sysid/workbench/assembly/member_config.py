@@ -6,7 +6,15 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, cast
 
-from pydantic import BaseModel, Field, ValidationInfo, ValidatorFunctionWrapHandler, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    Field,
+    FiniteFloat,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_validator,
+    model_validator,
+)
 
 from sysid.composite import FixedMember, Member
 from sysid.errors import ConfigError
@@ -81,7 +89,7 @@ class MemberConfig(StandingConfig):
     structure: StructureField
     alternatives: tuple[StructureField, ...] = ()
     training: TrainingConfig | None = None
-    rest: float
+    rest: FiniteFloat
     candidates: int = Field(default=1, ge=0)
     sweep: SweepSource | None = None
     traces: int | None = Field(default=None, ge=1)
@@ -158,7 +166,7 @@ class FixedConfig(StandingConfig):
     constant: float = 0.0
     low: float = -math.inf
     high: float = math.inf
-    rest: float
+    rest: FiniteFloat
     unit: str = "1"
 
     @model_validator(mode="after")

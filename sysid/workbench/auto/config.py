@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Field, FiniteFloat, model_validator
 
-from sysid.field_checks import FieldError
+from sysid.field_checks import FieldError, FolderName
 from sysid.models import AbstractStructure, Start, StartKind
 from sysid.workbench.auto.finish import drawn_in
 from sysid.workbench.fields import MappingField, StartField
@@ -47,13 +47,13 @@ class AutoConfig(BaseModel):
     model_config = STRICT
 
     kind: Literal["auto"]
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: FolderName
     description: str = ""
     data: str
     selection: str | None = None
     mapping: MappingField
     start: StartField = Start(kind=StartKind.ESTIMATED)
-    rest: dict[str, float] = Field(default_factory=dict)
+    rest: dict[str, FiniteFloat] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
     minutes: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     iterations: int | None = Field(default=None, ge=1)

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field, model_validator
 
-from sysid.field_checks import FieldError
+from sysid.field_checks import FieldError, FolderName
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import Design
 from sysid.workbench.fits.config import FitConfig
@@ -65,7 +65,7 @@ class ExperimentConfig(BaseModel):
     model_config = STRICT
 
     kind: Literal["experiment"]
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: FolderName
     description: str = ""
     reference: ReferenceConfig
     experiment: Design

@@ -10,6 +10,7 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     Field,
+    FiniteFloat,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     field_validator,
@@ -21,7 +22,7 @@ from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation.estimator import Options
 from sysid.estimation.estimators import check as check_request
 from sysid.estimation.estimators import estimator_of
-from sysid.field_checks import FieldError, check
+from sysid.field_checks import FieldError, FolderName, check
 from sysid.models import Start, StartKind
 from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig
@@ -150,13 +151,13 @@ class PipelineConfig(BaseModel):
     model_config = STRICT
 
     kind: Literal["fits"] = "fits"
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: FolderName
     description: str = ""
     data: str
     selection: str | None = None
     mapping: MappingField
     start: StartField = Start(kind=StartKind.ESTIMATED)
-    rest: dict[str, float] = Field(default_factory=dict)
+    rest: dict[str, FiniteFloat] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
     fits: Annotated[tuple[FitConfig, ...], BeforeValidator(_as_list)] = Field(min_length=1)
     tolerance: float | None = Field(default=None, gt=0.0, lt=1.0)

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from sysid.field_checks import FieldError
+from sysid.field_checks import FieldError, FolderName
 from sysid.workbench.old_words import STRICT
 
 
@@ -85,7 +85,7 @@ class JudgementConfig(BaseModel):
     model_config = STRICT
 
     kind: str
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: FolderName
     description: str = ""
     subjects: tuple[SubjectConfig, ...] = Field(min_length=1)
     options: dict[str, Any] = Field(default_factory=dict)

@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
+from sysid.field_checks import FolderName
 from sysid.workbench.old_words import STRICT
 
 
@@ -22,6 +23,6 @@ class MakingConfig(BaseModel):
     model_config = STRICT
 
     kind: str
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: FolderName
     description: str = ""
     options: dict[str, Any] = Field(default_factory=dict)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, FiniteFloat, field_validator, model_validator
 
 from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation import Training
-from sysid.field_checks import FieldError
+from sysid.field_checks import FieldError, FolderName
 from sysid.models import Start, StartKind
 from sysid.reporting.sweep_record import FIGURES
 from sysid.workbench.fields import MappingField, StartField, as_field_error, with_short_kind
@@ -145,13 +145,13 @@ class SweepConfig(BaseModel):
     model_config = STRICT
 
     kind: Literal["sweep"]
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    name: FolderName
     description: str = ""
     data: str
     selection: str | None = None
     mapping: MappingField
     start: StartField = Start(kind=StartKind.ESTIMATED)
-    rest: dict[str, float] = Field(default_factory=dict)
+    rest: dict[str, FiniteFloat] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
     structure: Annotated[
         tuple[Annotated[dict[str, Any], BeforeValidator(with_short_kind)], ...],

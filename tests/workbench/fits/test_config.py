@@ -108,6 +108,7 @@ MISTAKES = [
     pytest.param("mapping: a+b -> y", "mapping: a+y -> y", ["not a mapping"], id="output among the inputs"),
     pytest.param("{measured: 5}", "tomorrow", ["start a free run", "first-sample"], id="unknown start"),
     pytest.param("{measured: 5}", "{measured: 0}", ["measured samples"], id="no measured samples"),
+    pytest.param("rest: {y: 1.5}", "rest: {y: .nan}", ["field rest.y", "a finite number"], id="rest at no number"),
     pytest.param("rest: {y: 1.5}", "rest: {z: 1.5}", ["rest names z"], id="rest of a stranger"),
     pytest.param(
         "initial: open", "initial: opne", ["not an earlier fit", "did you mean open?"], id="misspelt initial fit"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -143,7 +144,11 @@ def fit_polynomial(
 
 
 def _search(
-    segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining, until: float
+    segments: Sequence[Segment],
+    orders: AbstractPolynomial,
+    training: PolynomialTraining,
+    until: float,
+    known: dict[AbstractPolynomial, Array | None] | None = None,
 ) -> tuple[PredictionErrors, Solution]:
     """Short runs from every start, and a long one from the best; what it contains first, all by the same clock."""
     pieces = [piece for segment in segments for piece in segment.pieces()]
@@ -157,20 +162,24 @@ def _search(
     looked = _looked_at(pieces, orders)
     longs = _longs(looked, orders)
     starts = [*_starts(looked, orders, longs), np.zeros(orders.n_parameters)]  # the last is finite whatever the record
+    known = {} if known is None else known
     straight = _straight(errors, starts, longs[0], training, until) if orders.noise else None
-    if straight is not None:
+    # With denominators of their own there are as many smaller structures as products of theirs: too many to ask for.
+    if straight is not None and not _common(orders):
         return errors, straight
-    starts += [*_of_state_space(looked, orders), *_of_fewer(segments, orders, training, until)]
-    starts = [theta for theta in starts if np.isfinite(theta).all()]
+    fewer = _of_fewer(segments, orders, training, until, known)
+    if straight is not None and straight.at.loss <= min(map(errors.loss, fewer), default=np.inf):
+        return errors, straight
+    starts = [theta for theta in (*starts, *_of_state_space(looked, orders)) if np.isfinite(theta).all()]
     if not errors.stable or training.stable is not None:
-        return errors, _minimum(errors, starts, training, until)
+        return errors, _minimum(errors, starts, training, until, fewer)
     lengths = [len(segment) for segment in errors.segments]
     bounded = replace(errors, largest=slow_poles.largest_pole(lengths))
-    inside = _minimum(bounded, starts, training, until)
+    inside = _minimum(bounded, starts, training, until, fewer)
     system = errors.chart.system(inside.theta)
     if not slow_poles.unseen(system.radius, lengths):
         return bounded, inside
-    beyond = _minimum(errors, [inside.theta, *starts], training, until)
+    beyond = _minimum(errors, [inside.theta, *starts], training, until, fewer)
     better = slow_poles.significantly_better(
         errors.errors(errors.chart.system(beyond.theta)),
         errors.errors(system),
@@ -201,14 +210,21 @@ def _within(training: PolynomialTraining, until: float) -> PolynomialTraining:
     return replace(training, max_time_s=max(until - now(), 0.0))
 
 
-def _minimum(errors: PredictionErrors, starts: Sequence[Array], training: PolynomialTraining, until: float) -> Solution:
-    """Short runs from the best starts, and a long one from the best of their ends."""
+def _minimum(
+    errors: PredictionErrors,
+    starts: Sequence[Array],
+    training: PolynomialTraining,
+    until: float,
+    fewer: Sequence[Array] = (),
+) -> Solution:
+    """Short runs from the best starts and from all of models with fewer poles, and a long one from the best end."""
     training = _within(training, until)
     short = replace(training, max_iterations=min(SHORT, training.max_iterations))
     ranked = sorted((loss, at) for at, theta in enumerate(starts) if np.isfinite(loss := errors.loss(theta)))
+    tried = [starts[at] for _, at in ranked[:TRIED]] + [theta for theta in fewer if np.isfinite(errors.loss(theta))]
     found: list[tuple[float, int, Solution]] = []
-    for _, at in ranked[:TRIED]:
-        solution = _run(errors, starts[at], short)
+    for at, theta in enumerate(tried):
+        solution = _run(errors, theta, short)
         found.append((solution.at.loss, at, solution))
     if not found:
         raise FitDivergedError(
@@ -274,30 +290,75 @@ def _common(orders: AbstractPolynomial) -> bool:
 
 
 def _of_fewer(
-    segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining, until: float
+    segments: Sequence[Segment],
+    orders: AbstractPolynomial,
+    training: PolynomialTraining,
+    until: float,
+    known: dict[AbstractPolynomial, Array | None],
 ) -> list[Array]:
-    """The best model with a pole and a zero less at each input, and one that cancel: the start is as good as that."""
-    nf = orders.denominators
-    inputs = orders.nb and not orders.order("na")
-    long = sum(map(len, segments)) * sum(nf) ** 2 > NESTED
-    if not inputs or long or min(nf) < 2 or min(orders.nb) < 2:
+    """The best models with one pole less, and a pole and a zero that cancel: the start is as good as those are.
+
+    Args:
+        segments: The records.
+        orders: The structure.
+        training: How to fit.
+        until: When the time is up.
+        known: What structures have come to, which is added to; ``None`` of one that could not be fitted.
+
+    Returns:
+        Coefficients.
+    """
+    if sum(map(len, segments)) * sum((*orders.denominators, orders.order("na"), orders.order("nd"))) ** 2 > NESTED:
         return []
-    fewer: AbstractPolynomial = replace(
-        cast("Any", orders), nb=tuple(n - 1 for n in orders.nb), nf=tuple(n - 1 for n in nf)
-    )
-    try:
-        lower = _search(segments, fewer, training, until)[1].theta
-    except FitDivergedError:
-        return []
-    places = np.cumsum([*fewer.nb, *fewer.denominators])
-    *parts, rest = np.split(lower, places)
-    B, F = parts[: len(nf)], parts[len(nf) :]
     found = []
-    for pole in CANCELLED:
-        wider = [np.convolve(b, [1.0, -pole]) for b in B]
-        wider += [np.convolve(np.concatenate([[1.0], f]), [1.0, -pole])[1:] for f in F]
-        found.append(np.concatenate([*wider, rest]))
+    for smaller, widened in _fewer(orders):
+        if smaller not in known:
+            try:
+                known[smaller] = _search(segments, smaller, training, until, known)[1].theta
+            except (FitDivergedError, TraceError):
+                known[smaller] = None
+        theta = known[smaller]
+        if theta is None:
+            continue
+        parts = np.split(theta, np.cumsum([size for _, size in _parts(smaller)]))
+        # The same root again and again would be a multiple one, which rounding tears apart.
+        apart = (0.6 * np.cos(2.4 * max(orders.order("nc"), 1)),)
+        for pole in CANCELLED if "F" in widened else apart:
+            wider = [
+                _with_root(part, pole, monic=name != "B") if name in widened else part
+                for (name, _), part in zip(_parts(smaller), parts, strict=False)
+            ]
+            found.append(np.concatenate([*wider, parts[-1]]))
     return found
+
+
+def _fewer(orders: AbstractPolynomial) -> list[tuple[AbstractPolynomial, str]]:
+    """Structures that this one contains, and the polynomials that each lacks a root of."""
+    na, nc, nd, nb, nf = orders.order("na"), orders.order("nc"), orders.order("nd"), orders.nb, orders.denominators
+    change: Any = partial(replace, cast("Any", orders))
+    found = []
+    if na:
+        if na > 1 and nc > 1 and all(n > 1 for n in nb):
+            found.append((change(na=na - 1, nc=nc - 1, nb=tuple(n - 1 for n in nb)), "BAC"))
+    elif nb:
+        if min(nf) > 1 and min(nb) > 1:
+            found.append((change(nb=tuple(n - 1 for n in nb), nf=tuple(n - 1 for n in nf)), "BF"))
+        if nc > 1 and nd > 1:
+            found.append((change(nc=nc - 1, nd=nd - 1), "CD"))
+    return found
+
+
+def _parts(orders: AbstractPolynomial) -> list[tuple[str, int]]:
+    """The polynomials of the flat vector, in its order, and how many coefficients each has."""
+    common = [("A", orders.order("na"))] if _common(orders) else [("F", n) for n in orders.denominators]
+    noise = [(letter, orders.order(f"n{letter.lower()}")) for letter in ("C" if _common(orders) else "CD")]
+    return [*(("B", n) for n in orders.nb), *common, *noise]
+
+
+def _with_root(part: Array, root: float, *, monic: bool) -> Array:
+    """The coefficients of a polynomial times another root; a leading 1 is not among those of a monic one."""
+    whole = np.concatenate([[1.0], part]) if monic else part
+    return np.asarray(np.convolve(whole, [1.0, -root])[int(monic) :])
 
 
 def _differenced(piece: Segment) -> Segment:

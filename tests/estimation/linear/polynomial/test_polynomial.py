@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy import optimize
@@ -112,3 +114,23 @@ def test_the_fit_is_that_of_scipys_least_squares() -> None:
     mine = fit_polynomial([trace_of(u, y)], TWO, still, rest_output=0.0)
     assert float(mine.history["mse"][-1]) == pytest.approx(2.0 * other.cost / 400, rel=1e-6)
     np.testing.assert_allclose(mine.uncertainty.values, other.x, atol=2e-4)
+
+
+@pytest.mark.parametrize("name", ["first", "nearly integrates", "no input"])
+def test_of_nested_armax_models_none_fits_worse_than_one_that_it_contains(name: str) -> None:
+    rng = np.random.default_rng(0)
+    u, e = np.repeat(rng.choice([-1.0, 1.0], 40), 10), rng.normal(size=400)
+    if name == "first":
+        y = lfilter([0.0, 0.1], [1.0, -0.9], u) + 0.05 * e
+    elif name == "nearly integrates":
+        y = lfilter([0.0, 1e3, 1e3], np.poly([0.999, 0.95]), u) + 1e4 * e
+    else:
+        y = lfilter([1.0, 0.5], np.poly([0.9, 0.4]), e)
+    losses = []
+    for n in range(1, 5):
+        empty = name == "no input"
+        orders = ARMAX(na=n, nb=() if empty else (n,), nc=n, nk=() if empty else (1,))
+        record = trace_of(u[:, np.newaxis][:, :0] if empty else u[:, np.newaxis], y)
+        fitted = fit_polynomial([record], Mapping.parse("-> y" if empty else "u1 -> y"), orders, start=FREE)
+        losses.append(float(fitted.history["mse"][-1]))
+    assert all(more <= less * (1.0 + 1e-6) for less, more in pairwise(losses)), losses
