@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from sysid.estimation.linear.instrumental import fit_iv4
     from sysid.estimation.linear.modes import Mode, modes
     from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
-    from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
+    from sysid.estimation.linear.state_space.fit import fit_state_space
     from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
     from sysid.estimation.linear.state_space.training import StateSpaceTraining
     from sysid.estimation.linear.transfer_function import fit_transfer_function
@@ -60,7 +60,6 @@ __all__ = [
     "fit_transfer_function",
     "fit_vector_narx",
     "fit_vector_neural_state_space",
-    "fit_vector_state_space",
     "modes",
     "state_orders",
     "with_upstream_outputs",
@@ -73,7 +72,7 @@ _WHERE = {
     "sysid.estimation.linear.instrumental": ("fit_iv4",),
     "sysid.estimation.linear.modes": ("Mode", "modes"),
     "sysid.estimation.linear.polynomial.fit": ("PolynomialTraining", "fit_polynomial"),
-    "sysid.estimation.linear.state_space.fit": ("fit_state_space", "fit_vector_state_space"),
+    "sysid.estimation.linear.state_space.fit": ("fit_state_space",),
     "sysid.estimation.linear.state_space.orders": ("StateOrders", "state_orders"),
     "sysid.estimation.linear.state_space.training": ("StateSpaceTraining",),
     "sysid.estimation.linear.transfer_function": ("fit_transfer_function",),

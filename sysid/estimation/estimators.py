@@ -27,7 +27,7 @@ from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
-from sysid.estimation.linear.state_space.fit import fit_state_space, fit_vector_state_space
+from sysid.estimation.linear.state_space.fit import fit_state_space
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
@@ -165,14 +165,14 @@ ESTIMATORS: dict[str, Estimator] = {
             _linear(
                 structure=structure,
                 name=name,
-                fit=fit,
+                fit=fit_state_space,
                 training=StateSpaceTraining,
                 posterior=state_space_posterior,
                 no_posterior=OF_STATES,
             )
-            for structure, name, fit in (
-                (LinearStateSpace, "a linear state space", fit_state_space),
-                (VectorStateSpace, "a linear state space of several outputs", fit_vector_state_space),
+            for structure, name in (
+                (LinearStateSpace, "a linear state space"),
+                (VectorStateSpace, "a linear state space of several outputs"),
             )
         ),
         *(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,6 @@ from sysid.models import (
     Scaling,
     Start,
     VectorScaling,
-    VectorStateSpace,
     VectorStateSpaceModel,
 )
 from sysid.traces import Trace
@@ -42,20 +41,21 @@ def fit_state_space(
     training: StateSpaceTraining | None = None,
     *,
     start: Start | None = None,
-    rest_output: float | None = None,
+    rest_output: float | Dict[str, float] | None = None,
 ) -> FitResult:
     """Fit a linear state space.
 
     Args:
         traces: Estimation traces; never concatenated, each with an initial state of its own.
-        mapping: Which channels go in, which comes out.
+        mapping: Which channels go in, which come out.
         orders: The structure; dead times that it leaves open (``nk="auto"``) are searched, and told.
         training: How to fit.
         start: What stands before each trace; at rest by default.
-        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        rest_output: Output at rest in its unit, or by name; the mean of the traces' first samples where not given.
 
     Returns:
-        The fit; after the prediction-error method with the uncertainty of its polynomials.
+        The fit; after the prediction-error method with the uncertainty of its polynomials. Of several outputs its
+        errors are mean squares over them, each relative to its innovations.
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
@@ -63,68 +63,29 @@ def fit_state_space(
         FitDivergedError: If no start gives a finite prediction.
     """
     began, training = now(), training or StateSpaceTraining()
-    rest = first_output(traces, mapping) if rest_output is None else rest_output
-    (scaling,), segments = records_of(traces, mapping, orders, start=start, rests=(rest,))
-    orders, segments, told = behind_dead_times(segments, orders, training)
-    found = search(segments, orders, training)
-    model = LinearStateSpaceModel(
-        orders=orders,
-        system=found.system,
-        scaling=scaling,
-        mapping=mapping,
-        sample_time=traces[0].sample_time,
-        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
-        output_unit=traces[0].channel(mapping.output).unit,
-        rest_output=rest,
+    given = (
+        rest_output if isinstance(rest_output, Dict) else {} if rest_output is None else {mapping.output: rest_output}
     )
-    unit = float(found.covariance[0, 0]) * scaling.output_scale**2 / max(found.curve[-1].mse, _TINY)
-    return _result(model, replace(found, notes=(*told, *found.notes)), orders, training, began=began, unit=unit)
-
-
-def fit_vector_state_space(
-    traces: Sequence[Trace],
-    mapping: Mapping,
-    orders: VectorStateSpace,
-    training: StateSpaceTraining | None = None,
-    *,
-    start: Start | None = None,
-    rest_output: Dict[str, float] | None = None,
-) -> FitResult:
-    """Fit a linear state space of several outputs; see :func:`fit_state_space`.
-
-    Args:
-        traces: Estimation traces.
-        mapping: Which channels go in, which come out.
-        orders: The structure.
-        training: How to fit.
-        start: What stands before each trace; at rest by default.
-        rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
-
-    Returns:
-        The fit. Its errors are mean squares over the outputs, each relative to its innovations.
-
-    Raises:
-        ChannelError: If a trace lacks a channel of the mapping.
-        TraceError: If there are fewer samples than parameters, or no record is long enough.
-        FitDivergedError: If no start gives a finite prediction.
-    """
-    began, training, given = now(), training or StateSpaceTraining(), rest_output or {}
     rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
     scalings, segments = records_of(traces, mapping, orders, start=start, rests=rests)
-    known, segments, told = behind_dead_times(segments, orders, training)
-    orders = cast("VectorStateSpace", known)
+    orders, segments, told = behind_dead_times(segments, orders, training)
     found = search(segments, orders, training)
-    model = VectorStateSpaceModel(
-        orders=orders,
-        system=found.system,
-        scaling=VectorScaling.of(scalings),
-        mapping=mapping,
-        sample_time=traces[0].sample_time,
-        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
-        output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
-        rest_outputs=rests,
-    )
-    return _result(model, replace(found, notes=(*told, *found.notes)), orders, training, began=began, unit=1.0)
+    shared: dict[str, Any] = {
+        "orders": orders,
+        "system": found.system,
+        "mapping": mapping,
+        "sample_time": traces[0].sample_time,
+        "input_units": tuple(traces[0].channel(name).unit for name in mapping.inputs),
+    }
+    units = tuple(traces[0].channel(name).unit for name in mapping.outputs)
+    model: LinearStateSpaceModel | VectorStateSpaceModel
+    if orders.several_outputs:
+        unit, scaling = 1.0, VectorScaling.of(scalings)
+        model = VectorStateSpaceModel(scaling=scaling, output_units=units, rest_outputs=rests, **shared)
+    else:
+        unit = float(found.covariance[0, 0]) * scalings[0].output_scale ** 2 / max(found.curve[-1].mse, _TINY)
+        model = LinearStateSpaceModel(scaling=scalings[0], output_unit=units[0], rest_output=rests[0], **shared)
+    return _result(model, replace(found, notes=(*told, *found.notes)), orders, training, began=began, unit=unit)
 
 
 _TINY = 1e-300

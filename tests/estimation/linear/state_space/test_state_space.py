@@ -9,7 +9,7 @@ import pytest
 from scipy import optimize
 
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation import Loop, StateSpaceTraining, Status, fit_state_space, fit_vector_state_space
+from sysid.estimation import Loop, StateSpaceTraining, Status, fit_state_space
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.provider import PredictionErrors
@@ -146,7 +146,7 @@ def two_outputs(seed: int, n: int = 500) -> Trace:
 
 def test_several_outputs_are_one_model_that_stores_and_predicts_itself() -> None:
     traces, mapping = [two_outputs(0), two_outputs(1)], Mapping.parse("a+b -> y+z")
-    fit = fit_vector_state_space(traces, mapping, VectorStateSpace(states=3), start=FREE)
+    fit = fit_state_space(traces, mapping, VectorStateSpace(states=3), start=FREE)
     np.testing.assert_allclose(poles(fit.model.system), poles(TRUE), atol=0.03)
     gain = C_TRUE @ np.linalg.solve(np.eye(3) - TRUE.A, TRUE.B) * np.array([[10.0], [1.0]])
     A, B, C, D = fit.model.matrices
@@ -173,7 +173,7 @@ def test_several_outputs_are_one_model_that_stores_and_predicts_itself() -> None
 def test_one_output_of_a_vector_model_is_the_single_model() -> None:
     trace = record(5)
     single = fit_state_space([trace], ONE, LinearStateSpace(states=2), start=FREE).model
-    vector = fit_vector_state_space([trace], ONE, VectorStateSpace(states=2), start=FREE).model
+    vector = fit_state_space([trace], ONE, VectorStateSpace(states=2), start=FREE).model
     u = trace.columns(["u1"])
     np.testing.assert_allclose(vector.simulate(u)[:, 0], single.simulate(u), rtol=1e-9, atol=1e-9)
 
