@@ -152,8 +152,19 @@ class Command:
 
         Returns:
             Shape ``(duration / sample_time,)``, rounded to whole samples.
+
+        Raises:
+            ConfigError: If a position is held for less than a sample, and would not be there.
         """
         count = round(self.duration / sample_time)
         starts = np.array([round(t / sample_time) for t in self.times])
+        lost = np.flatnonzero(np.diff([*starts, max(count, starts[-1] + 1)]) <= 0)
+        if len(lost):
+            raise ConfigError(
+                "a position of the handle falls between two samples", where="command",
+                expected=f"positions held for {sample_time:g} s or longer",
+                got=f"{self.pressures[lost[0]]:g} psi at {self.times[lost[0]]:g} s",
+                remedy="hold it longer, or take shorter samples",
+            )  # fmt: skip
         index = np.searchsorted(starts, np.arange(count), side="right") - 1
         return np.array(self.pressures, dtype=np.float64)[index]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sysid.airbrake.command import MAX_DURATION, Command
 from sysid.airbrake.consist import Consist
@@ -19,6 +19,7 @@ from sysid.airbrake.simulate import AirBrakeRecord, simulate
 from sysid.airbrake.variant import USUAL_VARIANT, VARIANTS
 from sysid.errors import ConfigError, did_you_mean
 from sysid.excitation import excite
+from sysid.field_checks import check
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
 
@@ -34,9 +35,6 @@ USUAL_NAMES: Mapping[str, str | dict[str, int]] = {
     "PS": "action",
 }
 """What a channel of this name is, unless ``quantities`` says otherwise."""
-
-
-_M = TypeVar("_M", bound=BaseModel)
 
 
 class _Random(BaseModel):
@@ -99,25 +97,10 @@ class _Options(BaseModel):
     retainers: float | tuple[float, ...] = 0.0
     radio: _Radio | None = None
     running_pressure: float | None = None
-    speed: float = Field(default=1.0, ge=0)
+    speed: float | None = Field(default=None, ge=0)
     time_step: float = Field(default=1e-3, gt=0)
     node: int = 3
     quantities: dict[str, str | dict[str, int]] = Field(default_factory=dict)
-
-
-def _checked(model: type[_M], values: Mapping[str, Any], where: str) -> _M:
-    try:
-        return model.model_validate(dict(values))
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"]) or "the whole"
-        raise ConfigError(
-            f"{where} cannot be used: {first['msg']}",
-            where=f"{where}, {place}",
-            expected=f"fields {', '.join(model.model_fields)}",
-            got=first["input"],
-            remedy="correct it in dataset.yaml",
-        ) from error
 
 
 def _excited(asked: _Excited, running_pressure: float, sample_time: float) -> Command:
@@ -195,6 +178,23 @@ def _equipment(options: _Options) -> Equipment:
     return dataclasses.replace(row, variant=row.variant.with_options(options.switches))
 
 
+def _check_heeded(options: _Options, equipment: Equipment) -> None:
+    """Refuse options that nothing on this train looks at."""
+    idle = {
+        "radio": (options.radio is not None and not options.locomotives, "locomotives inside the train that hear it"),
+        "speed": (
+            options.speed is not None and not equipment.variant.speed_gates,
+            "a variant with speed_gates, such as listing",
+        ),
+    }
+    for name, (unheeded, expected) in idle.items():
+        if unheeded:
+            raise ConfigError(
+                f"{name} changes nothing here", where=f"options, {name}", expected=expected,
+                got=getattr(options, name), remedy=f"leave {name} out",
+            )  # fmt: skip
+
+
 def _column(channel: Channel, probe: Probe | None, record: AirBrakeRecord) -> np.ndarray[Any, np.dtype[np.float64]]:
     psi = record.command if probe is None else record.gauge_psi(probe.quantity, probe.node)
     # The model's own psi (six digits) is kept for psi; everything else is converted from it.
@@ -223,9 +223,9 @@ def generate(
             :data:`sysid.airbrake.equipment.EQUIPMENT`), ``switches`` (fields of
             :class:`sysid.airbrake.variant.Variant`), ``pairs``, ``locomotives``, ``radio`` (how these hear of the
             handle: :class:`sysid.airbrake.radio.Radio`), ``loads`` and ``retainers`` (one number or one a pair:
-            :class:`sysid.airbrake.consist.Consist`), ``running_pressure`` in psi gauge, ``speed`` in m/s, ``time_step``
-            in s, ``node``, and ``quantities``: what each channel is, ``command``, a quantity at ``node``, or
-            ``{quantity: node}``.
+            :class:`sysid.airbrake.consist.Consist`), ``running_pressure`` in psi gauge, ``speed`` in m/s (for
+            variants with ``speed_gates``), ``time_step`` in s, ``node``, and ``quantities``: what each channel is,
+            ``command``, a quantity at ``node``, or ``{quantity: node}``.
         channels: Channels wanted, in their units.
         sample_time: Seconds between samples; each is the mean over its time steps.
 
@@ -247,9 +247,10 @@ def generate(
         >>> len(trace), float(trace["BC"][0])
         (200, 0.0)
     """
-    recipe_ = _checked(_Recipe, recipe, f"the recipe of case {case}")
-    options_ = _checked(_Options, options, "the options of the generator")
+    recipe_ = check(_Recipe, recipe, where=f"the recipe of case {case}")
+    options_ = check(_Options, options, where="the options of the generator")
     equipment = _equipment(options_)
+    _check_heeded(options_, equipment)
     running = equipment.running_pressure if options_.running_pressure is None else options_.running_pressure
     consist = Consist(
         pairs=options_.pairs,
@@ -267,7 +268,7 @@ def generate(
         probes=tuple(dict.fromkeys(probe for probe in probes if probe is not None)),
         time_step=options_.time_step,
         sample_time=sample_time,
-        speed=options_.speed,
+        speed=1.0 if options_.speed is None else options_.speed,
         radio=None if options_.radio is None else Radio(**options_.radio.model_dump()),
     )
     columns = [_column(channel, probe, record) for channel, probe in zip(channels, probes, strict=True)]

@@ -165,7 +165,9 @@ def _fits(draw: st.DrawFn, n_inputs: int) -> tuple[AbstractStructure, Options | 
         domain = draw(st.sampled_from(["discrete", "continuous"]))
         transfer = sysid.TransferFunction(poles=poles, zeros=zeros, delays=delays, domain=domain)
         return transfer, sysid.TransferFunctionTraining(
-            max_iterations=draw(st.integers(5, 15)), short_iterations=3, max_delay=3 if n_inputs > 1 else 20
+            max_iterations=draw(st.integers(5, 15)),
+            short_iterations=3,
+            max_delay=None if delays is not None else 3 if n_inputs > 1 else 20,
         )
     training = sysid.Training(
         max_iterations=draw(st.integers(5, 15)), workers=1, starts=draw(st.sampled_from([1, 1, 2]))
