@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sysid.estimation.networks.joint_options import JointTraining
     from sysid.estimation.networks.joint_training import fit_cascade, with_upstream_outputs
     from sysid.estimation.networks.narx import fit_narx
-    from sysid.estimation.networks.neural_state_space import fit_neural_state_space, fit_vector_neural_state_space
+    from sysid.estimation.networks.neural_state_space import fit_neural_state_space
     from sysid.estimation.networks.posterior import Posterior
     from sysid.estimation.networks.training import FitProgress, Training
     from sysid.estimation.networks.vector_narx import fit_vector_narx
@@ -59,7 +59,6 @@ __all__ = [
     "fit_state_space",
     "fit_transfer_function",
     "fit_vector_narx",
-    "fit_vector_neural_state_space",
     "modes",
     "state_orders",
     "with_upstream_outputs",
@@ -81,7 +80,7 @@ _WHERE = {
     "sysid.estimation.networks.joint_options": ("JointTraining",),
     "sysid.estimation.networks.joint_training": ("fit_cascade", "with_upstream_outputs"),
     "sysid.estimation.networks.narx": ("fit_narx",),
-    "sysid.estimation.networks.neural_state_space": ("fit_neural_state_space", "fit_vector_neural_state_space"),
+    "sysid.estimation.networks.neural_state_space": ("fit_neural_state_space",),
     "sysid.estimation.networks.posterior": ("Posterior",),
     "sysid.estimation.networks.training": ("FitProgress", "Training"),
     "sysid.estimation.networks.vector_narx": ("fit_vector_narx",),

@@ -44,7 +44,6 @@ from sysid.estimation.networks.neural_state_space import (
     check_neural_initial,
     check_training,
     fit_neural_state_space,
-    fit_vector_neural_state_space,
 )
 from sysid.estimation.networks.training import FitProgress, Training, check_lagged
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
@@ -103,16 +102,16 @@ ESTIMATORS: dict[str, Estimator] = {
             _trained(
                 structure=structure,
                 name=name,
-                fit=fit_by,
+                fit=fit_neural_state_space,
                 check_training=check_training,
                 initial=check_neural_initial,
                 starts=STARTS,
                 unites=True,
                 each=True,
             )
-            for structure, name, fit_by in (
-                (NeuralStateSpace, "a neural state space", fit_neural_state_space),
-                (VectorNeuralStateSpace, "a neural state space of several outputs", fit_vector_neural_state_space),
+            for structure, name in (
+                (NeuralStateSpace, "a neural state space"),
+                (VectorNeuralStateSpace, "a neural state space of several outputs"),
             )
         ),
         *(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,6 @@ from sysid.models import (
     NeuralStateSpaceModel,
     Scaling,
     Start,
-    VectorNeuralStateSpace,
     VectorNeuralStateSpaceModel,
     VectorScaling,
 )
@@ -93,7 +92,7 @@ def fit_neural_state_space(
     training: Training | None = None,
     *,
     start: Start | None = None,
-    rest_output: float | None = None,
+    rest_output: float | Dict[str, float] | None = None,
     selection: Sequence[Trace] = (),
     initial: FitResult | None = None,
     vet: Callable[[starts.Network], bool] | None = None,
@@ -102,122 +101,59 @@ def fit_neural_state_space(
     """Fit a neural state space by Levenberg-Marquardt with Bayesian regularisation, always in free run.
 
     A record whose start is measured has its own initial state, estimated with the parameters; the others start where
-    the model's map from the oldest sample says, which is estimated too.
+    the model's map from the oldest sample says, which is estimated too. Of several outputs each counts over what the
+    linear model leaves of it, and the best candidate is trained on with what that leaves, so that a noisy output does
+    not blur what a clean one shows of the states they share.
 
     Args:
         traces: Estimation traces.
-        mapping: Which channels go in, which comes out.
+        mapping: Which channels go in, which come out.
         network: The structure.
         training: How to train; options for lagged regressors do not apply.
         start: What stands before each trace; at rest by default.
-        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        rest_output: Output at rest in its unit, or by name; the mean of the traces' first samples where not given.
         selection: Traces that choose between starts; without them the evidence chooses.
         initial: A fit of the same structure, whose parameters are the first start, in its scaled numbers.
         vet: Whether a model's free run is stable; the best stable one of the ten best candidates is then chosen.
         on_progress: Called after every iteration, from the threads that train.
 
     Returns:
-        The best start's model, with the spread over starts in its attempts.
+        The best start's model, with the spread over starts in its attempts. Of several outputs its errors are mean
+        squares over them, in scaled numbers and so weighed.
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
         ConfigError: If the training is for one step ahead, which a hidden state does not have, or has options that are
             for lagged regressors alone.
     """
-    rest = first_output(traces, mapping) if rest_output is None else rest_output
-    given: dict[str, Any] = {
-        "mapping": mapping,
-        "network": network,
-        "start": start or Start(),
-        "rest_output": rest,
-        "vet": vet,
-    }
+    told = (
+        rest_output if isinstance(rest_output, Dict) else {} if rest_output is None else {mapping.output: rest_output}
+    )
+    rests = tuple(told[one.output] if one.output in told else first_output(traces, one) for one in mapping.each)
+    named, begun = dict(zip(mapping.outputs, rests, strict=True)), start or Start()
+    given: dict[str, Any] = {"mapping": mapping, "network": network, "start": begun, "rest_output": named, "vet": vet}
     given |= {"traces": traces, "selection": selection, "on_progress": on_progress}
     sparse = None if initial is not None else Thinned.of(given, training or Training())
     if sparse is not None:
         return sparse.fit(fit_neural_state_space)
-    experiments = experiments_of(traces, mapping, start or Start(), rest)
-    template = NeuralStateSpaceModel(
-        network=network,
-        theta=np.zeros(network.sizes(len(mapping.inputs)).count),
-        scaling=_signed(unit_range(experiments), network, experiments) if initial is None else _scaling(initial),
-        mapping=mapping,
-        sample_time=traces[0].sample_time,
-        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
-        output_unit=traces[0].channel(mapping.output).unit,
-        rest_output=rest,
-    )
-    records = Records(
-        traces=traces, selection=selection, start=start or Start(), experiments=experiments, initial=initial
-    )
-    return _fit(template, records, training, vet, on_progress)
-
-
-def fit_vector_neural_state_space(
-    traces: Sequence[Trace],
-    mapping: Mapping,
-    network: VectorNeuralStateSpace,
-    training: Training | None = None,
-    *,
-    start: Start | None = None,
-    rest_output: Dict[str, float] | None = None,
-    selection: Sequence[Trace] = (),
-    initial: FitResult | None = None,
-    vet: Callable[[starts.Network], bool] | None = None,
-    on_progress: Callable[[FitProgress], None] = lambda _: None,
-) -> FitResult:
-    """Fit a neural state space of several outputs; see :func:`fit_neural_state_space`.
-
-    Each output counts over what the linear model leaves of it, and the best candidate is trained on with what that
-    leaves, so that a noisy output does not blur what a clean one shows of the states they share.
-
-    Args:
-        traces: Estimation traces.
-        mapping: Which channels go in, which come out.
-        network: The structure.
-        training: How to train.
-        start: What stands before each trace; at rest by default.
-        rest_output: Outputs at rest by name, in their units; the mean of the traces' first samples where not given.
-        selection: Traces that choose between starts.
-        initial: A fit of the same structure, whose parameters are the first start.
-        vet: Whether a model's free run is stable.
-        on_progress: Called after every iteration.
-
-    Returns:
-        The fit. Its errors are mean squares over the outputs, in scaled numbers and so weighed.
-
-    Raises:
-        ChannelError: If a trace lacks a channel of the mapping.
-        ConfigError: As for one output.
-    """
-    told = rest_output or {}
-    rests = tuple(told[one.output] if one.output in told else first_output(traces, one) for one in mapping.each)
-    named = dict(zip(mapping.outputs, rests, strict=True))
-    given: dict[str, Any] = {
-        "mapping": mapping,
+    several = network.several_outputs
+    experiments = experiments_of(traces, mapping, begun, np.array(rests) if several else rests[0])
+    ranges = unit_ranges(experiments) if several else unit_range(experiments)
+    units = tuple(traces[0].channel(name).unit for name in mapping.outputs)
+    shared: dict[str, Any] = {
         "network": network,
-        "start": start or Start(),
-        "rest_output": named,
-        "vet": vet,
+        "theta": np.zeros(network.sizes(len(mapping.inputs), len(mapping.outputs)).count),
+        "scaling": _signed(ranges, network, experiments) if initial is None else _scaling(initial),
+        "mapping": mapping,
+        "sample_time": traces[0].sample_time,
+        "input_units": tuple(traces[0].channel(name).unit for name in mapping.inputs),
     }
-    given |= {"traces": traces, "selection": selection, "on_progress": on_progress}
-    sparse = None if initial is not None else Thinned.of(given, training or Training())
-    if sparse is not None:
-        return sparse.fit(fit_vector_neural_state_space)
-    experiments = experiments_of(traces, mapping, start or Start(), np.array(rests))
-    template = VectorNeuralStateSpaceModel(
-        network=network,
-        theta=np.zeros(network.sizes(len(mapping.inputs), len(mapping.outputs)).count),
-        scaling=_signed(unit_ranges(experiments), network, experiments) if initial is None else _scaling(initial),
-        mapping=mapping,
-        sample_time=traces[0].sample_time,
-        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
-        output_units=tuple(traces[0].channel(name).unit for name in mapping.outputs),
-        rest_outputs=rests,
-    )
-    records = Records(
-        traces=traces, selection=selection, start=start or Start(), experiments=experiments, initial=initial
-    )
+    template: NeuralStateSpaceModel | VectorNeuralStateSpaceModel
+    if several:
+        template = VectorNeuralStateSpaceModel(output_units=units, rest_outputs=rests, **shared)
+    else:
+        template = NeuralStateSpaceModel(output_unit=units[0], rest_output=rests[0], **shared)
+    records = Records(traces=traces, selection=selection, start=begun, experiments=experiments, initial=initial)
     return _fit(template, records, training, vet, on_progress)
 
 
@@ -406,10 +342,9 @@ def _scaling(initial: FitResult) -> Any:
     return initial.model.recursion.scaling
 
 
-_Scaling = TypeVar("_Scaling", Scaling, VectorScaling)
-
-
-def _signed(scaling: _Scaling, network: NeuralStateSpace, experiments: Sequence[Experiment]) -> _Scaling:
+def _signed(
+    scaling: Scaling | VectorScaling, network: NeuralStateSpace, experiments: Sequence[Experiment]
+) -> Scaling | VectorScaling:
     """The scaling of outputs that may be absolute values: such are one in scaled numbers only with the same zero."""
     if network.output != "absolute":
         return scaling

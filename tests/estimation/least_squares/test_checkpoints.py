@@ -16,7 +16,6 @@ from sysid.estimation import (
     fit_cascade,
     fit_narx,
     fit_neural_state_space,
-    fit_vector_neural_state_space,
 )
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch, checkpoints_of, part_of
 from sysid.models import NARX, Mapping, NeuralStateSpace, VectorNeuralStateSpace
@@ -51,7 +50,7 @@ def neural_of_two(told: Callable[[Any], None]) -> Any:
     training = Training(max_iterations=12, starts=2, workers=1)
     mapping = Mapping(inputs=("pump",), outputs=("level", "gauge"))
     network = VectorNeuralStateSpace(states=2, neurons=2)
-    return fit_vector_neural_state_space([beside(1)], mapping, network, training, on_progress=told)
+    return fit_neural_state_space([beside(1)], mapping, network, training, on_progress=told)
 
 
 def one_after_the_other(told: Callable[[Any], None]) -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.estimation import Training, fit_neural_state_space, fit_vector_neural_state_space
+from sysid.estimation import Training, fit_neural_state_space
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks import neural_ensemble
 from sysid.estimation.networks.halving import planned_iterations
@@ -156,7 +156,7 @@ def test_of_several_outputs_there_is_one_too():
     mapping = Mapping(inputs=("pump",), outputs=("level", "flow"))
     network = VectorNeuralStateSpace(states=1, neurons=3)
     training = Training(max_iterations=12, starts=3, ensemble=3, workers=1)
-    fit = fit_vector_neural_state_space([two(1)], mapping, network, training)
+    fit = fit_neural_state_space([two(1)], mapping, network, training)
     u = two(2).columns(["pump"])
     runs = [one.simulate(u) for one in members_of(fit.model)]
     assert len(runs) > 1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space, fit_vector_neural_state_space
+from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks import neural_layout, neural_start
 from sysid.estimation.networks.neural_layout import NeuralLayout
@@ -360,7 +360,7 @@ def coupled(seed: int, n: int = 300, noise: tuple[float, float] = (0.0, 0.0)) ->
 
 def test_several_outputs_are_one_model_that_shares_its_states():
     records = [coupled(0), coupled(1)]
-    fit = fit_vector_neural_state_space(
+    fit = fit_neural_state_space(
         records, BOTH, VectorNeuralStateSpace(states=2, neurons=4), Training(max_iterations=120, starts=2), start=FREE
     )
     unseen = coupled(2)
@@ -382,7 +382,7 @@ def test_a_linear_system_of_several_outputs_is_found_exactly():
     for t in range(n):
         y[t], x = C @ x, A @ x + B @ u[t]
     trace = replace(coupled(0), values=np.column_stack([u, y]))
-    fit = fit_vector_neural_state_space(
+    fit = fit_neural_state_space(
         [trace], BOTH, VectorNeuralStateSpace(states=4, neurons=0), Training(max_iterations=20, starts=1), start=FREE
     )
     assert fit.history["mse"][-1] < 1e-18
@@ -397,7 +397,7 @@ def test_a_noisy_output_does_not_blur_what_a_clean_one_shows(monkeypatch):
 
     def error_of_the_clean_one(rounds: int) -> float:
         monkeypatch.setattr("sysid.estimation.networks.output_weights.ROUNDS", rounds)
-        model = fit_vector_neural_state_space([noisy], BOTH, network, training, start=FREE).model
+        model = fit_neural_state_space([noisy], BOTH, network, training, start=FREE).model
         begun = beginning(model, noisy.columns(["u", "w"]), noisy.columns(["y", "z"]), FREE)
         run = model.simulate(noisy.columns(["u", "w"])[begun.first :], begun.history)
         return float(np.std(run[:, 1] - truth["z"][begun.first :]))
@@ -406,7 +406,7 @@ def test_a_noisy_output_does_not_blur_what_a_clean_one_shows(monkeypatch):
 
 
 def test_the_selection_traces_weigh_each_output_by_its_range():
-    fit = fit_vector_neural_state_space(
+    fit = fit_neural_state_space(
         [coupled(0)],
         BOTH,
         VectorNeuralStateSpace(states=1, neurons=1),
@@ -429,7 +429,7 @@ def test_outputs_that_never_move_have_a_fit(still):
     values = trace.values.copy()
     values[:, [column - 1 for column in still]] = 2.0
     network, training = VectorNeuralStateSpace(states=2, neurons=2), Training(max_iterations=25, starts=2)
-    fit = fit_vector_neural_state_space([replace(trace, values=values)], BOTH, network, training, start=FREE)
+    fit = fit_neural_state_space([replace(trace, values=values)], BOTH, network, training, start=FREE)
     run = fit.model.simulate(trace.columns(["u", "w"]), History.at_rest(inputs=[0.0, 0.0], output=values[0, 2:]))
     for column in still:
         np.testing.assert_allclose(run[:, column - 3], 2.0, atol=1e-3)
