@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sysid.advice import Advice, Verdict, advise
+from sysid.advice import Advice, Verdict, advise, looked_at
 from sysid.advice.dynamics import INTEGRATES
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
@@ -26,6 +26,8 @@ NOISE = 0.02
 """Share of its largest value by which a channel of one sign may be beyond nought."""
 ARX_TRIED = 3
 """Of the shortlist of an order search."""
+ORDER_SEARCH = 0.2
+"""Of what a look at an output takes, what a search for its orders does."""
 MOVED = 0.01
 """Share of an output's range by which it may move while the inputs have yet to, and still be said to begin at rest."""
 
@@ -49,7 +51,8 @@ class Looked:
             remembers one sample, or learns where it begins, is tried first.
         states: Of the best linear state space, once linear models were tried; 0 before.
         resets: Where outputs jump and are linear between, the equations of that: then it is tried before all else.
-        mechanism: Where something holds an output, equations of that, the likeliest first: they are tried next.
+        mechanism: Where friction holds an output, or play an input, equations of that, the likeliest first: they are
+            tried next.
         seen_from: Samples after which an input is seen to act first, in a response that takes no drift for its own.
     """
 
@@ -93,7 +96,7 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         What was found.
     """
     known = _set(data, data.estimation, data.selection)
-    advice = [advise(known, one, suggest=is_suggested(mapping)) for one in mapping.each]
+    advice = [advise(known, one, suggest=is_suggested(mapping)) for one in looked_at(mapping)]
     integrators = sum(any(finding.code == INTEGRATES for finding in one.findings) for one in advice)
     # A line that adds up would not explain a stop: what stands at its least was left there.
     ends = {} if integrators else at_ends(data.estimation, mapping)
@@ -105,7 +108,7 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         orders=_orders(data, mapping, start),
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(suggestion.structure for one in advice for suggestion in one.suggestions),
-        cautions=tuple(_cautions(advice)),
+        cautions=(*_cautions(advice), *_not_looked_at(mapping)),
         ends=any(ends.values()),
         all_end=bool(ends) and all(ends.values()),
         integrators=integrators,
@@ -209,7 +212,11 @@ def _orders(data: Data, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
     """The best ARX structures in free run over what chooses; of several outputs, what each of them needs in one."""
     fitted, chooses = (data.estimation, data.selection) if data.selection else ends_held_out(data.estimation)
     traces = _set(data, fitted, chooses)
-    found = [some for one in mapping.each if (some := _orders_of(traces, one, start))]
+    looked = looked_at(mapping, ORDER_SEARCH)
+    found = [some for one in looked if (some := _orders_of(traces, one, start))]
+    if len(looked) < len(mapping.outputs):  # of the others nobody knows what acts at once
+        m = len(mapping.inputs)
+        found.append((ARX(na=1, nb=(2,) * m, nk=(0,) * m),))
     most = max(map(len, found), default=0)
     together = [_together([some[min(k, len(some) - 1)] for some in found]) for k in range(most)]
     return tuple(dict.fromkeys(together))
@@ -236,6 +243,18 @@ def _together(some: Sequence[ARX]) -> ARX:
     last = [max(lags) for lags in zip(*ends, strict=True)]
     nb = tuple(end - begin for begin, end in zip(first, last, strict=True))
     return replace(some[0], na=max(one.na for one in some), nb=nb, nk=tuple(first))
+
+
+def _not_looked_at(mapping: Mapping) -> list[str]:
+    """That some outputs were not looked at."""
+    n, of = len(looked_at(mapping)), len(mapping.outputs)
+    if n == of:
+        return []
+    names = ", ".join(mapping.outputs[:n])
+    return [
+        f"Only {names} of {of} outputs had a look before the search and for its page, as it takes long with "
+        f"{len(mapping.inputs)} inputs. sysid advise looks at any."
+    ]
 
 
 def _cautions(advice: Sequence[Advice]) -> list[str]:

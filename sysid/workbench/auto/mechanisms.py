@@ -1,11 +1,11 @@
-"""What holds a motion, where records show it: equations with numbers to estimate, which are tried before networks."""
+"""What holds a motion, or an input, where records show it: equations that are tried before networks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sysid.estimation.friction import found_friction, grey_boxes_of
+from sysid.estimation import friction, play
 from sysid.models import Mapping, VectorGreyBox
 from sysid.traces import Trace
 
@@ -14,6 +14,11 @@ RUBS = (
     "tried first (docs/how/friction.md)"
 )
 """What is said of an output that friction holds."""
+PLAYS = (
+    "{input} acts as through play of {width:.3g} to either side, as a stem that sticks: equations with it are tried "
+    "first (docs/how/friction.md)"
+)
+"""What is said of an input with play."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +35,7 @@ class Mechanism:
 
 
 def mechanism_of(traces: Sequence[Trace], mapping: Mapping) -> Mechanism | None:
-    """Find what holds an output.
+    """Find what holds an output, or what an input moves.
 
     Args:
         traces: Records that begin at rest, at one place.
@@ -41,8 +46,13 @@ def mechanism_of(traces: Sequence[Trace], mapping: Mapping) -> Mechanism | None:
     """
     if any(trace.usable is not None for trace in traces):
         return None
-    friction = found_friction([(trace.columns(mapping.inputs), trace.columns(mapping.outputs)) for trace in traces])
-    if friction is None:
+    records = [(trace.columns(mapping.inputs), trace.columns(mapping.outputs)) for trace in traces]
+    rubs = friction.found_friction(records)
+    if rubs is not None:
+        told = RUBS.format(output=mapping.outputs[rubs.output])
+        return Mechanism(structures=tuple(friction.grey_boxes_of(rubs, mapping)), told=told)
+    plays = play.found_play(records)
+    if plays is None:
         return None
-    structures = tuple(grey_boxes_of(friction, mapping))
-    return Mechanism(structures=structures, told=RUBS.format(output=mapping.outputs[friction.output]))
+    told = PLAYS.format(input=mapping.inputs[plays.input], width=plays.width)
+    return Mechanism(structures=tuple(play.grey_boxes_of(plays, records, mapping)), told=told)

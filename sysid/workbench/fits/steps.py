@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sysid.advice import advise
+from sysid.advice import advise, looked_at
 from sysid.code_digest import code_digest
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
@@ -62,12 +62,14 @@ def look(config: PipelineConfig, data: Data, *, suggest: bool = True) -> list[di
     Args:
         config: The pipeline.
         data: The traces.
-        suggest: Whether structures are suggested.
+        suggest: Whether structures are suggested. A search of several outputs does not, and looks at no more of them
+            than it did before its trials.
 
     Returns:
         JSON values, one object an output.
     """
-    return [advise(data.traces, one, suggest=suggest).to_dict() for one in config.mapping.each]
+    outputs = config.mapping.each if suggest else looked_at(config.mapping)
+    return [advise(data.traces, one, suggest=suggest).to_dict() for one in outputs]
 
 
 def fit_code(structure: AbstractStructure) -> str:

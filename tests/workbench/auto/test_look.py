@@ -9,7 +9,7 @@ import pytest
 
 from sysid.advice import Advice
 from sysid.models import ARX, Mapping, NeuralStateSpace, Start, StartKind
-from sysid.traces import Role, Trace, TraceSet
+from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.auto.families import FAMILIES
 from sysid.workbench.auto.look import Looked, at_ends, in_motion, look
 from sysid.workbench.auto.mechanisms import mechanism_of
@@ -133,6 +133,31 @@ def test_orders_that_nobody_tries_are_not_looked_for(monkeypatch: pytest.MonkeyP
     names = ("y",) if outputs == 1 else ("y1", "y2")
     look(data(record("a", 60, outputs=outputs)), Mapping(inputs=("u",), outputs=names), ESTIMATED)
     assert asked == [outputs == 1] * outputs
+
+
+def test_of_many_inputs_and_outputs_some_are_looked_at_and_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A look at 14 outputs and as many inputs took six minutes of a search of one."""
+    asked: list[list[str]] = [[], []]
+
+    def counted(known: TraceSet, mapping: Mapping, *, suggest: bool) -> Advice:
+        asked[0].append(mapping.output)
+        return Advice(data=known.name, mapping=mapping, sample_time=0.1, units={}, findings=(), suggestions=())
+
+    def searched(_: TraceSet, mapping: Mapping, __: Start) -> tuple[ARX, ...]:
+        asked[1].append(mapping.output)
+        return (ARX(na=2, nb=(1,) * 14, nk=(1,) * 14),)
+
+    monkeypatch.setattr("sysid.workbench.auto.look.advise", counted)
+    monkeypatch.setattr("sysid.workbench.auto.look._orders_of", searched)
+    inputs, outputs = (tuple(f"{one}{k}" for k in range(n)) for one, n in (("u", 14), ("y", 13)))
+    values = np.random.default_rng(0).normal(size=(60, 27))
+    channels = tuple(Channel(name=name, unit="1") for name in (*inputs, *outputs))
+    trace = Trace(name="a", sample_time=1.0, channels=channels, values=values)
+    found = look(data(trace), Mapping(inputs=inputs, outputs=outputs), ESTIMATED)
+    assert asked == [["y0"], [f"y{k}" for k in range(6)]]
+    assert any("Only y0 of 13 outputs had a look" in one for one in found.cautions)
+    (order,) = found.orders
+    assert (order.na, order.nk, order.nb) == (2, (0,) * 14, (2,) * 14)
 
 
 def test_a_dead_time_that_drift_has_made_is_not_that_of_the_inputs(monkeypatch: pytest.MonkeyPatch) -> None:
