@@ -173,7 +173,7 @@ class Fit(FitResult):
         """
         from sysid.api.comparison import compare
 
-        return compare(traces or self.traces, self, start=self.start).plot()
+        return compare(self.traces if traces is None else traces, self, start=self.start).plot()
 
     def step(self, *, seconds: float | None = None) -> StepResponse:
         """Its step responses with their intervals; see :func:`sysid.step`."""
@@ -227,7 +227,7 @@ class Fit(FitResult):
         """
         from sysid.api.saving import save
 
-        return save(self, traces or self.traces, folder, formats=formats, start=self.start)
+        return save(self, self.traces if traces is None else traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
         """What was fitted, how it ended, its parameters as far as there is an uncertainty of them, and its fit."""
@@ -394,7 +394,7 @@ class SystemFit:
         """The free run of each output over its measurement, case by case."""
         from sysid.api.comparison import compare
 
-        return compare(traces or self.traces, self, start=self.start).plot()
+        return compare(self.traces if traces is None else traces, self, start=self.start).plot()
 
     def save(
         self, folder: str | Path, traces: TracesLike | None = None, *, formats: tuple[str, ...] | None = None
@@ -402,7 +402,7 @@ class SystemFit:
         """Write it as files of several outputs that run elsewhere; see :meth:`Fit.save`."""
         from sysid.api.saving import save
 
-        return save(self, traces or self.traces, folder, formats=formats, start=self.start)
+        return save(self, self.traces if traces is None else traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
         """The summaries of its fits."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from sysid.api.fits import Fit
 from sysid.api.given import ESTIMATED, TracesLike, traces_of
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.estimation import StabilityOptions, estimators
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import order_search
@@ -22,6 +22,7 @@ from sysid.estimation.nonparametric.dead_time import longest_dead_time, shares
 from sysid.estimation.nonparametric.feedback import feedback_of
 from sysid.extras import need
 from sysid.models import ARX, Mapping, Start, StartLike
+from sysid.models.lags import whole
 from sysid.reporting.numbers import pole
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.metrics import percent
@@ -284,6 +285,15 @@ def search_orders(
             got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
             remedy="give one that role",
         )
+    for name, most_of in (("max_na", max_na), ("max_nb", max_nb), ("max_nk", max_nk)):
+        if most_of is not None and not whole(most_of):
+            raise ConfigError(
+                "not a largest order",
+                where=name,
+                expected="a whole number from 0 to 10,000",
+                got=shortened(most_of),
+                remedy=f"write for example {name}=4",
+            )
     feedback = feedback_of(estimation, chosen) if chosen.inputs and max_nk != 0 else ""
     first = int(not isinstance(feedback, str) and feedback.at_once)
     samples = sum(len(trace) for trace in estimation), max(len(trace) for trace in estimation)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError
+from sysid.errors import ChannelError, ConfigError, shortened
 from sysid.field_checks import check
 from sysid.ingest.assemble import Wanted, assemble
 from sysid.ingest.experiments import columns_of, experiments_of
@@ -83,6 +83,14 @@ def data(
         >>> [(trace.name, len(trace), traces.roles[trace.name].value) for trace in traces]
         [('estimation', 15, 'estimation'), ('validation', 15, 'validation')]
     """
+    if isinstance(values, TraceSet | Trace) or (isinstance(values, list) and any(isinstance(v, Trace) for v in values)):
+        raise ConfigError(
+            "a record already is what a fit takes",
+            expected="frames, arrays, dicts of columns",
+            got=shortened(values),
+            remedy="give it to sysid.fit as it is; a part of it is trace[100:300], and roles are "
+            "sysid.traces.TraceSet(name=..., traces=..., roles=...)",
+        )
     wanted_inputs, wanted_outputs = _names(inputs), _names(outputs)
     check_distinct([*(wanted_inputs or ()), *(wanted_outputs or ())], where="inputs and outputs")
     repaired = check(RepairOptions, {"constant": "accept", **_options(repairs, "repairs")}, where="repairs")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
+from sysid.models.flat import as_many
 from sysid.models.lags import MOST, Lagged, Lags, per_input, whole
 from sysid.models.linear_forms import LinearForms
 from sysid.models.mapping import Mapping
@@ -146,6 +147,7 @@ class ARXModel(LinearForms):
 
     def with_theta(self, theta: NDArray[np.float64]) -> ARXModel:
         """The same model with another constant and other coefficients, in this order."""
+        theta = as_many(theta, 1 + len(self.coefficients))
         return replace(self, intercept=float(theta[0]), coefficients=theta[1:])
 
     def innovation_responses(self, steps: int) -> NDArray[np.float64]:

@@ -17,6 +17,7 @@ from sysid.models.base import AbstractModel
 from sysid.models.case_values import CaseValues
 from sysid.models.equation_form import EquationForm
 from sysid.models.equation_programs import StateTerms
+from sysid.models.flat import as_many
 from sysid.models.grey_box import GreyBox, lowered
 from sysid.models.history import History
 from sysid.models.mapping import Mapping
@@ -215,7 +216,7 @@ class EquationModel(AbstractModel):
 
     def with_theta(self: _ModelT, theta: Array) -> _ModelT:
         """The same model with other parameters."""
-        return replace(self, theta=theta)
+        return replace(self, theta=as_many(theta, len(self.theta)))
 
     def output_moves(
         self,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.continuous import ContinuousStateSpace, rates
+from sysid.models.flat import as_many
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
 from sysid.models.lags import MOST, per_input, whole
@@ -201,7 +202,7 @@ class _StateSpaceModel(InnovationModel):
 
     def with_theta(self, theta: NDArray[np.float64]) -> Self:
         """The same model with other numbers, in the order of :attr:`vector`."""
-        return replace(self, system=self.system.at(theta))
+        return replace(self, system=self.system.at(as_many(theta, len(self.system.entries))))
 
     @property
     def poles(self) -> NDArray[np.complex128]:

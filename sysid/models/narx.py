@@ -14,6 +14,7 @@ from sysid.errors import ConfigError, shortened
 from sysid.models.activations import PLAIN, Activation, check_activation
 from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit
+from sysid.models.flat import as_many
 from sysid.models.lags import MOST, Lagged, Lags, LagSpec, is_one_set, parse_lags, whole
 from sysid.models.mapping import Mapping
 from sysid.models.output_limits import Between, parse_limits, written
@@ -224,7 +225,7 @@ class NARXModel(AbstractModel):
 
     def with_theta(self, theta: NDArray[np.float64]) -> NARXModel:
         """The same network with other weights."""
-        return replace(self, theta=theta)
+        return replace(self, theta=as_many(theta, len(self.theta)))
 
     @property
     def structure(self) -> NARX:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.models.flat import as_many
 from sysid.models.innovation_moves import InnovationModel
 from sysid.models.innovations import Innovations
 from sysid.models.linear_forms import LinearForms
@@ -89,7 +90,7 @@ class PolynomialModel(LinearForms, InnovationModel):
 
     def with_theta(self, theta: NDArray[np.float64]) -> PolynomialModel:
         """The same model with other numbers, in the order of :attr:`vector`."""
-        return replace(self, theta=theta)
+        return replace(self, theta=as_many(theta, len(self.theta)))
 
     @property
     def gains(self) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError
 from sysid.models.activations import PLAIN, Activation
 from sysid.models.cascade_program import Limit
+from sysid.models.flat import as_many
 from sysid.models.history import History
 from sysid.models.lags import Lags, LagSpec, is_one_set
 from sysid.models.mapping import Mapping
@@ -257,7 +258,7 @@ class VectorNARXModel(SeveralOutputs):
 
     def with_theta(self, theta: NDArray[np.float64]) -> VectorNARXModel:
         """The same network with other weights."""
-        return replace(self, theta=theta)
+        return replace(self, theta=as_many(theta, len(self.theta)))
 
     def output_moves(
         self,

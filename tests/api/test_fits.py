@@ -271,3 +271,39 @@ def test_a_level_at_rest_is_a_number_of_an_output(level: Any) -> None:
 def test_a_trace_before_a_run_is_refused_in_words(fit: sysid.Fit) -> None:
     with pytest.raises(ConfigError, match="u_before, y_before"):
         fit.simulate(U, initial=fit.traces.traces[0])  # type: ignore[arg-type]
+
+
+def test_a_frame_is_no_data_set_to_any_word_of_a_fit(fit: sysid.Fit, tmp_path: Path) -> None:
+    frame: Any = pd.DataFrame({"u": U, "y": Y})
+    for ask in (fit.plot, fit.residuals, lambda given: fit.save(tmp_path / "bundle", given, formats=("c",))):
+        with pytest.raises(ConfigError, match="takes a data set"):
+            ask(frame)
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [ORDERS, sysid.OE(nb=1, nf=1, nk=1), sysid.LinearStateSpace(states=1)],
+    ids=lambda one: type(one).__name__,
+)
+@pytest.mark.parametrize(
+    "theta", [[1.0], np.zeros(99), "text", None, np.zeros((3, 1))], ids=["one", "many", "text", "none", "table"]
+)
+def test_other_parameters_are_as_many_as_there_are(structure: Any, theta: Any) -> None:
+    model = sysid.fit(sysid.data((U, Y), sample_time=0.1), "u -> y", structure).model
+    with pytest.raises(ConfigError, match="not the parameters of the model"):
+        model.with_theta(theta)
+
+
+def test_a_record_is_not_made_a_record_again(fit: sysid.Fit) -> None:
+    for given in (fit.traces, fit.traces.traces[0], list(fit.traces)):
+        with pytest.raises(ConfigError, match="already is what a fit takes"):
+            sysid.data(given)
+
+
+def test_orders_and_lengths_are_whole_numbers(fit: sysid.Fit) -> None:
+    given: Any
+    for given in (range(1, 3), "3", 2.5, True, -1):
+        with pytest.raises(ConfigError, match="not a largest order"):
+            sysid.search_orders(fit.traces, "u -> y", max_na=given)
+    with pytest.raises(ConfigError, match="not a length"):
+        sysid.impulse_response(fit.traces, "u -> y", lags="5")  # type: ignore[arg-type]

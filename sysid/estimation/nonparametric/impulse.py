@@ -123,9 +123,10 @@ def _later(found: ImpulseResponse) -> ImpulseResponse:
 def _check(mapping: Mapping, lags: int | None, dead_times: Sequence[int] | None, noise_order: int | None) -> None:
     m = len(mapping.inputs)
     most = MOST_ASKED // max(m, 1)
+    long = lags is None or (isinstance(lags, int | np.integer) and 2 <= lags <= most)
     for holds, what, expected, got in (
         (m > 0, "there is no input to respond to", "a mapping with inputs", str(mapping)),
-        (lags is None or 2 <= lags <= most, "not a length", f"2 to {most} lags", lags),
+        (long, "not a length", f"2 to {most} lags", lags),
         (dead_times is None or (len(dead_times) == m and min(dead_times) >= 0), "not the dead times",
          f"{m} numbers of samples, from 0 on", dead_times),
         (noise_order is None or 0 <= noise_order <= 100, "not an order of the noise", "0 to 100", noise_order),
