@@ -176,19 +176,46 @@ class Fit(FitResult):
         return compare(self.traces if traces is None else traces, self, start=self.start).plot()
 
     def step(self, *, seconds: float | None = None) -> StepResponse:
-        """Its step responses with their intervals; see :func:`sysid.step`."""
+        """Its step responses with their intervals; see :func:`sysid.step`.
+
+        Args:
+            seconds: Length in s; by default until the slowest pole has settled.
+
+        Returns:
+            The change of each output after a step of one unit in each input, in its unit, and 95 % intervals.
+
+        Raises:
+            ConfigError: If it is not linear, no input moves it, or the length is none.
+        """
         from sysid.api.responses import step
 
         return step(self, seconds=seconds)
 
     def bode(self, *, frequency: Any = None) -> Bode:
-        """Its Bode diagram with its intervals; see :func:`sysid.bode`."""
+        """Its Bode diagram with its intervals; see :func:`sysid.bode`.
+
+        Args:
+            frequency: In rad/s, shape ``(n,)``; by default four decades up to the Nyquist frequency.
+
+        Returns:
+            Gain, in units of the output per unit of the input, and phase in degrees, with 95 % intervals.
+
+        Raises:
+            ConfigError: If it is not linear, no input moves it, or a frequency is none.
+        """
         from sysid.api.responses import bode
 
         return bode(self, frequency=frequency)
 
     def poles(self) -> Poles:
-        """Its poles with their intervals; see :func:`sysid.poles`."""
+        """Its poles with their intervals; see :func:`sysid.poles`.
+
+        Returns:
+            The poles, the slowest first, with time constants in s and natural frequencies in rad/s.
+
+        Raises:
+            ConfigError: If it is not linear.
+        """
         from sysid.api.responses import poles
 
         return poles(self)
@@ -230,7 +257,11 @@ class Fit(FitResult):
         return save(self, self.traces if traces is None else traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
-        """What was fitted, how it ended, its parameters as far as there is an uncertainty of them, and its fit."""
+        """What was fitted, how it ended, its parameters as far as there is an uncertainty of them, and its fit.
+
+        Returns:
+            Lines of text.
+        """
         lines = [f"{self.model.label}, {self.model.mapping}", self.status.value]
         lines += [f"Parameters: {self.model.n_parameters}. Trained for {self.train_time_s:.3g} s."]
         if self.uncertainty is not None:
@@ -373,25 +404,59 @@ class SystemFit:
         return np.column_stack(found)
 
     def step(self, *, seconds: float | None = None) -> StepResponse:
-        """The step responses of all outputs with their intervals; see :func:`sysid.step`."""
+        """The step responses of all outputs with their intervals; see :func:`sysid.step`.
+
+        Args:
+            seconds: Length in s; by default until the slowest pole has settled.
+
+        Returns:
+            The change of each output after a step of one unit in each input, in its unit, and 95 % intervals.
+
+        Raises:
+            ConfigError: If it is not linear, no input moves it, or the length is none.
+        """
         from sysid.api.responses import step
 
         return step(self, seconds=seconds)
 
     def bode(self, *, frequency: Any = None) -> Bode:
-        """The Bode diagrams of all outputs with their intervals; see :func:`sysid.bode`."""
+        """The Bode diagrams of all outputs with their intervals; see :func:`sysid.bode`.
+
+        Args:
+            frequency: In rad/s, shape ``(n,)``; by default four decades up to the Nyquist frequency.
+
+        Returns:
+            Gain, in units of the output per unit of the input, and phase in degrees, with 95 % intervals.
+
+        Raises:
+            ConfigError: If it is not linear, no input moves it, or a frequency is none.
+        """
         from sysid.api.responses import bode
 
         return bode(self, frequency=frequency)
 
     def poles(self) -> Poles:
-        """The poles of all models with their intervals; see :func:`sysid.poles`."""
+        """The poles of all models with their intervals; see :func:`sysid.poles`.
+
+        Returns:
+            The poles, the slowest first, with time constants in s and natural frequencies in rad/s.
+
+        Raises:
+            ConfigError: If it is not linear.
+        """
         from sysid.api.responses import poles
 
         return poles(self)
 
     def plot(self, traces: TraceSet | None = None) -> Figure:
-        """The free run of each output over its measurement, case by case."""
+        """The free run of each output over its measurement, case by case.
+
+        Args:
+            traces: The cases; all of its data set by default.
+
+        Returns:
+            A figure of matplotlib's.
+        """
         from sysid.api.comparison import compare
 
         return compare(self.traces if traces is None else traces, self, start=self.start).plot()
@@ -399,13 +464,29 @@ class SystemFit:
     def save(
         self, folder: str | Path, traces: TracesLike | None = None, *, formats: tuple[str, ...] | None = None
     ) -> Bundle:
-        """Write it as files of several outputs that run elsewhere; see :meth:`Fit.save`."""
+        """Write it as files of several outputs that run elsewhere; see :meth:`Fit.save`.
+
+        Args:
+            folder: Where the bundle goes.
+            traces: Further records to check the files and to score the models on.
+            formats: As for :func:`sysid.save`.
+
+        Returns:
+            The bundle.
+
+        Raises:
+            ParityError: If a file differs from its model; nothing is published then.
+        """
         from sysid.api.saving import save
 
         return save(self, self.traces if traces is None else traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
-        """The summaries of its fits."""
+        """The summaries of its fits.
+
+        Returns:
+            Lines of text, those of each fit behind an empty one.
+        """
         return "\n\n".join(fit.summary() for fit in self.fits.values())
 
     def __repr__(self) -> str:

@@ -189,7 +189,15 @@ class OrderSearch:
         return pd.DataFrame(rows)
 
     def score(self, finalist: Finalist, criterion: Criterion) -> float:
-        """A criterion of a structure; smaller is better."""
+        """A criterion of a structure; smaller is better.
+
+        Args:
+            finalist: The structure, with its loss.
+            criterion: Which criterion.
+
+        Returns:
+            Its value, without a unit.
+        """
         return score(finalist, self.losses, criterion)
 
     def plot(self) -> Figure:
