@@ -227,21 +227,24 @@ class ProgramProvider(AbstractProvider):
         gradient, matrix = np.zeros(n), np.zeros((n, n))
         per_error, waiting = self._per_error(program), tuple[list[_Rows], ...]([] for _ in self._columns)
         # The matrix is summed in the first target's measure: to multiply it is to go through memory once more.
-        measure, gathered = weights * per_error**2, 0
+        measure, toward, gathered = (weights * per_error**2).tolist(), (weights * per_error / self._errors).tolist(), 0
         for rows, blocks in self._blocks(program, record, passed, n):
             gathered += rows.stop - rows.start
             wait = gathered < min(GATHERED, n) and rows.stop < len(record.rows)
             for j, (moving, block) in enumerate(blocks):
                 roots = None if record.root_weights is None else record.root_weights[rows, j][moving]
-                weighted, away = self._counting(block, residual[rows, j][moving], roots, per_error[j])
+                own = residual[rows, j] if moving is _EVERY else residual[rows, j][moving]
+                weighted, away = self._counting(block, own, roots, per_error[j])
                 waiting[j].append((weighted.copy() if wait else weighted, away))
             if wait:
                 continue
             gathered = 0
             for j, some in enumerate(waiting):
-                weighted, away = (np.concatenate(of) if len(of) > 1 else of[0] for of in zip(*some, strict=True))
+                if len(some) > 1:
+                    some[:] = [(np.concatenate([one for one, _ in some]), np.concatenate([one for _, one in some]))]
+                weighted, away = some[0]
                 reach = weighted.shape[1]
-                gradient[:reach] += weights[j] * per_error[j] / self._errors[j] * (weighted.T @ away)
+                gradient[:reach] += toward[j] * (weighted.T @ away)
                 # NumPy sees that both factors are one array and calls syrk, half the flops of a general product; unlike
                 # SciPy's wrapper of it, it lets the other threads run meanwhile.
                 square = weighted.T @ weighted
@@ -270,7 +273,7 @@ class ProgramProvider(AbstractProvider):
             per_error: The target's scale over its error.
         """
         weighted = block if roots is None else block * roots[:, None]
-        if np.isinf(self._longest):
+        if math.isinf(self._longest):
             return weighted, residual
         bounded = leverage_roots(weighted, self._longest / per_error)
         return weighted * bounded[:, None], residual * bounded
@@ -287,6 +290,7 @@ class ProgramProvider(AbstractProvider):
         size = min(BLOCK, max(LEAST, 1 << (ALIVE // max(1, n * len(outputs))).bit_length() - 1))
         kept[[output for output in outputs if output >= 0]] += size - 1
         room, every = rows_for(kept, n), len(record.rows) == samples
+        reaches, begins, masks = (part.tolist() for part in (trained.extent, room.first, room.mask))
         for first in range(0, samples, size):
             rows = min(size, samples - first)
             sensitivities(
@@ -300,12 +304,12 @@ class ProgramProvider(AbstractProvider):
                 if output < 0:
                     blocks.append((np.zeros(len(picked), dtype=np.bool_), np.zeros((0, 0))))
                     continue
-                reach, own = trained.extent[output], room.first[output] + (first & room.mask[output])
+                reach, own = reaches[output], begins[output] + (first & masks[output])
                 # A block stands in one piece: both its length and that of the room are powers of two.
                 if len(picked) == rows and room.moves[own : own + rows].all():
                     blocks.append((_EVERY, room.J[own : own + rows, :reach]))
                     continue
-                places = room.first[output] + (picked & room.mask[output])
+                places = begins[output] + (picked & masks[output])
                 moving = room.moves[places]
                 blocks.append((moving, room.J[places[moving], :reach]))
             yield slice(at, at + len(picked)), blocks
