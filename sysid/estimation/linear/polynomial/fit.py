@@ -22,7 +22,7 @@ from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
-from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start
+from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start, state_space_start
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors
@@ -281,7 +281,12 @@ def _starts(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequen
 def _of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
     """Coefficients from a state space of the same order."""
     same = None if _common(orders) else LongARX.of_state_space(looked, orders)
-    return [] if same is None else [box_jenkins_start(looked, orders, same, whitened=False)]
+    if same is None:
+        return []
+    begun = [box_jenkins_start(looked, orders, same, whitened=False)]
+    # What is fitted to the state space keeps its poles inside the unit circle: its own are an integrator's, too.
+    itself = state_space_start(looked, orders, same)
+    return begun if itself is None else [*begun, itself]
 
 
 def _common(orders: AbstractPolynomial) -> bool:

@@ -25,6 +25,7 @@ from sysid.estimation.linear.segments import Segment, delayed_inputs
 from sysid.estimation.linear.state_space.search import search
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.subspace.projections import arx_orders, regress
+from sysid.estimation.linear.subspace.system import EDGE
 from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.subspace.yardstick import Yardstick
 from sysid.models import LinearStateSpace
@@ -35,6 +36,8 @@ Array = NDArray[np.float64]
 LONGEST, ROUNDS, INSIDE, SETTLED = 40, 12, 0.98, 1e-3
 """Lags of a long ARX model at most; filtering rounds; how far inside the unit circle a root is put; and a change of
 coefficients at which filtering may end."""
+ALLOWED = 2.0 * EDGE - 1.0
+"""Magnitude at which a pole is begun that stands at the edge of what is allowed, or beyond."""
 STEPS = 30
 """Steps of a state space that a start is taken from."""
 
@@ -177,6 +180,32 @@ def box_jenkins_start(pieces: Sequence[Segment], orders: AbstractPolynomial, lon
     level = float(np.mean(np.concatenate(left)))
     noise = _noise([v - level for v in left], orders.order("nc"), orders.order("nd"))
     return np.concatenate([*B, *F, *noise, [level] * orders.level])
+
+
+def state_space_start(pieces: Sequence[Segment], orders: AbstractPolynomial, same: LongARX) -> Array | None:
+    """Coefficients of a model of one input that are a state space's own.
+
+    Args:
+        pieces: Unbroken records.
+        orders: The structure.
+        same: The state space, of as many states as the model has poles.
+
+    Returns:
+        The flat vector; ``None`` where the structure has not just these coefficients.
+    """
+    if len(orders.nb) != 1 or orders.denominators[0] != len(same.A) - 1:
+        return None
+    first, last = orders.nk[0], orders.nk[0] + orders.nb[0]
+    b = np.concatenate([same.B[0], np.zeros(max(last - len(same.B[0]), 0))])
+    if np.abs(np.delete(b, slice(first, last))).max(initial=0.0) > SETTLED * np.abs(b).max():
+        return None
+    roots = np.roots(same.A)
+    size = np.maximum(np.abs(roots), np.finfo(np.float64).tiny)
+    A = np.real(np.poly(np.where(size >= EDGE, roots / size * ALLOWED, roots)))
+    left = [p.outputs[:, 0] - scipy.signal.lfilter(b, A, p.inputs[:, 0]) for p in pieces]
+    level = float(np.mean(np.concatenate(left)))
+    noise = _noise([v - level for v in left], orders.order("nc"), orders.order("nd"))
+    return np.concatenate([b[first:last], A[1:], *noise, [level] * orders.level])
 
 
 def inside(coefficients: Array) -> Array:

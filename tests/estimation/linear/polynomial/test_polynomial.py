@@ -134,3 +134,16 @@ def test_of_nested_armax_models_none_fits_worse_than_one_that_it_contains(name: 
         fitted = fit_polynomial([record], Mapping.parse("-> y" if empty else "u1 -> y"), orders, start=FREE)
         losses.append(float(fitted.history["mse"][-1]))
     assert all(more <= less * (1.0 + 1e-6) for less, more in pairwise(losses)), losses
+
+
+@pytest.mark.parametrize("orders", [OE(nb=2, nf=2, nk=1), BJ(nb=2, nc=1, nd=1, nf=2, nk=1)], ids=["OE", "BJ"])
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.1])
+def test_a_plant_that_integrates_is_found_to_the_noise(orders: AbstractPolynomial, noise: float) -> None:
+    """Its pole is put inside the unit circle by every start but that of a state space itself."""
+    rng = np.random.default_rng(7)
+    u = np.repeat(rng.choice([-1.0, 1.0], 45), 9)
+    y = lfilter([0.0, 0.02, 0.01], np.poly([1.0, 0.8]), u) - 7.0
+    record = trace_of(u[:, np.newaxis], y + noise * rng.normal(size=len(u)))
+    fitted = fit_polynomial([record], Mapping.parse("u1 -> y"), orders, start=FREE)
+    assert fitted.model.pole_radius == pytest.approx(1.0, abs=2e-4)
+    assert float(fitted.history["mse"][-1]) < 1.05 * noise**2 + 1e-5 * np.var(y)
