@@ -137,7 +137,10 @@ class Drive(NamedTuple):
 @numba.njit(error_model="numpy", forceinline=True, _nrt=False)
 def _coefficient(low, high, values, slopes):
     """Cq Cm / sqrt(T) at a ratio of pressures."""
-    position = sqrt(1.0 - low / high) * (len(values) - 1)
+    last = len(values) - 1
+    position = sqrt(1.0 - low / high) * last
+    if not position <= last:  # a pressure below a vacuum, or none any more: as an index it is outside of the table
+        return np.nan
     index = np.uintp(int(position))  # unsigned: numba then leaves out the test for indices from the end
     return values[index] + (position - index) * slopes[index]
 

@@ -46,6 +46,11 @@ MOST = 16
 SHARE = 0.6
 """Of a fit's time that goes by thinned records."""
 
+NOTHING = (
+    "What was found on every {nth} sample of low-passed records is no model of all samples, and was not gone on with."
+)
+"""What is said where a fit has to begin anew."""
+
 ITERATIONS, PATIENCE = 60, 6
 """Iterations over all samples at most, which begin near a minimum; and over how many of them progress is judged."""
 
@@ -109,7 +114,9 @@ class Thinned:
         model: Any = first.model
         form = finer(model.recursion, self.sparse["traces"], self.given["traces"], model.mapping, self.every)
         if form is None:
-            return one(**self.given, training=later)
+            found = one(**self.given, training=later)
+            took = first.train_time_s + found.train_time_s
+            return replace(found, notes=(*found.notes, NOTHING.format(nth=_nth(self.every))), train_time_s=took)
         interrupted = first.status is Status.INTERRUPTED
         limits = replace(
             later,

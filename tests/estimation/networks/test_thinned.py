@@ -103,3 +103,15 @@ def test_a_model_that_sums_up_is_trained_on_all_samples() -> None:
 def test_a_number_that_thins_nothing_is_refused() -> None:
     with pytest.raises(ConfigError, match="thin is too small"):
         Training(thin=0)
+
+
+def test_a_fit_whose_thinned_model_is_none_of_all_samples_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sysid.estimation.networks.thinned.finer", lambda *_: None)
+    record, training = shaken(0, 2.0, n=1500), Training(starts=1, max_iterations=2, stable=True)
+    structure = NeuralStateSpace(states=2, neurons=1)
+    sparse, whole = (
+        fit_neural_state_space([record], MAPPING, structure, replace(training, thin=thin)) for thin in (EVERY, 1)
+    )
+    np.testing.assert_array_equal(sparse.model.theta, whole.model.theta)
+    assert "every 5th sample" in sparse.notes[-1]
+    assert sparse.train_time_s > whole.train_time_s
