@@ -103,7 +103,8 @@ def finer(
     R = np.linalg.lstsq(z, _neurons(form, W, z), rcond=None)[0].T if s.neurons else np.zeros((0, s.row))
     fine = [_with_one(_between(path, every))[ENDS * every : -ENDS * every] for path in paths]
     # Either what neurons do on average is a part of the modes, or it is not.
-    found = [_stepped(form, share * R, fine, every) for share in (1.0, 0.0)]
+    stepped = [_stepped(form, share * R, fine, every) for share in (1.0, 0.0)]
+    found = [*stepped, *(_read_anew(one, traces, mapping) for one in stepped)]
     errors = [_error(one, traces, mapping) for one in found]
     best = int(np.argmin(errors))
     return replace(found[best], theta=_evened(found[best].theta, s, z[:, : s.states])) if errors[best] < LOST else None
@@ -126,6 +127,23 @@ def _stepped(form: NeuralForm, R: Array, paths: Sequence[Array], every: int) -> 
     theta = form.theta.copy()
     theta[s.linear], theta[s.readout] = linear.ravel(), after.ravel()
     return replace(form, theta=s.hold(theta))
+
+
+def _read_anew(form: NeuralForm, traces: Sequence[Trace], mapping: Mapping) -> NeuralForm:
+    """The model whose linear output is the regression of what was measured on the states of its own free run."""
+    s = form.sizes
+    rows, targets = [], []
+    for trace in traces:
+        u = form.scaled(trace.columns(mapping.inputs)[:REGRESSED])
+        y = form.scaled_outputs(trace.columns(mapping.outputs)[:REGRESSED])
+        z = _with_one(np.column_stack([form.path(u, form.resting(u[0], y[0])), u]))
+        bent = NEURONS[form.activation].value(z @ form.theta[s.output_hidden].reshape(-1, s.row).T)
+        rows.append(z)
+        targets.append(y - bent @ form.theta[s.output_readout].reshape(s.outputs, -1).T)
+    theta = form.theta.copy()
+    if not form.rectified and all(np.isfinite(one).all() for one in (*rows, *targets)):
+        theta[s.output_linear] = _regression(np.concatenate(rows), np.concatenate(targets)).ravel()
+    return replace(form, theta=theta)
 
 
 def _error(form: NeuralForm, traces: Sequence[Trace], mapping: Mapping) -> float:

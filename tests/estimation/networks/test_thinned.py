@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
+from sysid.estimation.networks.finer import finer
 from sysid.estimation.networks.neural_state_space import fit_neural_state_space
 from sysid.estimation.networks.thinned import LONG, band_allows, thinned
 from sysid.estimation.networks.training import Training
-from sysid.models import NeuralStateSpace, Start
+from sysid.models import NeuralForm, NeuralStateSpace, Scaling, Start
 from sysid.traces import Channel, Role, Trace
 from sysid.validation import case_results
 from tests.estimation.networks.structures import MAPPING, shaken
@@ -115,3 +116,29 @@ def test_a_fit_whose_thinned_model_is_none_of_all_samples_begins_anew(monkeypatc
     np.testing.assert_array_equal(sparse.model.theta, whole.model.theta)
     assert "every 5th sample" in sparse.notes[-1]
     assert sparse.train_time_s > whole.train_time_s
+
+
+@pytest.mark.parametrize("turn", [0.2, 1.0])
+def test_a_swing_at_fewer_samples_is_the_same_swing_at_all(turn: float) -> None:
+    """Frequency and damping to the last digits; the free run but for a phase far from the resonance."""
+    A = 0.98 * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    sizes = NeuralStateSpace(states=2, neurons=0).sizes(1)
+    theta = np.zeros(sizes.count)
+    theta[sizes.linear] = np.column_stack([A, [0.1, 0.0], [0.0, 0.0]]).ravel()
+    theta[sizes.output_linear] = [1.0, 0.0, 0.0, 0.0]
+    scaling = Scaling(input_offset=(0.0,), input_scale=(1.0,), output_offset=0.0, output_scale=1.0)
+    form = NeuralForm(sizes=sizes, theta=theta, scaling=scaling)
+    rng, t = np.random.default_rng(0), np.arange(10_000)
+    lines = np.arange(0.3, 1.7, 0.01) * turn / EVERY
+    u = 0.05 * np.sum([np.cos(f * t + rng.uniform(0.0, 6.28)) for f in lines], axis=0)  # within the states' bounds
+    few = replace(tones(0.04, n=2000), values=np.column_stack([u[::EVERY], np.zeros(2000)]))
+    spectrum = np.fft.rfft(form.run(u[::EVERY, None], np.zeros(2))[:, 0], norm="forward")
+    y = np.fft.irfft(np.concatenate([spectrum, np.zeros(5001 - len(spectrum))]), 10_000, norm="forward")
+    every = replace(tones(0.04, n=10_000), values=np.column_stack([u, y]))
+    found = finer(form, [few], [every], MAPPING, EVERY)
+    assert found is not None
+    swings = np.linalg.eigvals(found.theta[sizes.linear].reshape(2, -1)[:, :2])
+    np.testing.assert_allclose(np.abs(swings), 0.98 ** (1 / EVERY), rtol=1e-9)
+    np.testing.assert_allclose(np.abs(np.angle(swings)), turn / EVERY, rtol=1e-9)
+    away = found.run(u[:, None], np.zeros(2))[1000:-1000, 0] - y[1000:-1000]
+    assert np.std(away) < 0.05 * np.std(y)
