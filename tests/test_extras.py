@@ -81,6 +81,7 @@ def test_base_code_needs_no_extra(tmp_path):
         "sysid.export.onnx_core onnx",
         "sysid.export.onnx_equations onnx",
         "sysid.export.onnx_flags onnx",
+        "sysid.export.onnx_holds onnx",
         "sysid.export.onnx_limits onnx",
         "sysid.export.onnx_nodes onnx",
         "sysid.export.onnx_outputs onnx",

@@ -66,7 +66,7 @@ def test_who_extends_replaces_one_of_them(tmp_path):
         (("0, 9)", "0, -9)"), 4, "equations: low, high", "bounds of near"),
         (("rest: {open: 1}", "rest: {shut: 1}"), 4, "equations: rest", "rest names shut"),
         (("unit: cm", "units: cm"), 2, "units", "did you mean unit"),
-        (("rest: {open: 1}", "rest: shut"), 3, "rest.float", "number"),
+        (("rest: {open: 1}", "rest: shut"), 3, "rest", "number"),
     ],
 )
 def test_what_is_wrong_names_its_line(tmp_path, edit, line, field, says):
