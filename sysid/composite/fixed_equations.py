@@ -17,7 +17,6 @@ from typing import Any
 
 from sysid.composite.fixed_expressions import expression_of, reads_nothing, words_of
 from sysid.composite.fixed_member import FixedMember, parameters_of
-from sysid.equations.functions import CONSTANTS
 from sysid.equations.parser import DEEPEST, parse
 from sysid.equations.syntax import (
     CONTINUOUS,
@@ -353,8 +352,6 @@ class _Reader:
         match node:
             case Number():
                 return _Sum(constant=Fraction(repr(node.value)))
-            case Name() if node.name in CONSTANTS:
-                return _Sum(constant=Fraction(repr(CONSTANTS[node.name])))
             case Name() if node.name not in self.parameters:
                 return _Sum(weights={(node.name, self.shift): Fraction(1)})
             case Delayed(seconds=False):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from sysid.equations.functions import CONSTANTS, OWN
+from sysid.equations.functions import OWN
 from sysid.equations.parser import parse
 from sysid.equations.syntax import (
     DEFINITION,
@@ -102,7 +102,7 @@ def words_of(equation: Equation, parameters: Collection[str] = ()) -> dict[str, 
 def channels_of(node: Node, parameters: Collection[str] = ()) -> tuple[str, ...]:
     """The channels that an expression reads, in order."""
     read = sorted((one for one in nodes_of(node) if isinstance(one, Name | Delayed)), key=lambda one: one.at)
-    return tuple(dict.fromkeys(one.name for one in read if one.name not in CONSTANTS and one.name not in parameters))
+    return tuple(dict.fromkeys(one.name for one in read if one.name not in parameters))
 
 
 def moving(node: Node) -> frozenset[str]:
@@ -141,7 +141,7 @@ def reads_nothing(equation: Equation, text: str) -> ConfigError:
 
 def _a_sample_earlier(parameters: Collection[str], node: Node) -> Node:
     match node:
-        case Name() if node.name not in CONSTANTS and node.name not in parameters:
+        case Name() if node.name not in parameters:
             return Delayed(name=node.name, lag=1.0, seconds=False, at=node.at)
         case Delayed():
             return replace(node, lag=node.lag + 1.0)

@@ -18,7 +18,7 @@ _WORD = re.compile(
     |(?P<end>\n)
     |(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
     |(?P<name>[^\W\d]\w*)
-    |"(?P<quoted>[^"\n]+)"
+    |"(?P<quoted>(?:[^"\n]|"")+)"
     |(?P<sign>\*\*|<=|>=|==|!=|[-+*/^(),;=<>\[\]])""",
     re.VERBOSE,
 )
@@ -31,7 +31,8 @@ class Word:
     """A word.
 
     Args:
-        kind: ``number``, ``name``, ``quoted`` (a name in double quotes), ``sign`` or ``end`` (of an equation).
+        kind: ``number``, ``name``, ``quoted`` (a name in double quotes, where two stand for one), ``sign`` or ``end``
+            (of an equation).
         text: As it is written, a quoted name without its quotes.
         at: Where it begins, in characters.
     """
@@ -39,6 +40,11 @@ class Word:
     kind: str
     text: str
     at: int
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a line cannot be over after it; a name in double quotes ends one like any other."""
+        return self.kind != "quoted" and self.text in _OPEN
 
 
 def words_of(text: str) -> list[Word]:
@@ -78,13 +84,14 @@ def words_of(text: str) -> list[Word]:
                 remedy='put a name that holds other signs in double quotes, as in "P 1"',
             )
         kind = str(found.lastgroup)
-        word = Word(kind=kind, text=found.group(kind), at=at)
+        said = found.group(kind)
+        word = Word(kind=kind, text=said.replace('""', '"') if kind == "quoted" else said, at=at)
         at = found.end()
         if kind == "sign":
             depth += (word.text in "([") - (word.text in ")]")
-        if kind == "end" or (word.text == ";" and depth <= 0):
+        if kind == "end" or (kind == "sign" and word.text == ";" and depth <= 0):
             depth = max(depth, 0)
-            if depth == 0 and words and words[-1].kind != "end" and words[-1].text not in _OPEN:
+            if depth == 0 and words and words[-1].kind != "end" and not words[-1].is_open:
                 words.append(Word(kind="end", text="", at=word.at))
         elif kind != "blank":
             words.append(word)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sysid.equations.functions import CONSTANTS, FUNCTIONS, OWN, operator
+from sysid.equations.functions import FUNCTIONS, OWN, operator
 from sysid.equations.graph import (
     CONTINUOUS_STATE,
     DISCRETE_STATE,
@@ -135,8 +135,6 @@ class _Lowering:
             return self.graph.leaf(FREE, terms.free.index(name))
         if name in terms.fixed:
             return self.graph.leaf(FIXED, terms.fixed.index(name))
-        if name in CONSTANTS:
-            return self.constant(CONSTANTS[name])
         return self.input(name, 0.0, at)
 
     def input(self, name: str, lag: float, at: int) -> int:
@@ -192,9 +190,9 @@ class _Lowering:
                 remedy="correct the delay, or the sample time of the data",
             )
         name = node.name
-        if name not in {*self.system.states, *self.system.definitions, *self.system.parameters, *CONSTANTS}:
+        if name not in {*self.system.states, *self.system.definitions, *self.system.parameters}:
             return self.input(name, lag, node.at)
-        if name in {*self.system.parameters, *CONSTANTS} or lag == 0.0:
+        if name in self.system.parameters or lag == 0.0:
             return self.named(name, node.at)
         if name not in self.chains:
             self.unfinished.append(name)

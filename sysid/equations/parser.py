@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from sysid.equations.functions import CONSTANTS
 from sysid.equations.lexer import Word, words_of
 from sysid.equations.syntax import (
     CONTINUOUS,
@@ -250,6 +251,8 @@ class _Parser:
                 )
             return Delayed(name=word.text, lag=float(lag), seconds=False, at=word.at)
         if self.now.text != "(" or self.now.kind != "sign":
+            if word.kind == "name" and word.text in CONSTANTS:
+                return Number(value=CONSTANTS[word.text], at=word.at)
             return Name(name=word.text, at=word.at)
         self.take()
         if self.now.text == TIME and self.now.kind == "name":

@@ -96,7 +96,7 @@ class System:
     @cached_property
     def others(self) -> tuple[str, ...]:
         """Names that are read and nothing says what they are: inputs, in the order in which they are read first."""
-        known = {*self.states, *self.definitions, *self.parameters, *CONSTANTS}
+        known = {*self.states, *self.definitions, *self.parameters}
         return tuple(dict.fromkeys(name for name, _ in self._reads if name not in known))
 
     @cached_property
@@ -170,13 +170,14 @@ class System:
                 "too many states", where="equations", expected=f"at most {MOST_STATES}", got=len(self.states)
             )
         for one in self.equations:
-            if one.name in (*FUNCTIONS, *OWN, *CONSTANTS, *RESERVED, *self.tables):
+            own = {*self.tables} if self.text[one.at] == '"' else {*WORDS, *self.tables}
+            if one.name in own:
                 raise equation_error(
                     f"{one.name} is a word of the language, or a table",
                     self.text,
                     one.at,
                     expected="another name",
-                    remedy=f"write for example {one.name}_ in its place, everywhere",
+                    remedy=f'write for example {one.name}_ in its place, everywhere, or "{one.name}" in double quotes',
                 )
             if one.name in seen:
                 raise equation_error(
@@ -196,7 +197,7 @@ class System:
                 )
             seen.add(one.name)
         for name in (*self.parameters, *self.tables):
-            if name in {*FUNCTIONS, *OWN, *CONSTANTS, *RESERVED}:
+            if name in WORDS:
                 raise ConfigError(
                     f"{name} is a word of the language",
                     where="parameters" if name in self.parameters else "tables",
@@ -302,6 +303,10 @@ MOST_DEFINITIONS = 300
 """Names that are computed from others: they may need each other in a row."""
 
 
+WORDS = frozenset({*FUNCTIONS, *OWN, *CONSTANTS, *RESERVED})
+"""Words of the language: in double quotes they are names like any other."""
+
+
 def written_name(name: str) -> str:
     """A name as an equation has it: in double quotes where it is no plain word, or one of the language's own.
 
@@ -310,8 +315,12 @@ def written_name(name: str) -> str:
 
     Returns:
         It, as it is written.
+
+    Example:
+        >>> print(*map(written_name, ("flow", "P 1", "max", 'a"b')))
+        flow "P 1" "max" "a""b"
     """
-    return name if name.isidentifier() and name not in RESERVED else f'"{name}"'
+    return name if name.isidentifier() and name not in WORDS else '"' + name.replace('"', '""') + '"'
 
 
 def _in_order(node: Node) -> list[Node]:

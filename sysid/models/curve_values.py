@@ -9,11 +9,12 @@ from typing import Any, Final, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.models.base import AbstractModel
 from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
 from sysid.models.built_model import BuiltModel
-from sysid.models.curves import NONE, Text, quoted
+from sysid.models.curves import NONE, Text
 from sysid.models.grey_box import lowered
 from sysid.models.history import History
 
@@ -124,14 +125,14 @@ def _wanted(model: BuiltModel) -> list[tuple[str, str, str, str, str]]:
         each = zip(mapping.inputs, model.input_units, structure.curves(n), structure.lags(n), strict=True)
         for j, (name, unit, curve, lag) in enumerate(each, start=1):
             tag = f"f{j}" if n > 1 else "f"
-            read = quoted(name) + (f"[k-{lag - 1}]" if lag > 1 else "")
+            read = written_name(name) + (f"[k-{lag - 1}]" if lag > 1 else "")
             behind = text.name(f"{tag}_in" if curve.given else f"{tag}_out")
             if curve.kind != NONE:
                 wanted.append((f"{name}: {curve}", f"{name} [{unit}]", "into the block, scaled", read, behind))
         if structure.output.kind != NONE:
             x = text.name("unbent" if structure.output.given else "inside")
             label = "out of the block" + (f" [{model.output_unit}]" if structure.output.given else ", scaled")
-            y = model.grey.equations.splitlines()[-1].partition(" = ")[2]
+            y = _right(model)
             title = f"{mapping.output}: {structure.output}"
             wanted.append((title, label, f"{mapping.output} [{model.output_unit}]", x, y))
     elif isinstance(structure, WienerHammerstein):
@@ -141,14 +142,19 @@ def _wanted(model: BuiltModel) -> list[tuple[str, str, str, str, str]]:
     return wanted
 
 
+def _right(model: BuiltModel) -> str:
+    """What the output is, as the last equation has it."""
+    return model.grey.equations.splitlines()[-1].removeprefix(f"{written_name(model.mapping.output)} = ")
+
+
 def _run(model: BuiltModel, expression: str, records: Sequence[tuple[Array, History]]) -> Array:
     """What an expression of the equations is over some records, one after the other."""
     mapping = model.mapping
-    *lines, last = model.grey.equations.splitlines()
+    lines = model.grey.equations.splitlines()[:-1]
     kept = Text(taken=frozenset((*mapping.inputs, *mapping.outputs))).name("whole")  # so that all parameters are read
-    right, own = last.partition(" = ")[2], model
+    right, own = _right(model), model
     if expression != right:
-        lines += [f"{kept} = {right}", f"{quoted(mapping.output)} = {expression}"]
+        lines += [f"{kept} = {right}", f"{written_name(mapping.output)} = {expression}"]
         grey = replace(model.grey, equations="\n".join(lines))
         low = lowered(grey, mapping.inputs, mapping.outputs, model.sample_time)
         # Networks that are run are the first: only that of the last line may be gone, and its weights with it.

@@ -261,11 +261,6 @@ def number(value: float) -> str:
     return f"({float(value)!r})" if value < 0.0 else repr(float(value))
 
 
-def quoted(channel: str) -> str:
-    """The name of a channel as equations have it."""
-    return channel if channel.isidentifier() else f'"{channel}"'
-
-
 def _limited(function: str) -> Callable[[Text, Curve, str, str], str]:
     def write(text: Text, curve: Curve, x: str, tag: str) -> str:
         if curve.limits is not None:

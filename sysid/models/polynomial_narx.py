@@ -8,8 +8,9 @@ from itertools import combinations_with_replacement
 from math import comb
 from typing import Annotated, Any
 
+from sysid.equations.system import written_name
 from sysid.errors import ConfigError, shortened
-from sysid.models.curves import number, quoted
+from sysid.models.curves import number
 from sysid.models.lags import Lags, LagSpec, parse_lags, whole
 from sysid.models.mapping import Mapping
 from sysid.models.ranges import IntRange
@@ -115,7 +116,7 @@ class PolynomialNARX(AbstractStructure):
         found = []
         levels = (0.0,) * len(names) if origin is None else origin
         for name, each, at in zip(names, (*lags.inputs, lags.output), levels, strict=True):
-            plain = [f"{quoted(name)}[k-{lag}]" if lag else quoted(name) for lag in each]
+            plain = [f"{written_name(name)}[k-{lag}]" if lag else written_name(name) for lag in each]
             found += [f"({one} - {number(float(at))})" if at else one for one in plain]
         return found
 

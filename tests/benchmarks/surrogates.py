@@ -2,7 +2,8 @@
 
 Run with ``python -m tests.benchmarks surrogates --minutes=5 --only=thermal,cylinder --workers=2``. References are slow
 models of the tests (a stiff thermal network of 200 states, a hydraulic cylinder with friction and end stops, a motor on
-a spindle between stops, a basin that runs over and runs dry), which can be compiled
+a spindle between stops, a basin that runs over and runs dry, a block that sticks and slips behind a spring, a tank
+whose valve sticks), which can be compiled
 (``--compiled=yes``), to the same numbers and so fast that the proof has 1,000 experiments in any time, while the
 surrogate's speed is held against two runs of the model as it is written; and, where the folder of the environment
 variable ``REFERENCE_FMUS`` holds them, the Modelica Association's VanDerPol, Dahlquist and BouncingBall
@@ -76,6 +77,25 @@ PYTHON: dict[str, dict[str, Any]] = {
             "outputs": {"level": {"unit": "m"}},
         },
         "experiment": {"duration": 600.0, "runs": MORE},
+    },
+    "block": {
+        "reference": {
+            **{"python": "slow_models:block", "sample_time": 0.05},
+            "inputs": {"pull": {"unit": "m/s", "range": [-0.3, 0.3], "start": 0}},
+            "outputs": {"place": {"unit": "m"}, "spring": {"unit": "N"}},
+        },
+        "experiment": {"duration": 20.0, "runs": MORE},
+    },
+    "valve": {
+        "reference": {
+            **{"python": "slow_models:valve", "sample_time": 1.0},
+            "inputs": {
+                "inflow": {"unit": "m3/s", "range": [0, 0.08], "start": 0},
+                "command": {"unit": "1", "range": [0, 1], "start": 0},
+            },
+            "outputs": {"level": {"unit": "m"}, "outflow": {"unit": "m3/s"}},
+        },
+        "experiment": {"duration": 300.0, "runs": MORE},
     },
 }
 FMUS = {

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from sysid.equations import System
+from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 
 
@@ -13,6 +16,23 @@ def test_names_are_sorted() -> None:
     assert (system.continuous, system.discrete, tuple(system.definitions)) == (("x",), ("z",), ("q", "y"))
     assert system.others == ("u", "v")
     assert system.order == ("q", "y")
+
+
+def test_words_of_the_language_are_names_in_double_quotes() -> None:
+    """Channels are called as they are called, and their equations are written by those who do not know."""
+    system = System.read('"max" = "t" + max("pi", pi) + "a ""b""" + "and"[k-1]', [])
+    assert tuple(system.definitions) == ("max",)
+    assert system.others == ("t", "pi", 'a "b"', "and")
+
+
+@example(";")
+@example("and")
+@given(st.text(st.characters(exclude_categories=["C"]), min_size=1))
+def test_any_name_is_read_as_it_was_written(name: str) -> None:
+    system = System.read(f"y_ = pi + {written_name(name)}\nz_ = y_", [])
+    assert system.others == (name,)
+    if name != "y_":
+        assert tuple(System.read(f"{written_name(name)} = 1 + u_", []).definitions) == (name,)
 
 
 def test_definitions_are_ordered_by_what_they_need() -> None:

@@ -11,6 +11,7 @@ from numba import njit
 from slow_models import Array
 
 _cylinder, _spindle, _basin = map(njit, (slow_models.cylinder_run, slow_models.spindle_run, slow_models.basin_run))
+_block, _valve = map(njit, (slow_models.block_run, slow_models.valve_run))
 
 
 def thermal(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
@@ -31,3 +32,13 @@ def spindle(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Arra
 def basin(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``slow_models:basin``."""
     return _basin(time[1] - time[0], np.ascontiguousarray(inputs))
+
+
+def block(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """As ``slow_models:block``."""
+    return _block(time[1] - time[0], np.ascontiguousarray(inputs))
+
+
+def valve(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """As ``slow_models:valve``."""
+    return _valve(time[1] - time[0], np.ascontiguousarray(inputs))

@@ -271,3 +271,49 @@ def gives(time: Array, inputs: Array, parameters: Mapping[str, float]) -> object
 
 
 NO_FUNCTION = 3
+
+
+def block(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """A block on a table behind a spring that is pulled, which sticks with 6 N and slips with 4.
+
+    Input: the pull in m/s. Outputs: the block's place in m, the spring's force in N.
+    """
+    return block_run(float(time[1] - time[0]), inputs)
+
+
+def block_run(h: float, inputs: Array) -> Array:
+    """The same of numbers alone."""
+    dt, place, speed, end, found = h / 200, 0.0, 0.0, 0.0, np.empty((len(inputs), 2))
+    for k, pull in enumerate(inputs[:, 0]):
+        for _ in range(200):
+            end += dt * pull
+            spring = 20.0 * (end - place)
+            rubs = 4.0 + 2.0 * np.exp(-((speed / 0.05) ** 2))
+            if speed == 0.0 and abs(spring) <= rubs:
+                continue
+            faster = speed + dt * (spring - 0.5 * speed - rubs * np.sign(speed if speed else spring))
+            speed = 0.0 if speed * faster < 0.0 else faster
+            place += dt * speed
+        found[k] = place, 20.0 * (end - place)
+    return found
+
+
+def valve(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
+    """A tank that runs over, drained by a valve whose stem sticks.
+
+    Inputs: inflow in m3/s, the valve's command from 0 to 1. Outputs: level in m, outflow in m3/s.
+    """
+    return valve_run(float(time[1] - time[0]), inputs)
+
+
+def valve_run(h: float, inputs: Array) -> Array:
+    """The same of numbers alone."""
+    dt, level, stem, outflow, found = h / 200, 0.3, 0.0, 0.0, np.empty((len(inputs), 2))
+    for k in range(len(inputs)):
+        inflow, command = inputs[k, 0], inputs[k, 1]
+        for _ in range(200):
+            stem = min(max(stem, command - 0.06), command + 0.06)
+            outflow = 0.02 * min(max(stem, 0.0), 1.0) * np.sqrt(19.62 * level)
+            level = max(level + dt * (inflow - outflow - 0.5 * max(level - 1.0, 0.0) ** 1.5) / 0.5, 0.0)
+        found[k] = level, outflow
+    return found

@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.equations.system import written_name
 from sysid.estimation.blocks.linear_start import LinearStart
 from sysid.estimation.blocks.sections import Block, Pair
 from sysid.models import GreyBox, HammersteinWiener, Mapping, WienerHammerstein
-from sysid.models.curves import NONE, Curve, Text, number, quoted, sizeable
+from sysid.models.curves import NONE, Curve, Text, number, sizeable
 
 
 def hammerstein_wiener(
@@ -42,7 +43,7 @@ def hammerstein_wiener(
         right = text.curve(curve, text.define("unbent", f"{in_units}*{inside}"), tag)
     else:
         right = f"{in_units}*({text.curve(curve, inside, tag)})"
-    text.lines.append(f"{quoted(mapping.output)} = {right}")
+    text.lines.append(f"{written_name(mapping.output)} = {right}")
     return _grey(text), frozenset(text.curved)
 
 
@@ -83,7 +84,7 @@ def wiener_hammerstein(
     linear = write_block(text, behind, [(bent, True), *((one, True) for one in more)], "g2")
     scaling = begun.scaling
     right = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}*({linear} + {level})"
-    text.lines.append(f"{quoted(mapping.output)} = {right}")
+    text.lines.append(f"{written_name(mapping.output)} = {right}")
     return _grey(text), weights
 
 
@@ -134,7 +135,7 @@ def _inputs(
     found, scaling = [], begun.scaling
     for j, (name, curve, lag) in enumerate(zip(mapping.inputs, curves, lags, strict=True)):
         tag = f"f{j + 1}" if len(mapping.inputs) > 1 else "f"
-        read = quoted(name) + (f"[k-{lag - 1}]" if lag > 1 else "")
+        read = written_name(name) + (f"[k-{lag - 1}]" if lag > 1 else "")
         offset, scale = scaling.input_offset[j], scaling.input_scale[j]
         if curve.kind == "table":
             values = np.array([y for _, y in curve.points])

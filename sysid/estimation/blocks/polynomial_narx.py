@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.equations.system import written_name
 from sysid.errors import FitDivergedError
 from sysid.estimation.blocks.selection import Chosen, choose_terms
 from sysid.estimation.clock import now
@@ -22,7 +23,7 @@ from sysid.estimation.linear.regression import nothing_in_a_row
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.result import FitResult
 from sysid.models import BuiltModel, GreyBox, Lags, Mapping, PolynomialNARX, Start
-from sysid.models.curves import Text, number, quoted
+from sysid.models.curves import Text, number
 from sysid.models.polynomial_narx import Term
 from sysid.traces import Trace
 
@@ -217,7 +218,7 @@ def equations(
         "*".join(filter(None, [text.estimated(f"c{i}", c), _written(term, names)]))
         for i, (term, c) in enumerate(zip(terms, coefficients, strict=True), start=1)
     ]
-    text.lines.append(f"{quoted(mapping.output)} = {' + '.join(level + parts)}")
+    text.lines.append(f"{written_name(mapping.output)} = {' + '.join(level + parts)}")
     return GreyBox(equations="\n".join(text.lines), parameters=tuple(text.parameters))
 
 

@@ -12,8 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sysid.equations.system import written_name
 from sysid.estimation.friction.found import Beside, Friction
 from sysid.models import Mapping, VectorGreyBox
+from sysid.models.curves import Text
 
 STEPS = 5
 """From sample to sample."""
@@ -66,10 +68,7 @@ class _Written:
 
     def _own(self, name: str) -> str:
         """A name that no channel has."""
-        prefix = "f"
-        while any(one.startswith(f"{prefix}_") for one in self.mapping.channels):
-            prefix += "f"
-        return f"{prefix}_{name}"
+        return Text(taken=frozenset(self.mapping.channels)).name(f"f_{name}")
 
     def _parameters(self) -> dict[str, Any]:
         found, size = self.found, max(map(abs, (*self.found.by_inputs, *self.found.by_beside)))
@@ -92,7 +91,7 @@ class _Written:
 
     def _lines(self) -> Iterator[str]:
         own, found = self._own, self.found
-        for j, name in enumerate(_quoted(self.mapping.inputs)):
+        for j, name in enumerate(map(written_name, self.mapping.inputs)):
             yield f"{own(f'u_{j}')} = ({name} - {_n(found.begins[j])})/{_n(found.reach[j])}"
         pushes = " + ".join(f"{own(f'push_{j}')}*{own(f'u_{j}')}" for j in range(len(found.begins)))
         yield f"{own('push')} = {pushes} + {own('bias')}"
@@ -102,7 +101,7 @@ class _Written:
             after = {name: own(f"{name}_{k}") for name in names}
             yield from self._step(now, after, k)
             now = after
-        places = _quoted(self.mapping.outputs)
+        places = list(map(written_name, self.mapping.outputs))
         yield f"{places[found.output]} = {_n(found.rest[found.output])} + {_n(found.span)}*{now['place']}"
         yield from self._beside(now, places)
         for name in names:
@@ -149,7 +148,3 @@ def _n(value: float) -> str:
     """A number, in brackets where it has a sign."""
     text = f"{value:.13g}"
     return f"({text})" if text.startswith("-") else text
-
-
-def _quoted(names: Sequence[str]) -> list[str]:
-    return [name if name.isidentifier() and name.isascii() else f'"{name}"' for name in names]

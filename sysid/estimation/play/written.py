@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from sysid.equations.system import written_name
 from sysid.estimation.play.found import Array, Play, Records, monomials, played
 from sysid.models import Mapping, VectorGreyBox
+from sysid.models.curves import Text
 
 DEGREES, MOST_TERMS = (5, 3), 260
 """Of the polynomials, the likeliest first, and their terms at most, all outputs together."""
@@ -82,13 +84,11 @@ class _Written:
 
     def _own(self, name: str) -> str:
         """A name that no channel has."""
-        prefix = "p"
-        while any(one.startswith(f"{prefix}_") for one in self.mapping.channels):
-            prefix += "p"
-        return f"{prefix}_{name}"
+        return Text(taken=frozenset(self.mapping.channels)).name(f"p_{name}")
 
     def _lines(self, terms: Sequence[tuple[int, ...]], middle: Array, half: Array, spans: Array) -> Iterator[str]:
-        own, inputs, outputs = self._own, *(_quoted(some) for some in (self.mapping.inputs, self.mapping.outputs))
+        own = self._own
+        inputs, outputs = ([written_name(one) for one in some] for some in (self.mapping.inputs, self.mapping.outputs))
         moved, width = inputs[self.found.input], own("width")
         stood = f"where({own('runs')} > 0.5, {own('kept')}, {own('stood')})"
         yield f"{own('stem')} = min(max({stood}, {moved} - {width}), {moved} + {width})"
@@ -106,7 +106,3 @@ class _Written:
                 yield f"{own(f'was_{j}')}[k+1] = {output}"
         yield f"{own('kept')}[k+1] = {own('stem')}"
         yield f"{own('runs')}[k+1] = 1"
-
-
-def _quoted(names: Sequence[str]) -> list[str]:
-    return [name if name.isidentifier() and name.isascii() else f'"{name}"' for name in names]

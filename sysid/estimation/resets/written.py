@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from collections.abc import Mapping as Dict
+from functools import partial
 
 import numpy as np
 
+from sysid.equations.system import written_name
 from sysid.estimation.resets.reset_map import Array, Guard, ResetMap, Rest
 from sysid.models import Mapping, VectorGreyBox
+from sysid.models.curves import Text
 
 DIGITS = 13
 """Of a number: what is behind them is rounding."""
+
+Own = Callable[[str], str]
+"""Gives a name that no channel has."""
 
 
 def grey_box_of(found: ResetMap, mapping: Mapping, others: Dict[str, Array] | None = None) -> VectorGreyBox:
@@ -26,17 +32,18 @@ def grey_box_of(found: ResetMap, mapping: Mapping, others: Dict[str, Array] | No
         The structure; nothing of it is left to estimate.
     """
     derived = others or {}
-    names = _quoted([name for name in mapping.outputs if name not in derived])
-    inputs = _quoted(mapping.inputs)
+    own = Text(taken=frozenset(mapping.channels)).name
+    names = [written_name(name) for name in mapping.outputs if name not in derived]
+    inputs = list(map(written_name, mapping.inputs))
     inputs += [f"({'1' if above is None else inputs[above]}/{inputs[below]})" for above, below in found.ratios]
-    before = [f"before_{k}" for k in range(len(names))]
+    before = [own(f"before_{k}") for k in range(len(names))]
     lines, now = list[str](), before
     for step in range(found.steps):
         last = step + 1 == found.steps
-        after = names if last else [f"at_{step}_{k}" for k in range(len(names))]
-        lines += _step(found, now, after, inputs, step)
+        after = names if last else [own(f"at_{step}_{k}") for k in range(len(names))]
+        lines += _step(found, now, after, inputs, partial(_of_step, own, step))
         now = after
-    lines += [f"{_quoted([name])[0]} = {_sum(row, [*names, ''])}" for name, row in derived.items()]
+    lines += [f"{written_name(name)} = {_sum(row, [*names, ''])}" for name, row in derived.items()]
     lines += [f"{one}[k+1] = {name}" for one, name in zip(before, names, strict=True)]
     initial = {
         one: {"start": float(f"{value:.{DIGITS}g}"), "fixed": True}
@@ -45,18 +52,18 @@ def grey_box_of(found: ResetMap, mapping: Mapping, others: Dict[str, Array] | No
     return VectorGreyBox(equations="\n".join(lines), initial=initial)
 
 
-def _quoted(names: Sequence[str]) -> list[str]:
-    return [name if name.isidentifier() and name.isascii() else f'"{name}"' for name in names]
+def _of_step(own: Own, step: int, name: str) -> str:
+    return own(f"{name}_{step}")
 
 
-def _step(found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str], step: int) -> Iterator[str]:
-    between = [f"on_{step}_{k}" for k in range(len(now))]
+def _step(found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str], own: Own) -> Iterator[str]:
+    between = [own(f"on_{k}") for k in range(len(now))]
     if found.looks_first:
-        yield from _looked(found, now, between, inputs, step)
+        yield from _looked(found, now, between, inputs, own)
         yield from _flown(found, between, after, inputs)
     else:
         yield from _flown(found, now, between, inputs)
-        yield from _looked(found, between, after, inputs, step)
+        yield from _looked(found, between, after, inputs, own)
 
 
 def _flown(found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str]) -> Iterator[str]:
@@ -65,13 +72,13 @@ def _flown(found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Se
 
 
 def _looked(
-    found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str], step: int
+    found: ResetMap, now: Sequence[str], after: Sequence[str], inputs: Sequence[str], own: Own
 ) -> Iterator[str]:
     value = list(now)
     for number, guard in reversed(list(enumerate(found.guards))):
-        event = f"event_{step}_{number}"
+        event = own(f"event_{number}")
         yield f"{event} = {_event(guard, now, inputs)}"
-        set_to = [f"set_{step}_{number}_{k}" for k in range(len(now))]
+        set_to = [own(f"set_{number}_{k}") for k in range(len(now))]
         yield from _set(guard, now, inputs, set_to)
         value = [
             f"where({event}, {one}, {other})" for one, other in zip(_resting(found.rest, set_to), value, strict=True)

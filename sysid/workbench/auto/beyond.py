@@ -4,8 +4,8 @@ Parts of a record that are held out are of the same movement as the rest of it. 
 rest before the next, a network may meet every part and be far off where a step follows sooner. Nobody knows what the
 plant would do there, but models from other parts, starts and structures, all of which meet the record, say how well it
 is known: where they differ, most of them are wrong (query by committee: Seung, Opper and Sompolinsky 1992; ambiguity of
-an ensemble: Krogh and Vedelsby 1995). The middle of them is the best guess there is, and who stands
-alone is not chosen.
+an ensemble: Krogh and Vedelsby 1995). The middle of them is the best guess there is, and who stands alone is not
+chosen.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from statistics import median
 
 import numpy as np
@@ -21,9 +22,12 @@ from numpy.typing import NDArray
 from sysid.estimation.stability.excursions import usable_parts
 from sysid.estimation.stability.free_run import free_runs
 from sysid.estimation.stability.other_commands import LONGEST, OtherCommands
+from sysid.estimation.stability.sequences import InputSequence
 from sysid.models import AbstractModel
+from sysid.models import Mapping as ChannelMapping
 from sysid.reporting.sweep_record import Trial
 from sysid.traces import Trace
+from sysid.workbench.auto.words import EXACT
 
 AS_GOOD = 1.5
 """Times the least error up to which a trial's models are looked at: to be in the middle is no merit of one that meets
@@ -96,13 +100,12 @@ class Beyond:
         """
         return self.spread > TOLD**2 * error
 
-    def sentence(self, error: float, shown: Callable[[float], str], linear: tuple[str, float] | None = None) -> str:
+    def sentence(self, error: float, shown: Callable[[float], str]) -> str:
         """That they are, for people; empty where they are not.
 
         Args:
             error: As for :meth:`tells`.
             shown: Writes a root of a mean square with its unit.
-            linear: The best linear model, where it was not chosen, and its error.
 
         Returns:
             What it means, and what would help.
@@ -111,16 +114,12 @@ class Beyond:
             return ""
         apart, own = math.sqrt(self.spread), math.sqrt(error)
         times = f"{apart / own:.2g} times its error on what chose" if own else "where what chose shows no error"
-        safer = ""
-        if linear is not None and linear[1] < self.spread:
-            safer = f"The best linear model, {linear[0]}, which leaves {shown(math.sqrt(linear[1]))}, is safer there. "
         return (
             "Not shown by the record: on other commands, made of pieces of its own inputs in other order, "
             f"{self.models} models that did alike are {shown(apart)} (root mean square, median) from the middle of "
             f"them, {times}. "
             "An error may be as large wherever inputs follow each other in other ways than here. "
-            f"{safer}Record more of these: levels and holding times at random, some shorter than the output takes to "
-            "settle."
+            "Record more of these: levels and holding times at random, some shorter than the output takes to settle."
         )
 
 
@@ -152,30 +151,44 @@ def look_beyond(
     if not np.isfinite(least) or len(found) < FEWEST or not any(usable_parts(trace, ()) for trace in traces):
         return Beyond()
     count = max(2, min(COMMANDS, MOST_BYTES // (8 * LONGEST * len(sizes) * len(found))))
-    runs = np.stack([_run(models, traces, count, seed) for _, models in found])
-    middle = np.median(runs, axis=0)
-    away = [float(np.mean((run - middle) ** 2 / np.asarray(sizes))) for run in runs]
-    apart = {
-        trial.number: median(a for a, (one, _) in zip(away, found, strict=True) if one is trial)
-        for trial in near
-        if any(one is trial for one, _ in found)
-    }
-    return Beyond(models=len(found), spread=median(away), apart=apart)
+    asked = cache(lambda mapping: _Asked.of(mapping, traces, count, seed))
+    runs = np.stack([np.hstack([asked(model.mapping).run(model) for model in models]) for _, models in found])
+    away = np.mean((runs - np.median(runs, axis=0)) ** 2 / np.asarray(sizes), axis=(1, 2))
+    spans = np.concatenate([asked(model.mapping).span for model in found[0][1]])
+    away[away <= EXACT**2 * np.mean(spans**2 / np.asarray(sizes))] = 0.0  # what rounding leaves of exact models
+    own = dict[int, list[float]]()
+    for (trial, _), one in zip(found, away.tolist(), strict=True):
+        own.setdefault(trial.number, []).append(one)
+    apart = {number: median(some) for number, some in own.items()}
+    return Beyond(models=len(found), spread=float(np.median(away)), apart=apart)
 
 
-def _run(models: Models, traces: Sequence[Trace], count: int, seed: int) -> NDArray[np.float64]:
-    """The runs over all commands, one after the other: shape ``(n_samples, n_outputs)``."""
-    return np.hstack([_run_one(model, traces, count, seed) for model in models])
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Asked:
+    """Other commands for models of one mapping, drawn once.
 
+    Args:
+        commands: They.
+        low: Least value of each output in the records, shape ``(n_outputs,)``.
+        span: Their ranges.
+    """
 
-def _run_one(model: AbstractModel, traces: Sequence[Trace], count: int, seed: int) -> NDArray[np.float64]:
-    commands = OtherCommands.of(traces, model.mapping.inputs, model.mapping.outputs)
-    low, high = commands.output_range
-    least, most = low - FAR * (high - low), high + FAR * (high - low)
-    runs = [
-        np.clip(np.where(np.isnan(run), most, run), least, most)[int(BEGINNING * len(run)) :]
-        for run in (
-            one.reshape(len(command.inputs), -1) for command, one in free_runs(model, commands.draw(count, seed))
-        )
-    ]
-    return np.concatenate(runs)
+    commands: list[InputSequence]
+    low: NDArray[np.float64]
+    span: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, mapping: ChannelMapping, traces: Sequence[Trace], count: int, seed: int) -> _Asked:
+        source = OtherCommands.of(traces, mapping.inputs, mapping.outputs)
+        low, high = source.output_range
+        return cls(commands=list(source.draw(count, seed)), low=low, span=high - low)
+
+    def run(self, model: AbstractModel) -> NDArray[np.float64]:
+        """The runs over all commands, one after the other: shape ``(n_samples, n_outputs)``."""
+        least, most = self.low - FAR * self.span, self.low + (1.0 + FAR) * self.span
+        runs = [
+            run.reshape(len(command.inputs), -1)[int(BEGINNING * len(run)) :]
+            for command, run in free_runs(model, self.commands)
+        ]
+        lost = np.nan_to_num(np.concatenate(runs), nan=np.inf, posinf=np.inf, neginf=-np.inf)
+        return np.asarray(np.clip(lost, least, most))

@@ -284,7 +284,7 @@ class Search:
                 *told.left_out(plan),
                 *(f"Look at the data: {one}" for one in self.looked.cautions),
             ),
-            warning=self._warning(choice, beyond),
+            warning=beyond.sentence(error(choice.chosen), partial(shown_in, self._unit)),
             hurried=hurried,
             needs_s=needs_s,
             done_now=trials.done_now,
@@ -319,11 +319,6 @@ class Search:
             plan.candidates, error, lambda one: [m for n in plan.starts_of(one) for m in trials.fitted(n)],
             self.data.estimation, sizes, seed=self.config.seed,
         )  # fmt: skip
-
-    def _warning(self, choice: Choice, beyond: Beyond) -> str:
-        linear = choice.linear
-        other = None if linear is None or linear is choice.chosen else (linear.label, error(linear))
-        return beyond.sentence(error(choice.chosen), partial(shown_in, self._unit), other)
 
     @property
     def _unit(self) -> str:

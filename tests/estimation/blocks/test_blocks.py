@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+import sysid
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Status
 from sysid.estimation.blocks.fit import fit_blocks
@@ -29,6 +30,7 @@ from sysid.models import (
     WienerHammerstein,
     model_from_dict,
 )
+from sysid.models.curve_values import curve_values, has_curves
 from sysid.models.curves import Curve
 from sysid.traces import Channel, Trace
 
@@ -92,6 +94,30 @@ def test_blocks_and_curves_are_found(system: Any, structure: dict[str, Any]) -> 
     u = steps(1)
     fit = fit_blocks([a_trace(u, system(u))], MAPPING, HammersteinWiener(states=2, **structure), ONE)
     assert error(fit, system) < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("given", "comes"), [("t", "max"), ('u "1"', "pi"), ("f_in", "and"), ("c1", "inside"), ("k", "x = 1")]
+)
+@pytest.mark.parametrize(
+    "structure", [HammersteinWiener(states=1, input="piecewise 4", output="piecewise 4"), PolynomialNARX()]
+)
+def test_channels_may_be_called_as_words_of_equations_are(structure: Any, given: str, comes: str) -> None:
+    u = steps(0)
+    y = saturated(u)
+
+    def fitted(*names: str) -> FitResult:
+        channels = tuple(Channel(name=name, unit="V") for name in names)
+        trace = Trace(name="r", sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
+        return sysid.fit(trace, Mapping(inputs=names[:1], outputs=names[1:]), structure)
+
+    found, plain = fitted(given, comes), fitted("u", "y")
+    np.testing.assert_array_equal(found.model.simulate(u[:, None]), plain.model.simulate(u[:, None]))
+    if has_curves(found.model):
+        rest = History.at_rest(inputs=u[:1], output=0.0)
+        drawn, usual = (curve_values(one.model, [(u[:, None], rest)]) for one in (found, plain))
+        for one, other in zip(drawn, usual, strict=True):
+            np.testing.assert_array_equal(one.y, other.y)
 
 
 def test_the_limits_of_a_saturation_have_intervals_that_hold_them() -> None:

@@ -65,7 +65,7 @@ def test_play_is_found_with_its_width_and_its_equations_come_to_the_plant() -> N
     assert found is not None
     assert found.input == 1
     assert found.width == pytest.approx(WIDTH, rel=0.05)
-    names = ("fill", "p_command", "level", "out")  # a channel has the prefix that names of ours would have
+    names = ("dt", "p_stem", "level", "pi")  # words of the language, and what a name of ours would be
     mapping = Mapping(inputs=names[:2], outputs=names[2:])
     (box, _) = grey_boxes_of(found, runs[:8], mapping)
     channels = tuple(Channel(name=name, unit="1") for name in names)

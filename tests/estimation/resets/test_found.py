@@ -155,8 +155,9 @@ def test_its_equations_run_as_it_does(name: str) -> None:
     found, others = of(name)
     assert found is not None
     u, y = others[0]
-    names = tuple(f"u {k}" for k in range(u.shape[1]))
-    mapping = Mapping(inputs=names, outputs=tuple(f"y {k}" for k in range(found.n_outputs)))
+    # Words of the language, a quotation mark, and what names of ours would be.
+    names = ("and", 'u "2"', "event_0_0", "pi")[: u.shape[1]]
+    mapping = Mapping(inputs=names, outputs=("max", "before_0", "y 2")[: found.n_outputs])
     record = sysid.data({"r": (u, y)}, inputs=names, outputs=mapping.outputs, sample_time=0.01, split=["estimation"])
     rest = dict(zip(mapping.outputs, found.begin.tolist(), strict=True))
     fit = sysid.fit(record, mapping, grey_box_of(found, mapping), start=Start(), rest_output=rest)

@@ -269,7 +269,8 @@ def lag(time, inputs, parameters):
     np.testing.assert_array_equal(after.proof.errors, whole.proof.errors)
     assert after.notes == whole.notes
     counted = [(tmp_path / name / "lag.py.log").read_text(encoding="utf-8") for name in ("whole", "killed")]
-    assert counted[0] == counted[1]
+    # With one worker one run may be on its way when it is killed: that has no result, and is run again.
+    assert 0 <= counted[1].count("run") - counted[0].count("run") <= (at == "Proving")
     assert "Of 6 new random experiments" in after.report.read_text(encoding="utf-8")
 
 
