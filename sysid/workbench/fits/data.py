@@ -63,7 +63,8 @@ def data_of(traces: TraceSet, mapping: Mapping) -> Data:
             where=f"data set {traces.name}",
             expected="a case with role: estimation",
             got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
-            remedy="give a case that role in the data set's dataset.yaml",
+            remedy="give a case that role in the data set's dataset.yaml, or from Python in the roles of its TraceSet: "
+            f"roles={{{next(iter(traces.roles))!r}: Role.ESTIMATION}}",
         )
     return Data(traces=traces, selection=traces.with_role(Role.SELECTION))
 
