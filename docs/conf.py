@@ -22,6 +22,7 @@ html_theme = "furo"
 html_title = "sysid"
 html_theme_options = {"navigation_with_keys": True, "top_of_page_buttons": []}
 html_static_path, html_css_files = ["_static"], ["site.css"]
+html_search_scorer = str(Path(__file__).with_name("scorer.js"))
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
