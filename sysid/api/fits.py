@@ -17,9 +17,8 @@ from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ChannelError, TraceError, shortened
 from sysid.estimation import FitResult
 from sysid.estimation.experiment import Experiment
-from sysid.ingest.frames import as_array
 from sysid.ingest.run_inputs import inputs_of
-from sysid.ingest.run_records import before_a_run, level_of
+from sysid.ingest.run_records import before_a_run, level_of, measured_of
 from sysid.models import Cascade, History, Start
 from sysid.models.curve_values import curve_values
 from sysid.models.form import unheeded
@@ -92,16 +91,23 @@ class Fit(FitResult):
         """Prediction from measured output.
 
         Args:
-            y: Measured output, shape ``(n_samples,)``, or ``(n_samples, n_outputs)`` of a model of several outputs.
+            y: Measured output, shape ``(n_samples,)``, or ``(n_samples, n_outputs)`` of a model of several outputs; or
+                a frame or dict with columns by name, or a trace.
             u: Inputs, as for :meth:`simulate`.
             steps: How many samples ahead.
             initial: As for :meth:`simulate`.
 
         Returns:
-            What each sample was predicted to be ``steps`` before it, of the shape of ``y``, in the output's unit.
+            What each sample was predicted to be ``steps`` before it, in the output's unit, of the shape that
+            :meth:`simulate` gives.
+
+        Raises:
+            ChannelError: If an input or an output is missing.
+            ConfigError: If ``y`` and ``u`` have rows of other labels, or columns are not as many as channels.
+            TraceError: If they differ in length, or a sample is missing.
         """
         inputs = self._inputs(u)
-        output = self._outputs(y)
+        output = self._outputs(y, u)
         if len(output) != len(inputs):
             raise TraceError(
                 "inputs and output have different lengths",
@@ -295,26 +301,18 @@ class Fit(FitResult):
         model = self.model
         return inputs_of(u, model.mapping.inputs, sample_time=model.sample_time, units=model.ends.units)
 
-    def _outputs(self, y: Any) -> NDArray[np.float64]:
-        named = isinstance(y, Dict) or hasattr(y, "columns")
-        output = inputs_of(y, self.model.mapping.outputs, units=self.model.ends.units) if named else as_array(y)
-        if output.dtype.kind not in "buif":
-            raise TraceError(
-                "the measured output is no numbers",
-                where=", ".join(self.model.mapping.outputs),
-                expected="real numbers",
-                got=f"shape {output.shape} of type {output.dtype}",
-                remedy="give a column of numbers an output, or columns by name",
-            )
-        output = output.astype(np.float64)
-        return output.reshape(len(output), -1) if self.model.structure.several_outputs else output.reshape(-1)
+    def _outputs(self, y: Any, u: Any) -> NDArray[np.float64]:
+        model = self.model
+        found = measured_of(y, u, model.mapping.outputs, model.ends.units, sample_time=model.sample_time)
+        return found if model.structure.several_outputs else found[:, 0]
 
     def _history(self, inputs: NDArray[np.float64], initial: Initial) -> History | None:
         model = self.model
         if initial is None or isinstance(initial, History):
             return initial
         if isinstance(initial, tuple):
-            before, output = before_a_run(initial, model.mapping.inputs, model.mapping.outputs, model.ends.units)
+            ends = model.mapping.inputs, model.mapping.outputs, model.ends.units
+            before, output = before_a_run(initial, *ends, sample_time=model.sample_time)
             return History(inputs=before, output=output if model.structure.several_outputs else output[:, 0])
         if not model.structure.several_outputs and not isinstance(initial, Dict):
             return History.at_rest(inputs=inputs[0], output=level_of(initial))
@@ -377,31 +375,42 @@ class SystemFit:
         Returns:
             Shape ``(n_samples, n_outputs)``, in the outputs' units.
         """
-        given: dict[str, Any] = {}
-        if isinstance(initial, tuple):
-            models = [self[name].model for name in self.outputs]
-            units = {name: unit for model in models for name, unit in model.ends.units.items()}
-            before, output = before_a_run(initial, models[0].mapping.inputs, self.outputs, units)
-            given = {name: (before, column) for name, column in zip(self.outputs, output.T, strict=True)}
-        elif initial is not None:
-            given = dict(initial)
-        check_outputs(given, self.outputs)
+        given = self._begun(initial)
         return np.column_stack([fit.simulate(u, initial=given.get(name)) for name, fit in self.fits.items()])
 
-    def predict(self, y: Any, u: Any, *, steps: int = 1) -> NDArray[np.float64]:
+    def predict(
+        self, y: Any, u: Any, *, steps: int = 1, initial: Dict[str, float] | tuple[Any, Any] | None = None
+    ) -> NDArray[np.float64]:
         """Prediction of all outputs from measured ones; see :meth:`Fit.predict`.
 
         Args:
-            y: Measured outputs, shape ``(n_samples, n_outputs)``, in their order.
+            y: Measured outputs: an array of shape ``(n_samples, n_outputs)`` in their order, a frame or dict with
+                columns by name, or a trace.
             u: Inputs, as for :meth:`Fit.simulate`.
             steps: How many samples ahead.
+            initial: As for :meth:`simulate`.
 
         Returns:
             Shape ``(n_samples, n_outputs)``, in the outputs' units.
         """
-        columns = np.asarray(y, dtype=np.float64).reshape(-1, len(self.fits)).T
-        found = [fit.predict(column, u, steps=steps) for fit, column in zip(self.fits.values(), columns, strict=True)]
+        given, columns = (
+            self._begun(initial),
+            measured_of(y, u, self.outputs, self.model.units, sample_time=self.model.sample_time).T,
+        )
+        runs = zip(self.fits.items(), columns, strict=True)
+        found = [fit.predict(column, u, steps=steps, initial=given.get(name)) for (name, fit), column in runs]
         return np.column_stack(found)
+
+    def _begun(self, initial: Dict[str, float] | tuple[Any, Any] | None) -> Dict[str, Any]:
+        """What stands before the first sample, output by output."""
+        if not isinstance(initial, tuple):
+            check_outputs(initial or {}, self.outputs)
+            return initial or {}
+        inputs = self[self.outputs[0]].model.mapping.inputs
+        before, output = before_a_run(
+            initial, inputs, self.outputs, self.model.units, sample_time=self.model.sample_time
+        )
+        return {name: (before, column) for name, column in zip(self.outputs, output.T, strict=True)}
 
     def step(self, *, seconds: float | None = None) -> StepResponse:
         """The step responses of all outputs with their intervals; see :func:`sysid.step`.

@@ -192,9 +192,8 @@ def _after(
     surrogate: Surrogate, inputs: NDArray[np.float64], pair: tuple[Any, Any], names: tuple[str, ...]
 ) -> NDArray[np.float64]:
     """The run behind measured samples: over both, and of it what comes after them."""
-    before, output = before_a_run(
-        pair, surrogate.source.inputs, names, {port.name: port.unit for port in surrogate.channels}
-    )
+    units = {port.name: port.unit for port in surrogate.channels}
+    before, output = before_a_run(pair, surrogate.source.inputs, names, units, sample_time=surrogate.sample_time)
     start = Start(kind=StartKind.MEASURED, n_measured=len(output))
     check_able(surrogate.source, names, start, where="initial")
     before = np.zeros((len(output), 1)) if surrogate.ticks else before

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, ReaderError
+from sysid.errors import ConfigError, ReaderError, shortened
+from sysid.ingest.calendar import is_calendar
 from sysid.ingest.columns import RawColumn
 from sysid.ingest.headers import parse_header, unit_in_name
 from sysid.ingest.time_columns import is_time_unit, recognise_time, time_unit
@@ -40,7 +41,7 @@ def columns_by_name(values: Any, *, where: str = "the table") -> Columns | None:
         The columns by name; a frame's index is among them where it is time. ``None`` for what has no names.
 
     Raises:
-        ConfigError: If two columns have one name, or series of a dict have different labels.
+        ConfigError: If two columns have one name, series of a dict have different labels, or labels are time as text.
     """
     pairs: list[tuple[str, Any]]
     if isinstance(values, Mapping):
@@ -140,12 +141,14 @@ def check_rows(table: Any, *, where: str) -> None:
     Rows that were dropped, shuffled, or put behind those of another record are no samples at equal distances.
 
     Args:
-        table: A frame or a series; what has no labels of rows is taken as it stands.
+        table: A frame, a series, or a dict of series; what has no labels of rows is taken as it stands.
         where: Named in errors.
 
     Raises:
         ConfigError: If the labels are of several levels, or do not count evenly.
     """
+    if isinstance(table, Mapping):
+        table = next(filter(is_labelled, table.values()), None)
     if not is_labelled(table):
         return
     if getattr(table.index, "nlevels", 1) > 1:
@@ -317,6 +320,15 @@ def _index(index: Any) -> Columns:
     array = as_column(index)
     if array.dtype.kind in "mM":
         return {INDEX: array}
+    if array.dtype.kind in "OSU" and len(array) and all(is_calendar(str(label)) for label in array[:2].tolist()):
+        raise ConfigError(
+            "the labels of the rows are time as text",
+            where="the index",
+            expected="time stamps, or no time",
+            got=shortened(array[0]),
+            remedy="frame.index = pd.to_datetime(frame.index), or parse_dates=True where the file is read; if they are "
+            "no time, frame.reset_index(drop=True)",
+        )
     header = parse_header(str(index.name or ""))
     unit = header.unit or unit_in_name(header.name)
     if array.dtype.kind not in "iuf" or (unit is not None and not is_time_unit(unit)):  # a way in mm, say

@@ -55,6 +55,16 @@ def remedies_of_a_file(path: Path) -> Iterator[None]:
         raise _with(error, f"{error.remedy}. A file alone takes no options: {described}") from None
 
 
+@contextmanager
+def remedies_of_a_run() -> Iterator[None]:
+    """Errors of a table that a model is to run over say where its options can be written."""
+    try:
+        yield
+    except UserError as error:
+        told = "A run takes no options, but a trace that has them: sysid.data(table, ...).traces[0]"
+        raise _with(error, f"{in_python(error.remedy or '')}. {told}") from None
+
+
 def proposal_of(path: Path) -> str:
     """The command that describes a file as a data set.
 

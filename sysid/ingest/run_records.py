@@ -10,14 +10,47 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
 from sysid.ingest.arrays import data
-from sysid.ingest.frames import as_array, columns_by_name
+from sysid.ingest.frames import check_labels, columns_by_name
 from sysid.ingest.headers import parse_header
 from sysid.ingest.run_inputs import inputs_of
 from sysid.traces import Channel, Trace
 
+MEASURED, BEFORE = "the measured outputs", "initial, the samples before a run"
+
+
+def measured_of(
+    y: Any, u: Any, outputs: tuple[str, ...], units: Mapping[str, str], *, sample_time: float, where: str = MEASURED
+) -> NDArray[np.float64]:
+    """Outputs that were measured beside inputs, as a matrix in a mapping's order.
+
+    Args:
+        y: As inputs may be, for :func:`sysid.ingest.run_inputs.inputs_of`.
+        u: The inputs, whose rows have the same labels where both have some.
+        outputs: Names of the outputs.
+        units: As for :func:`sysid.ingest.run_inputs.inputs_of`.
+        sample_time: Of the model, in seconds.
+        where: What they are, for errors.
+
+    Returns:
+        Shape ``(n_samples, n_outputs)``.
+
+    Raises:
+        ChannelError: If a table lacks an output.
+        ConfigError: If rows have other labels than those of the inputs, or columns are not as many as the outputs.
+        TraceError: If a sample is missing.
+    """
+    if not isinstance(y, Trace) and not isinstance(u, Trace):
+        check_labels((u, y), ("u", "y"), where=where)
+    return inputs_of(y, outputs, sample_time=sample_time, units=units, where=where)
+
 
 def before_a_run(
-    pair: tuple[Any, Any], inputs: tuple[str, ...], outputs: tuple[str, ...], units: Mapping[str, str]
+    pair: tuple[Any, Any],
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    units: Mapping[str, str],
+    *,
+    sample_time: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The samples before a run, from which it goes on.
 
@@ -26,33 +59,22 @@ def before_a_run(
         inputs: Names of the inputs.
         outputs: Names of the outputs.
         units: Of both, as for :func:`sysid.ingest.run_inputs.inputs_of`.
+        sample_time: Of the model, in seconds.
 
     Returns:
         Shapes ``(n_past, n_inputs)`` and ``(n_past, n_outputs)``, oldest first.
 
     Raises:
         ChannelError: If a table lacks a channel.
+        ConfigError: If columns are not as many as channels, or the rows of both have other labels.
         TraceError: If a sample is missing, or they are not as many.
     """
     if len(pair) != 2:
         raise _not_before(f"{len(pair)} values", outputs)
-    named = columns_by_name(pair[1], where="initial") if not isinstance(pair[1], Trace) else {}
-    if named is not None and not hasattr(pair[1], "to_frame"):
-        output = inputs_of(pair[1], outputs, units=units)
-    else:
-        output = np.asarray(as_array(pair[1]), dtype=np.float64)
-        output = output.reshape(len(output), -1) if output.ndim else output
-    before = inputs_of(pair[0], inputs, units=units)
-    if output.ndim != 2 or output.shape != (len(before), len(outputs)) or not len(output):
-        raise _not_before(f"{len(before)} samples of inputs and an output of shape {np.shape(pair[1])}", outputs)
-    if not np.isfinite(output).all():
-        raise TraceError(
-            "a sample before the first is missing",
-            where="initial",
-            expected="finite numbers: a run goes on from them",
-            got="nan or infinity",
-            remedy="give the samples after the last one that is missing, or one number",
-        )
+    before = inputs_of(pair[0], inputs, sample_time=sample_time, units=units, where=BEFORE)
+    output = measured_of(pair[1], pair[0], outputs, units, sample_time=sample_time, where=BEFORE)
+    if len(output) != len(before):
+        raise _not_before(f"{len(before)} samples of inputs and {len(output)} of outputs", outputs)
     return before, output
 
 

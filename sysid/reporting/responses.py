@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING, Any, cast
 
@@ -16,6 +16,7 @@ from sysid.estimation.linear.modes import Mode, modes
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.extras import need
 from sysid.models import AbstractModel
+from sysid.models.intersample import HELD
 from sysid.models.to_control import Linear
 from sysid.reporting.linear_view import LinearView, linear_views
 from sysid.reporting.numbers import number, quantity
@@ -23,6 +24,8 @@ from sysid.reporting.step_responses import SETTLED, band, gains, settling, step_
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from sysid.models import TransferFunctionModel
 
 Matrix = NDArray[np.float64]
 Known = Sequence[tuple[AbstractModel, Uncertainty | None]]
@@ -293,7 +296,7 @@ def step_of(known: Known, *, samples: int | None = None, seed: int = 0) -> StepR
     n = samples or max(settling(view) for _, view in pairs)
     values, ends, found = [], [], []
     for model, view in pairs:
-        A, B, C, D = cast("Linear", model).matrices
+        A, B, C, D = _stepped(model, view).matrices
         at, of = slice(view.source, view.source + 1), slice(view.target, view.target + 1)
         y = step_response(A, B[:, at], C[of], D[of, at], n)
         values.append(y)
@@ -306,6 +309,14 @@ def step_of(known: Known, *, samples: int | None = None, seed: int = 0) -> StepR
         **_names(pairs), time=time, values=np.column_stack(values), low=low, high=high,
         **dict(zip(("gain", "gain_low", "gain_high"), np.array(found).T, strict=True)),
     )  # fmt: skip
+
+
+def _stepped(model: AbstractModel, view: LinearView) -> Linear:
+    """The model of a step, which stands between samples, whatever the inputs of its records do there."""
+    if not view.discrete:
+        transfer = cast("TransferFunctionModel", model)
+        return replace(transfer, orders=replace(transfer.orders, intersample=HELD))
+    return cast("Linear", model)
 
 
 def bode_of(known: Known, *, frequency: Any = None, points: int = 200, seed: int = 0) -> Bode:

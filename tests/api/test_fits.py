@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 import sysid
-from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.errors import ChannelError, ConfigError, TraceError, UserError
 from sysid.models import History
 
 U = np.repeat([0.0, 1.0, -1.0, 0.5, 0.0], 20)
@@ -86,6 +86,54 @@ def test_a_record_of_another_rate_or_unit_is_no_record_of_the_model(traces: Any,
     for use in (lambda: sysid.compare(traces, made), lambda: made.residuals(traces), lambda: made.plot(traces)):
         with pytest.raises(ConfigError, match=words):
             use()
+
+
+OUTPUTS: dict[str, Any] = {
+    "columns in another order": pd.DataFrame({"z": 2.0 * Y + 1.0, "u": U, "y": Y}),
+    "dict": {"z": 2.0 * Y + 1.0, "y": Y},
+    "trace": sysid.data({"z": 2.0 * Y + 1.0, "y": Y}, sample_time=0.1)["record"],
+}
+
+
+@pytest.mark.parametrize("kind", OUTPUTS)
+def test_measured_outputs_are_taken_by_their_names(system: sysid.SystemFit, kind: str) -> None:
+    expected = system.predict(np.column_stack([Y, 2.0 * Y + 1.0]), U)
+    assert_array_equal(system.predict(OUTPUTS[kind], U), expected)
+
+
+STAMPS = pd.date_range("2024-01-01", periods=100, freq="100ms")
+REFUSED: dict[str, Any] = {
+    "channels in rows": np.vstack([Y, Y]),
+    "a third column": np.column_stack([Y, Y, Y]),
+    "a missing value": np.column_stack([Y, np.where(Y > 0.5, np.nan, Y)]),
+    "an infinite one": np.column_stack([Y, np.where(Y > 0.5, np.inf, Y)]),
+    "rows of other stamps": pd.DataFrame({"y": Y, "z": Y}, index=STAMPS + pd.Timedelta("100ms")),
+    "another rate": pd.DataFrame({"y": Y, "z": Y}, index=pd.date_range("2024-01-01", periods=100, freq="50ms")),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_measured_outputs_that_do_not_go_with_the_inputs_are_refused(system: sysid.SystemFit, kind: str) -> None:
+    u = pd.DataFrame({"u": U}, index=STAMPS)
+    with pytest.raises(UserError):
+        system.predict(REFUSED[kind], u)
+    y = REFUSED[kind]["y"] if kind.startswith("rows") else y_of(REFUSED[kind])
+    with pytest.raises(UserError):
+        system["y"].predict(y, u)
+    with pytest.raises(UserError):
+        system.simulate(u, initial=(u, REFUSED[kind]))
+
+
+def y_of(y: Any) -> Any:
+    """What a fit of one output refuses for the same reason."""
+    return y[:, 1:] if getattr(y, "shape", ())[1:] == (2,) and not hasattr(y, "columns") else y
+
+
+def test_a_prediction_of_all_outputs_begins_where_it_is_told(system: sysid.SystemFit) -> None:
+    y = np.column_stack([Y, 2.0 * Y + 1.0])
+    found = system.predict(y[5:], U[5:], initial=(U[:5], y[:5]))
+    assert_allclose(found, y[5:], atol=1e-12)
+    assert_allclose(system.predict(y, U, initial={"y": 3.0})[0], [2.4, 1.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("steps", [0, -1, 1.5])
@@ -212,7 +260,7 @@ def test_a_trace_in_other_units_is_no_input() -> None:
 
 
 def test_samples_before_a_run_are_numbers(fit: sysid.Fit) -> None:
-    with pytest.raises(TraceError, match="a sample before the first is missing"):
+    with pytest.raises(TraceError, match=r"(?s)a value is missing.*samples before a run"):
         fit.simulate(U, initial=(U[:3], [0.0, float("nan"), 0.0]))
 
 
@@ -245,7 +293,7 @@ def test_a_model_refuses_what_are_no_numbers(fit: sysid.Fit, given: Any) -> None
 
 
 def test_measured_output_that_is_no_number_is_refused(fit: sysid.Fit) -> None:
-    with pytest.raises(TraceError, match="no numbers"):
+    with pytest.raises(ConfigError, match=r"(?s)the measured outputs.*expected: numbers"):
         fit.predict(["a"] * len(U), U)
 
 

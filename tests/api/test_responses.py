@@ -51,6 +51,20 @@ def test_a_step_is_that_of_scipy_and_its_intervals_hold_the_plant(second: sysid.
     assert "overshoots by" in str(found)
 
 
+@pytest.mark.parametrize("between", ["zoh", "foh"])
+def test_a_step_stands_between_samples_whatever_the_inputs_of_the_records_do(between: str) -> None:
+    """It had begun half a sample before time zero where they go straight from sample to sample."""
+    t = 0.05 * np.arange(800)
+    u = np.sin(0.7 * t) + 0.5 * np.sin(3.1 * t)
+    sampled = signal.cont2discrete(signal.tf2ss([1.0, 2.0], [0.5, 0.4, 1.0]), 0.05, between)
+    y = signal.dlsim(sampled, np.r_[np.zeros(4), u[:-4]])[1][:, 0]
+    structure = sysid.TransferFunction(poles=2, zeros=1, delays=4, domain="continuous", intersample=between)
+    found = sysid.fit(sysid.data((u, y), sample_time=0.05), "u -> y", structure).step(seconds=5.0)
+    exact = signal.step(([1.0, 2.0], [0.5, 0.4, 1.0]), T=t[:97])[1]
+    np.testing.assert_allclose(found.values[:, 0], np.r_[np.zeros(4), exact], atol=1e-7)
+    assert (found.low[:, 0] <= found.values[:, 0] + 1e-7).all() and (found.values <= found.high + 1e-7).all()
+
+
 def test_bode_is_the_model_s_own_response_and_zero_frequency_is_the_gain(second: sysid.Fit) -> None:
     w = np.array([0.0, 1.0, 3.0])
     found = sysid.bode(second, frequency=w)

@@ -108,7 +108,7 @@ def test_a_pair_of_the_samples_before_is_gone_on_from(source):
     [
         pytest.param((np.ones(5), np.ones((4, 2))), "these are no samples before a run", id="not as many"),
         pytest.param((np.ones(5),), "these are no samples before a run", id="no pair"),
-        pytest.param((np.ones(5), np.full((5, 2), np.nan)), "before the first is missing", id="not a number"),
+        pytest.param((np.ones(5), np.full((5, 2), np.nan)), "values are missing", id="not a number"),
     ],
 )
 def test_a_pair_that_is_none_is_refused(pair, says):

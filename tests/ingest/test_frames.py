@@ -80,6 +80,8 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "names in one word": (lambda: data(FRAME, inputs="u+y", outputs="y"), "['u', 'y'] where a list"),
     "two records as one": (lambda: data(pd.concat([FRAME, FRAME])[["u"]], sample_time=1), "a list of frames"),
     "levels of rows": (lambda: data(pd.DataFrame({"y": Y}, index=RUNS), sample_time=1), "frame.groupby"),
+    "stamps as text": (lambda: data(FRAME[["u"]].set_index(np.array(["2024-01-01 00:00:00"] * 20))), "pd.to_datetime"),
+    "rows dropped of a dict": (lambda: data({"u": FRAME["u"].drop(index=[7])}, sample_time=1), "frame.reindex"),
     "labels of a dict": (
         lambda: data({"u": FRAME["u"], "y": FRAME["y"][::-1]}, sample_time=1),
         "u and y have different indexes",

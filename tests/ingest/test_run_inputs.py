@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ConfigError, UserError
+from sysid.ingest.arrays import data
 from sysid.ingest.run_inputs import inputs_of
 
 T = np.arange(20) * 0.5
@@ -35,3 +36,49 @@ def test_inputs_that_cannot_be_run_are_refused(u: Any) -> None:
     with pytest.raises(UserError) as caught:
         inputs_of(u, ("u",))
     assert caught.value.remedy
+
+
+STAMPS = pd.date_range("2024-01-01", periods=20, freq="500ms", tz="Europe/Berlin")
+UNEVEN = {
+    "a gap": [0, 1, 2, *range(5, 20)],
+    "a sample twice": [0, 1, 2, 2, *range(3, 20)],
+    "two samples changed over": [1, 0, *range(2, 20)],
+    "jitter": None,
+}
+
+
+@pytest.mark.parametrize("rows", UNEVEN)
+@pytest.mark.parametrize("labels", ["stamps", "a column", "numbers"])
+def test_a_run_over_samples_that_are_not_one_after_the_other_is_refused(labels: str, rows: str) -> None:
+    """It would be computed as if they were."""
+    frame = pd.DataFrame({"t": T, "u": U})
+    picked = frame.iloc[UNEVEN[rows] or range(20)].copy()
+    if rows == "jitter":
+        picked["t"] += 0.1 * np.random.default_rng(0).uniform(-1.0, 1.0, 20)
+    if labels == "stamps":
+        picked.index = STAMPS[0] + pd.to_timedelta(picked.pop("t"), unit="s")
+    elif labels == "numbers":
+        picked.pop("t")
+    if rows == "jitter" and labels == "numbers":
+        return  # rows that are counted have none
+    with pytest.raises(UserError) as caught:
+        inputs_of(picked, ("u",), sample_time=0.5)
+    assert caught.value.remedy
+    assert labels == "numbers" or "sysid.data(table, ...).traces[0]" in caught.value.remedy
+
+
+def test_the_remedy_for_a_gap_works() -> None:
+    picked = pd.DataFrame({"u": U}, index=STAMPS).iloc[UNEVEN["a gap"] or []]
+    trace = data(picked, repairs={"gaps": "hold"}).traces[0]
+    assert_array_equal(inputs_of(trace, ("u",), sample_time=0.5)[:, 0], U)
+
+
+@pytest.mark.parametrize("count", [1, 2, 20])
+def test_stamps_far_from_zero_are_even(count: int) -> None:
+    frame = pd.DataFrame({"time": 1.7e9 + 1e-3 * np.arange(count), "u": U[:count]})
+    assert_array_equal(inputs_of(frame, ("u",), sample_time=1e-3)[:, 0], U[:count])
+
+
+def test_stamps_as_text_are_no_labels_without_a_meaning() -> None:
+    with pytest.raises(ConfigError, match=r"pd\.to_datetime"):
+        inputs_of(pd.DataFrame({"u": U}, index=STAMPS.strftime("%d.%m.%Y %H:%M:%S.%f")), ("u",), sample_time=0.5)

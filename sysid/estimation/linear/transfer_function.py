@@ -127,14 +127,17 @@ def _third(experiment: Experiment) -> int:
     return int(places[len(places) // 3])
 
 
-def _at_rest(experiment: Experiment) -> int:
+def _at_rest(experiment: Experiment, dead: int) -> int:
     """First samples of a record in which all inputs and the output stand: what came before it was no different.
 
-    A record of a step begins so, and the samples that a long dead time would leave out may be all that it tells.
+    A record of a step begins so, and the samples that a long dead time would leave out may be all that it tells. The
+    output has to stand until it can show that inputs move, ``dead`` samples later: where inputs stepped as the record
+    began it stands too, and moves before.
     """
     moved = (experiment.inputs != experiment.inputs[0]).any(axis=1)
     first = int(np.argmax(moved)) if moved.any() else 0
-    known = slice(0, first) if experiment.usable is None else np.flatnonzero(experiment.usable[:first])
+    until = first + dead
+    known = slice(0, until) if experiment.usable is None else np.flatnonzero(experiment.usable[:until])
     y = experiment.output[known]
     if len(y) < STANDS:
         return 0
@@ -168,7 +171,7 @@ class _Problem(AbstractProblem):
         return SeparableProvider(
             poles=self.pole_parameters(max(len(e.output) for e in self.experiments)),
             n_zeros=self.orders.zeros,
-            records=self._records(delays, max(delays) if unknown is None else unknown),
+            records=self._records(delays, unknown),
             constant=self.orders.intercept,
         )
 
@@ -239,9 +242,16 @@ class _Problem(AbstractProblem):
         records = [record for record in provider.records if isinstance(record, TimeRecord)]
         return free_starts(records, self.orders.poles)
 
-    def _records(self, delays: tuple[int, ...], unknown: int) -> tuple[TimeRecord, ...]:
-        """Records whose first samples are left out where an input a dead time ago would come before a record."""
-        known = [self._record(experiment, delays, unknown) for experiment in self.experiments]
+    def _records(self, delays: tuple[int, ...], most: int | None) -> tuple[TimeRecord, ...]:
+        """Records whose first samples are left out where an input a dead time ago would come before a record.
+
+        Dead times that are compared (up to ``most``) leave out the same samples: whether a record begins at rest is
+        not judged by each of them.
+        """
+        unknown, dead = (max(delays), min(delays)) if most is None else (most, 0)
+        known = [
+            self._record(experiment, delays, unknown - _at_rest(experiment, dead)) for experiment in self.experiments
+        ]
         records = tuple(record for record in known if len(record.target))
         if not records:
             raise TraceError(
@@ -263,7 +273,7 @@ class _Problem(AbstractProblem):
             output = np.concatenate([experiment.history.output, output])
             weights = np.concatenate([experiment.past_weights, weights])
         scaled, held = self.scaling.scale_inputs(inputs), self.scaling.scale_inputs(past[np.newaxis])[0]
-        rows = slice(max(unknown - _at_rest(experiment), 0) if experiment.free else 0, None)
+        rows = slice(max(unknown, 0) if experiment.free else 0, None)
         return TimeRecord(
             inputs=np.asfortranarray(delayed_inputs(scaled, held, delays)[rows]),
             # From a state that is fitted any past can be reached, and zero is one that every system has.

@@ -228,6 +228,22 @@ def test_a_record_that_begins_at_rest_tells_its_dead_time_by_a_single_response(w
     np.testing.assert_allclose([ratio.B[0], -ratio.F[1]], [0.2, 0.8], atol=0.01)
 
 
+@pytest.mark.parametrize("dead", [7, 12, 30])
+def test_inputs_that_step_as_the_record_begins_are_no_rest_before_it(dead: int) -> None:
+    """The output stands until the dead time is over, as it does in a record that begins at rest: for another reason."""
+    u = np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 76), 8)[:600, np.newaxis]
+    y = signal.lfilter(np.r_[np.zeros(dead), 0.05, 0.03], [1.0, -1.6, 0.8], u[:, 0])
+    fit = fit_transfer_function(
+        [trace_of(u, y, sample_time=T)],
+        ONE,
+        TransferFunction(poles=(2,), zeros=(1,), delays=(dead,)),
+        QUICK,
+        start=Start(kind=StartKind.ESTIMATED),
+    )
+    ratio = fit.model.ratios[(0, 0)]
+    np.testing.assert_allclose([*ratio.B, *ratio.F], [0.05, 0.03, 1.0, -1.6, 0.8], atol=1e-8)
+
+
 def test_a_double_integrator_is_no_long_dead_time() -> None:
     u = np.repeat(np.random.default_rng(0).integers(0, 2, 61), 5)[:300, np.newaxis] * 2.0 - 1.0
     y = signal.lfilter([0.0, 0.05, 0.05], [1.0, -2.0, 1.0], u[:, 0])
