@@ -361,6 +361,28 @@ def continuous_form(model: _StateSpaceModel) -> ContinuousStateSpace:
     )  # fmt: skip
 
 
+def state_space_names(orders: LinearStateSpace, mapping: Mapping) -> tuple[str, ...]:
+    """What the coefficients of a state space's polynomials are called.
+
+    Args:
+        orders: The structure, with its dead times.
+        mapping: Its channels.
+
+    Returns:
+        ``B(input, lag)``, ``F(lag)``, ``C(lag)`` of the innovations and ``constant``; of several outputs
+        ``B(output, input, lag)``, ``F(lag)``, ``C(output, innovation, lag)`` and ``constant(output)``.
+    """
+    outputs, first, n = mapping.outputs, orders.shortest, orders.states
+    of = [""] if len(outputs) == 1 else [f"{name}, " for name in outputs]
+    late = zip(mapping.inputs, orders.shifts(len(mapping.inputs)), strict=True)
+    lags = {u: range(first + k, n + 1 + k) for u, k in late}
+    names = [f"B({o}{u}, {lag})" for o in of for u, at in lags.items() for lag in at]
+    names += [f"F({lag})" for lag in range(1, n + 1)]
+    names += [f"C({o}{e}{lag})" for o in of for e in of for lag in range(1, n + 1)] * orders.noise
+    single = len(outputs) == 1
+    return (*names, *(["constant"] if single else [f"constant({name})" for name in outputs]) * orders.intercept)
+
+
 def polynomials(system: Innovations) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     r"""A state space as polynomials in ``1/z``, by Faddeev and LeVerrier.
 

@@ -80,8 +80,8 @@ def linear_views(model: AbstractModel, uncertainty: Uncertainty | None, seed: in
             continue
         name = f"{ends.outputs[o]} from {ends.inputs[j]}" if several else ends.inputs[j]
         Bs, Fs = ratio.B[np.newaxis], ratio.F[np.newaxis]
-        if uncertainty is not None:
-            drawn_B, drawn_F = _drawn(uncertainty, ratio, seed)
+        if uncertainty is not None and (drawn := _drawn(uncertainty, ratio, seed)) is not None:
+            drawn_B, drawn_F = drawn
             Bs, Fs = np.concatenate([Bs, drawn_B]), np.concatenate([Fs, drawn_F])
         views.append(
             LinearView(
@@ -92,12 +92,17 @@ def linear_views(model: AbstractModel, uncertainty: Uncertainty | None, seed: in
     return views
 
 
-def _drawn(uncertainty: Uncertainty, ratio: Ratio, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Numerators and denominators of one input drawn from their joint distribution, ascending powers."""
+def _drawn(uncertainty: Uncertainty, ratio: Ratio, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Numerators and denominators of one input drawn from their joint distribution, ascending powers.
+
+    ``None`` where the records do not determine one of them: to draw the others alone would say that it is known.
+    """
     b = [i for i, text in enumerate(uncertainty.names) if text.startswith(ratio.of_numerator)]
     f = [i for i, text in enumerate(uncertainty.names) if text.startswith(ratio.of_denominator)]
-    chosen = np.array(b + f)
-    covariance = np.nan_to_num(uncertainty.covariance[np.ix_(chosen, chosen)])
+    chosen = np.array(b + f, dtype=np.intp)
+    covariance = uncertainty.covariance[np.ix_(chosen, chosen)]
+    if not b or not np.isfinite(covariance).all():
+        return None
     draws = np.random.default_rng(seed).multivariate_normal(
         uncertainty.values[chosen], covariance, size=DRAWS, method="eigh"
     )

@@ -114,7 +114,10 @@ class StepResponse(_Response):
 
     def __str__(self) -> str:
         lines = []
-        for (y, u), one in zip(self.units, self.info(), strict=True):
+        for (y, u), one, response in zip(self.units, self.info(), self.values.T, strict=True):
+            if not response.any():
+                lines.append(f"{one['name']}: no effect in the model")
+                continue
             gain = _with_interval(one["gain"], one["gain_low"], one["gain_high"], _over(y, u))
             said = f"{one['name']}: gain {gain}"
             if np.isfinite(one["settling_time"]):

@@ -21,6 +21,7 @@ from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.coloured_errors import sandwich
+from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start, state_space_start
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
@@ -106,6 +107,11 @@ def fit_polynomial(
     experiments = experiments_of(traces, mapping, start or Start(), rest)
     _check(orders, experiments)
     scaling = scaling_of(experiments, constant=orders.intercept or orders.drifts)
+    units, determined = tuple(traces[0].channel(name).unit for name in mapping.inputs), Determined.of(experiments)
+    if len(determined.kept) < len(mapping.inputs):
+        own = determined.mapping(mapping), determined.narrowed(orders)
+        fit = fit_polynomial(traces, *own, training, start=start, rest_output=rest)
+        return determined.polynomials(fit, orders, mapping, scaling, units)
     segments = segments_of(experiments, scaling)
     with one_blas_thread():  # threads that wake for such small matrices cost more than they give
         errors, solution = _search(segments, orders, training, began + training.max_time_s)
@@ -120,12 +126,12 @@ def fit_polynomial(
         scaling=scaling,
         mapping=mapping,
         sample_time=traces[0].sample_time,
-        input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
+        input_units=units,
         output_unit=traces[0].channel(mapping.output).unit,
         rest_output=rest,
     )
     unit = scaling.output_scale**2
-    return FitResult(
+    fit = FitResult(
         model=model,
         status=Status.CONVERGED if solution.status in {Status.STALLED, Status.NOT_IMPROVED} else solution.status,
         loop=Loop.OPEN if orders.noise else Loop.CLOSED,
@@ -141,6 +147,7 @@ def fit_polynomial(
             slow_poles.stability(model.pole_radius),
         ),
     )
+    return fit if determined.moves else determined.polynomials(fit, orders, mapping, scaling, units)
 
 
 def _search(

@@ -15,6 +15,7 @@ from sysid.estimation.clock import now
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, side_by_side
 from sysid.estimation.linear.state_space.dead_times import behind_dead_times, late
 from sysid.estimation.linear.state_space.refinement import Found
@@ -67,7 +68,16 @@ def fit_state_space(
         rest_output if isinstance(rest_output, Dict) else {} if rest_output is None else {mapping.output: rest_output}
     )
     rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
-    scalings, segments = records_of(traces, mapping, orders, start=start, rests=rests)
+    input_units = tuple(traces[0].channel(name).unit for name in mapping.inputs)
+    scalings, segments, determined = records_of(traces, mapping, orders, start=start, rests=rests)
+    scaling: Any = VectorScaling.of(scalings) if orders.several_outputs else scalings[0]
+    if len(determined.kept) < len(mapping.inputs):
+        own, given = (
+            (determined.mapping(mapping), determined.narrowed(orders)),
+            dict(zip(mapping.outputs, rests, strict=True)),
+        )
+        fit = fit_state_space(traces, *own, training, start=start, rest_output=given)
+        return determined.states(fit, mapping, scaling, input_units)
     orders, segments, told = behind_dead_times(segments, orders, training)
     found = search(segments, orders, training)
     shared: dict[str, Any] = {
@@ -75,17 +85,18 @@ def fit_state_space(
         "system": found.system,
         "mapping": mapping,
         "sample_time": traces[0].sample_time,
-        "input_units": tuple(traces[0].channel(name).unit for name in mapping.inputs),
+        "input_units": input_units,
     }
     units = tuple(traces[0].channel(name).unit for name in mapping.outputs)
     model: LinearStateSpaceModel | VectorStateSpaceModel
     if orders.several_outputs:
-        unit, scaling = 1.0, VectorScaling.of(scalings)
+        unit = 1.0
         model = VectorStateSpaceModel(scaling=scaling, output_units=units, rest_outputs=rests, **shared)
     else:
         unit = float(found.covariance[0, 0]) * scalings[0].output_scale ** 2 / max(found.curve[-1].mse, _TINY)
-        model = LinearStateSpaceModel(scaling=scalings[0], output_unit=units[0], rest_output=rests[0], **shared)
-    return _result(model, replace(found, notes=(*told, *found.notes)), orders, training, began=began, unit=unit)
+        model = LinearStateSpaceModel(scaling=scaling, output_unit=units[0], rest_output=rests[0], **shared)
+    fit = _result(model, replace(found, notes=(*told, *found.notes)), orders, training, began=began, unit=unit)
+    return fit if determined.moves else determined.states(fit, mapping, scaling, input_units)
 
 
 _TINY = 1e-300
@@ -98,8 +109,8 @@ def records_of(
     *,
     start: Start | None,
     rests: tuple[float, ...],
-) -> tuple[list[Scaling], tuple[Segment, ...]]:
-    """The scaling of each output, and the records in scaled numbers, before any dead time.
+) -> tuple[list[Scaling], tuple[Segment, ...], Determined]:
+    """The scaling of each output, the records in scaled numbers, before any dead time, and which inputs say anything.
 
     Args:
         traces: Estimation traces.
@@ -109,7 +120,7 @@ def records_of(
         rests: Each output at rest, in its unit.
 
     Returns:
-        Both.
+        All three.
 
     Raises:
         TraceError: If there are fewer samples than parameters.
@@ -126,7 +137,7 @@ def records_of(
         )
     scalings = [scaling_of(experiments, constant=orders.intercept) for experiments in each]
     segments = side_by_side([segments_of(e, scaling) for e, scaling in zip(each, scalings, strict=True)])
-    return scalings, segments
+    return scalings, segments, Determined.of(each[0])
 
 
 def matrices_root(
@@ -143,7 +154,7 @@ def matrices_root(
         Shape ``(n_entries, n_directions)``, entries as :attr:`sysid.models.innovations.Innovations.entries`.
     """
     rests = tuple(float(rest) for rest in model.ends.rest_outputs)
-    _, segments = records_of(traces, model.mapping, model.orders, start=start, rests=rests)
+    _, segments, _ = records_of(traces, model.mapping, model.orders, start=start, rests=rests)
     found = around(model.system, late(segments, model.orders), model.orders)
     return np.asarray(found.chart.basis @ coordinates_root(found))
 

@@ -57,7 +57,7 @@ def state_orders(
         TraceError: If no record is long enough.
     """
     structure = LinearStateSpace(states=most, feedthrough=feedthrough)
-    _, segments = records_of(
+    _, segments, _ = records_of(
         traces, mapping, structure, start=Start(kind=StartKind.ESTIMATED), rests=(0.0,) * len(mapping.outputs)
     )
     with one_blas_thread():

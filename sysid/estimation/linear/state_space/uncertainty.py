@@ -13,7 +13,7 @@ from sysid.estimation.linear.state_space.refinement import Found
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import LinearStateSpaceModel, VectorStateSpaceModel
 from sysid.models.innovations import Innovations
-from sysid.models.linear_state_space import polynomials
+from sysid.models.linear_state_space import polynomials, state_space_names
 
 Array = NDArray[np.float64]
 
@@ -83,11 +83,11 @@ def state_space_uncertainty(model: LinearStateSpaceModel | VectorStateSpaceModel
         outputs ``B(output, input, lag)``, ``F(lag)``, ``C(output, innovation, lag)`` and ``constant(output)``. Its
         noise variance is that of the innovations, of several outputs the root of their covariance's determinant.
     """
-    scaling, orders, outputs, p = model.scaling, model.orders, model.mapping.outputs, found.system.n_outputs
+    scaling, orders, p = model.scaling, model.orders, found.system.n_outputs
     scale, offset = np.atleast_1d(scaling.output_scale), np.atleast_1d(scaling.output_offset)
     gains = scale[:, np.newaxis] / np.array(scaling.input_scale)
     across = scale[:, np.newaxis] / scale
-    first, n, late = orders.shortest, orders.states, orders.shifts(len(gains[0]))
+    first = orders.shortest
 
     def coefficients(system: Innovations) -> NDArray[np.complex128]:
         F, numerators, noise = polynomials(system)
@@ -95,19 +95,13 @@ def state_space_uncertainty(model: LinearStateSpaceModel | VectorStateSpaceModel
         parts += [(across[:, :, np.newaxis] * noise)[:, :, 1:].ravel()] * orders.noise
         return np.concatenate([*parts, *[scale * system.constant] * orders.intercept])
 
-    of = [""] if p == 1 else [f"{name}, " for name in outputs]
-    lags = {u: range(first + k, n + 1 + k) for u, k in zip(model.mapping.inputs, late, strict=True)}
-    names = [f"B({o}{u}, {lag})" for o in of for u, at in lags.items() for lag in at]
-    names += [f"F({lag})" for lag in range(1, n + 1)]
-    names += [f"C({o}{e}{lag})" for o in of for e in of for lag in range(1, n + 1)] * orders.noise
-    names += (["constant"] if p == 1 else [f"constant({name})" for name in outputs]) * orders.intercept
     J = derivatives(found, coefficients)
     values = np.real(coefficients(found.system))
     if orders.intercept:
         values[-p:] += offset
     covariance = found.covariance * np.outer(scale, scale)
     return Uncertainty(
-        names=tuple(names),
+        names=state_space_names(orders, model.mapping),
         values=values,
         covariance=J @ coordinates_covariance(found) @ J.T,
         noise_variance=float(np.exp(np.linalg.slogdet(covariance + _TINY * np.eye(p))[1] / p)),
