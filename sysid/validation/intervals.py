@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Posterior
 from sysid.estimation.experiment import Experiment
 from sysid.models import AbstractModel, Start, gaps
@@ -30,6 +30,7 @@ class OutputInterval:
         noise_deviation: Standard deviation of the residuals.
         spread: Factor of both together that was found on traces which trained nothing; 1 where there were none.
         level: Probability that the interval holds the measured output.
+        first: Samples of the record before the first that there is an output of: those that the start took.
 
     Of a model of several outputs, signals have shape ``(n_samples, n_outputs)``, and the last but the level one figure
     an output.
@@ -40,6 +41,7 @@ class OutputInterval:
     noise_deviation: float | NDArray[np.float64]
     spread: float | NDArray[np.float64]
     level: float
+    first: int = 0
 
     @property
     def half_width(self) -> NDArray[np.float64]:
@@ -70,12 +72,17 @@ class OutputInterval:
         """How often the interval of one output, or of all of them, holds what was measured.
 
         Args:
-            target: Measured output, shape ``(n_samples,)``.
-            counted: Which samples count; all by default.
+            target: Measured output, shape ``(n_samples,)``: of the whole record, or of the samples that there is an
+                output of.
+            counted: Which of these count; all by default.
 
         Returns:
             The coverage.
+
+        Raises:
+            TraceError: If it is of another length.
         """
+        target, counted = self._of(target), None if counted is None else self._of(counted)
         counted = np.ones(len(target), dtype=bool) if counted is None else counted
         error, half = np.abs(target - self.output)[counted], self.half_width[counted]
         if np.isnan(error).all():  # no such run, or nothing that counts
@@ -86,6 +93,18 @@ class OutputInterval:
             share_before_spread=float(np.mean(error * self.spread <= half)),
             mean_half_width=float(np.mean(half)),
         )
+
+    def _of(self, measured: NDArray[Any]) -> NDArray[Any]:
+        """Samples of a record that there is an output of."""
+        whole, own = self.first + len(self.output), np.shape(self.output)
+        kept = np.asarray(measured)[self.first if len(measured) == whole else 0 :]
+        if kept.shape != own and kept.shape != own[:1]:
+            raise TraceError(
+                "not the output of this interval", where="coverage",
+                expected=f"{whole} samples of the record, or the last {len(self.output)} of them",
+                got=f"shape {np.shape(measured)}", remedy="give the record that it was predicted for: trace[OUTPUT]",
+            )  # fmt: skip
+        return kept
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,6 +225,13 @@ def predict_interval(
     if not 0.0 < level < 1.0:
         raise ConfigError("not a probability", where="level", expected="between 0 and 1", got=level)
     experiment = Experiment.for_model(trace, fit.model, start or _start_of(fit))
+    found = _over(fit, experiment, level, loop, steps)
+    return replace(found, first=len(trace) - len(experiment.output))
+
+
+def _over(fit: FitResult, experiment: Experiment, level: float, loop: Loop, steps: int) -> OutputInterval:
+    """The interval over the samples that the start leaves."""
+    assert fit.posterior is not None  # noqa: S101 - asked before
     closed = loop is Loop.CLOSED
     model, inputs, history = fit.model, experiment.inputs, experiment.history
     if steps != 1:

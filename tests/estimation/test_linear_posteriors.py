@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from sysid.errors import ConfigError
+import sysid
+from sysid.errors import ConfigError, TraceError
 from sysid.estimation import Posterior, StateSpaceTraining
 from sysid.estimation.estimators import fit
 from sysid.estimation.experiment import Experiment
@@ -137,3 +139,24 @@ def test_an_input_that_is_not_determined_takes_no_part() -> None:
     structure = TransferFunction(poles=(2, 1), zeros=(0, 0), delays=(1, 1))
     found = fit([both], Mapping.parse("u1+u2 -> y"), structure, start=ESTIMATED)
     assert np.isfinite(predict_interval(found, both, start=ESTIMATED).half_width).all()
+
+
+@pytest.mark.parametrize("start", [None, {"measured": 20}, "rest"])
+@pytest.mark.parametrize("name", ["ARX", "SS of two outputs"])
+def test_a_coverage_is_of_the_record_as_it_stands_however_it_begins(name: str, start: Any) -> None:
+    """As the page on trust says: ``interval.coverage(trace["BC"])``; the first samples are those of the start."""
+    structure, _, inside = STRUCTURES[name]
+    trace, other = (record(np.random.default_rng(seed), inside=inside) for seed in (7, 8))
+    mapping = BOTH if structure.several_outputs else MAPPING
+    found = sysid.fit([trace], mapping, structure, **({} if start is None else {"start": start}))
+    interval = predict_interval(found, other)
+    measured = other.columns(mapping.outputs)
+    measured = measured if structure.several_outputs else measured[:, 0]
+    whole, last = interval.coverage(measured), interval.coverage(measured[interval.first :])
+    assert whole == last
+    assert interval.first == (20 if isinstance(start, dict) else 0 if start else 50)
+    usable = np.arange(len(measured)) % 2 == 0
+    half = interval.coverage(measured, usable)
+    assert half == interval.coverage(np.where(usable[:, None] if measured.ndim > 1 else usable, measured, 1e9), usable)
+    with pytest.raises(TraceError, match="not the output of this interval"):
+        interval.coverage(measured[:-1])
