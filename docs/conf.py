@@ -1,9 +1,12 @@
 """The site: `make docs` builds it, with every page of the gallery run anew."""
 
 import os
+import sys
 from pathlib import Path
 
 import sysid
+
+sys.path.insert(0, str(Path(__file__).parent))  # for report_pages.py
 
 project = "System-identification workbench"
 author = "The system-identification workbench developers"
@@ -16,6 +19,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
+    "report_pages",
 ]
 exclude_patterns = ["receivers"]
 html_theme = "furo"
@@ -26,7 +30,7 @@ html_search_scorer = str(Path(__file__).with_name("scorer.js"))
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-# Links from a page to files of the repository (reports, YAML) are checked by the tests, not here.
+# Links from a page to files of the repository (README, YAML) are checked by the tests, not here.
 suppress_warnings = [
     "myst.xref_missing",
     "mystnb.unknown_mime_type",

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -20,6 +21,7 @@ BLOCK = re.compile(r"^```python[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NAMED = re.compile(r"^```python (\S+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 CELL = re.compile(r"^```\{code-cell\} ipython3\n(?::\w[^\n]*\n)*(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]*)(#[^)\s]+)?\)")
+SITE_LINK = re.compile(r'(?:href|src)="(?!\w+:|//)([^"#?]+)')
 HEADING = re.compile(r"^#{1,3} (.+)$", re.MULTILINE)
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 NAME = re.compile(r"`(sysid(?:\.\w+)+)")
@@ -162,6 +164,14 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     pages = "".join((tmp_path / "html" / f"{name}.html").read_text(encoding="utf-8") for name in names)
     ours = runpy.run_path(str(ROOT / "docs" / "conf.py"))["ACCESSIBLE"].values()
     assert [one for one in ours if one not in pages] == [], "what axe-core finds is put right in the theme's own words"
+    assert lost_links(tmp_path / "html") == []
+    assert 'href="reports/service-cascade-grown/README.html"' in (tmp_path / "html" / "brake.html").read_text("utf-8")
+
+
+def lost_links(site: Path) -> list[str]:
+    """Links and pictures of a built site that lead to no file of it."""
+    found = ((page, to) for page in site.rglob("*.html") for to in SITE_LINK.findall(page.read_text(encoding="utf-8")))
+    return [f"{page.relative_to(site)}: {to}" for page, to in found if not (page.parent / unquote(to)).exists()]
 
 
 @pytest.mark.parametrize("word", ["narxnet", "closeloop", "trainbr", "tfest", "arx", "compare", "resid", "genFunction"])
