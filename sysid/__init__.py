@@ -15,17 +15,6 @@ from typing import Any
 
 __version__ = "0.2.0"
 
-WORDS = (
-    *("data", "load", "fit", "compare", "save", "read_bundle", "search_orders", "Comparison", "Fit", "SystemFit"),
-    *("advise", "excite", "frequency_response", "impulse_response", "step", "bode", "poles"),
-    *("OrderSearch", "ARX", "ARMAX", "OE", "BJ", "LinearStateSpace", "VectorStateSpace", "TransferFunction"),
-    *("NARX", "NeuralStateSpace", "VectorNARX", "VectorNeuralStateSpace", "GreyBox", "VectorGreyBox"),
-    *("HammersteinWiener", "WienerHammerstein", "PolynomialNARX"),
-    *("Training", "JointTraining", "TransferFunctionTraining", "StateSpaceTraining", "PolynomialTraining"),
-    *("StabilityOptions", "Start", "Role"),
-)
-"""What is imported when it is first used: ``sysid --help`` loads none of it."""
-
 ABOVE = {
     "auto": "sysid.workbench.auto.python",
     "experiment": "sysid.workbench.experiments.python",
@@ -35,13 +24,16 @@ ABOVE = {
 
 
 def __getattr__(name: str) -> Any:
-    """A word of the short way, imported now."""
-    if name not in (*WORDS, *ABOVE):
-        raise AttributeError(f"module 'sysid' has no attribute {name!r}")
+    """A word of the short way, imported now: ``sysid --help`` loads none of it."""
     from importlib import import_module
 
-    return getattr(import_module(ABOVE.get(name, "sysid.api")), name)
+    api = import_module("sysid.api")
+    if name not in (*api.__all__, *ABOVE):
+        raise AttributeError(f"module 'sysid' has no attribute {name!r}")
+    return getattr(import_module(ABOVE[name]) if name in ABOVE else api, name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *WORDS, *ABOVE})
+    from importlib import import_module
+
+    return sorted({*globals(), *import_module("sysid.api").__all__, *ABOVE})

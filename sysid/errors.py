@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Self
 
 
 def shortened(value: object, limit: int = 80) -> str:
@@ -130,6 +131,34 @@ class SysidError(Exception):
         details = {"where": where, "expected": expected, "got": got, "remedy": remedy}
         lines = [f"  {key + ':':<9} {value}" for key, value in details.items() if value is not None]
         super().__init__("\n".join([what, *lines]))
+
+    @classmethod
+    def unknown(
+        cls, what: str, given: str, known: Iterable[str], otherwise: str, *, where: object = None, none: str = ""
+    ) -> Self:
+        """Of a word that is none of those that are known.
+
+        Args:
+            what: One sentence: what went wrong.
+            given: The word.
+            known: Those that there are.
+            otherwise: What to do where none of them was probably meant.
+            where: Where it stands.
+            none: What would be accepted where nothing is known.
+
+        Returns:
+            The error, which tells what is known, and which of it was probably meant.
+
+        Example:
+            >>> print(SysidError.unknown("there is no such format", "onx", ["onnx", "c"], "correct the name"))
+            there is no such format
+              expected: one of onnx, c
+              got:      onx
+              remedy:   did you mean onnx?
+        """
+        names = list(known)
+        expected = f"one of {', '.join(names)}" if names or not none else none
+        return cls(what, where=where, expected=expected, got=given, remedy=did_you_mean(given, names, otherwise))
 
 
 class UserError(SysidError):

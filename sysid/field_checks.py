@@ -154,30 +154,35 @@ def _config_error(found: list[dict[str, Any]], model: type[BaseModel], origins: 
         if isinstance(cause, FieldError):
             what, expected, got, remedy = cause.what, cause.expected, cause.got, cause.remedy
     else:
-        wanted = first["msg"].removeprefix("Input should be ").split(", unable to parse")[0]
-        what, expected, got = (
-            f"{path_text(origins.of(loc)[1])} cannot be used as it is",
-            wanted,
-            shortened(first["input"]),
-        )
-        expected, remedy = _CHANGES.get(first["type"], (expected, remedy))
-        if first["input"] is None:
-            remedy = f"give {loc[-1]} a value" if loc else remedy
-        elif first["type"] == "string_type" and isinstance(first["input"], list | tuple | Mapping):
-            remedy = "write one text, without brackets"
-        elif first.get("ctx", {}).get("pattern") == _FOLDER:
-            expected = "a name of letters, digits, dots, dashes and underscores, that begins with a letter or a digit"
-            remedy = f"write for example {slug(str(first['input']))}"
-        if first["type"] in {"too_short", "too_long"}:  # its own words are Python's
-            least, most = (first.get("ctx", {}).get(f"{end}_length") for end in ("min", "max"))
-            expected = f"at least {_counted(least)}" if most is None else f"at most {_counted(most)}"
-        if expected == _NAMES:
-            expected = _names_at(model, loc, _NAMES)
-        if first["type"] in {"enum", "literal_error"}:
-            remedy = _choice(str(first["input"]), str(first.get("ctx", {}).get("expected", "")))
+        what = f"{path_text(origins.of(loc)[1])} cannot be used as it is"
+        got = shortened(first["input"])
+        expected, remedy = _another_value(first, model, remedy)
     if others:
         remedy += f" (also at fault: {', '.join(sorted({_beside(loc, item['loc'], origins) for item in others}))})"
     return ConfigError(what, where=origins.place(loc), expected=expected, got=got, remedy=remedy)
+
+
+def _another_value(first: dict[str, Any], model: type[BaseModel], remedy: str) -> tuple[object, str]:
+    """What a value of another kind or size had to be, and what to do about it."""
+    loc, kind, limits = first["loc"], first["type"], first.get("ctx", {})
+    wanted = first["msg"].removeprefix("Input should be ").split(", unable to parse")[0]
+    expected: object
+    expected, remedy = _CHANGES.get(kind, (wanted, remedy))
+    if first["input"] is None:
+        remedy = f"give {loc[-1]} a value" if loc else remedy
+    elif kind == "string_type" and isinstance(first["input"], list | tuple | Mapping):
+        remedy = "write one text, without brackets"
+    elif limits.get("pattern") == _FOLDER:
+        expected = "a name of letters, digits, dots, dashes and underscores, that begins with a letter or a digit"
+        remedy = f"write for example {slug(str(first['input']))}"
+    if kind in {"too_short", "too_long"}:  # its own words are Python's
+        least, most = (limits.get(f"{end}_length") for end in ("min", "max"))
+        expected = f"at least {_counted(least)}" if most is None else f"at most {_counted(most)}"
+    if expected == _NAMES:
+        expected = _names_at(model, loc, _NAMES)
+    if kind in {"enum", "literal_error"}:
+        remedy = _choice(str(first["input"]), str(limits.get("expected", "")))
+    return expected, remedy
 
 
 def _inside(loc: Loc, holder: Loc) -> bool:

@@ -7,7 +7,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints
 from typing import Any
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 
 
 @cache
@@ -42,16 +42,13 @@ def find_entry(group: str, name: str, *, what: str, where: object) -> EntryPoint
     """
     found = {entry.name: entry for entry in entry_points(group)}
     if name not in found:
-        raise ConfigError(
+        raise ConfigError.unknown(
             f"no {what} named {name} is installed",
+            name,
+            sorted(found),
+            "install the package that brings it; for what is built in, the workbench itself (pip install -e .)",
             where=where,
-            expected=f"one of {', '.join(sorted(found))}" if found else f"an installed {what}; there is none at all",
-            got=name,
-            remedy=did_you_mean(
-                name,
-                found,
-                "install the package that brings it; for what is built in, the workbench itself (pip install -e .)",
-            ),
+            none=f"an installed {what}; there is none at all",
         )
     return found[name]
 

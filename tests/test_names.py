@@ -138,7 +138,7 @@ def test_a_paragraph_of_markdown_says_what_it_was_given(name: str) -> None:
 
 @hostile
 def test_a_cell_of_markdown_stays_one(name: str) -> None:
-    cell = names.markdown_cell(name)
+    cell = names.markdown(name)
     text, elements = shown(MARKDOWN.render(f"| a | b |\n| --- | --- |\n| {cell} | 2 |\n"))
     assert elements == {"table", "thead", "tbody", "tr", "th", "td"}
     assert " ".join(text.split()) == " ".join(f"a b {as_said(name)} 2".split())
@@ -234,9 +234,7 @@ def test_a_mapping_reads_back_from_its_text(given_names: list[str]) -> None:
 
 def test_what_needs_no_care_is_left_alone() -> None:
     plain = "BP 1, closed loop (4/4/20): 2.5 kPa² below free_run → [kPa]"
-    assert (
-        names.visible(plain) == names.markdown(plain) == names.markdown_cell(plain) == names.c_comment(plain) == plain
-    )
+    assert names.visible(plain) == names.markdown(plain) == names.c_comment(plain) == plain
     assert names.csv_cell("BP [kPa]") == "BP [kPa]"
     assert names.tracking_key("VAL 1") == "VAL 1"
     assert not keyword.iskeyword(names.c_identifier("level"))

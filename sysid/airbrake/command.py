@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 
 EMERGENCY = 0.0
 """The command in psi gauge that means an emergency."""
@@ -101,12 +101,8 @@ class Command:
             ConfigError: If the rows are not such rows.
         """
         if time_unit not in TIME_UNITS:
-            raise ConfigError(
-                "unknown time unit",
-                where="command, time_unit",
-                expected=f"one of {', '.join(TIME_UNITS)}",
-                got=time_unit,
-                remedy=did_you_mean(time_unit, TIME_UNITS, "write one of these"),
+            raise ConfigError.unknown(
+                "unknown time unit", time_unit, TIME_UNITS, "write one of these", where="command, time_unit"
             )
         try:
             table = np.array([[float(value) for value in row] for row in rows], dtype=np.float64)

@@ -6,16 +6,16 @@ import math
 
 import numpy as np
 
-from sysid.airbrake import kernel
 from sysid.airbrake.consist import TEMPERATURE, Consist
 from sysid.airbrake.flow import GAS_CONSTANT, HEAT_RATIO, flow_table
+from sysid.airbrake.kernel_arrays import Constants
 from sysid.airbrake.variant import QuickService, Variant
 from sysid.units import STANDARD_ATMOSPHERE_PA
 
 _QUICK_SERVICE = {QuickService.NONE: 0, QuickService.COMMAND: 1, QuickService.LOCAL: 2}
 
 
-def kernel_constants(consist: Consist, variant: Variant, dt: float) -> kernel.Constants:
+def kernel_constants(consist: Consist, variant: Variant, dt: float) -> Constants:
     """The kernel's constants.
 
     Args:
@@ -30,7 +30,7 @@ def kernel_constants(consist: Consist, variant: Variant, dt: float) -> kernel.Co
     gas_step = GAS_CONSTANT * TEMPERATURE * dt
     pipe_section = consist.pipe.volume / consist.pipe.length
     rate = math.inf if variant.equalising_rate is None else variant.equalising_rate
-    return kernel.Constants(
+    return Constants(
         atmosphere=atmosphere,
         running=consist.charged,
         pipe_area=consist.pipe.area,

@@ -17,7 +17,7 @@ from sysid.airbrake.radio import Radio
 from sysid.airbrake.sequences import RandomCommand
 from sysid.airbrake.simulate import AirBrakeRecord, simulate
 from sysid.airbrake.variant import USUAL_VARIANT, VARIANTS
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.excitation import excite
 from sysid.field_checks import check
 from sysid.traces import Channel, Trace
@@ -158,13 +158,7 @@ def _equipment(options: _Options) -> Equipment:
         ("variant", options.variant, VARIANTS),
     ):
         if given is not None and given not in rows:
-            raise ConfigError(
-                f"unknown {name}",
-                where=f"options, {name}",
-                expected=f"one of {', '.join(rows)}",
-                got=given,
-                remedy=did_you_mean(given, rows, "name one of these"),
-            )
+            raise ConfigError.unknown(f"unknown {name}", given, rows, "name one of these", where=f"options, {name}")
     if options.equipment is not None and options.variant is not None:
         raise ConfigError(
             "equipment and variant are both given", where="options",

@@ -12,6 +12,7 @@ from sysid.airbrake import kernel
 from sysid.airbrake.consist import TEMPERATURE, Consist
 from sysid.airbrake.constants import kernel_constants
 from sysid.airbrake.flow import GAS_CONSTANT, FlowTable, flow_table
+from sysid.airbrake.kernel_arrays import Drive, Layout, State, Table, Work
 from sysid.airbrake.variant import Variant
 from sysid.errors import ConfigError, StabilityError
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA
@@ -104,7 +105,7 @@ def _steps_per_sample(
     return steps
 
 
-def charged_state(consist: Consist, variant: Variant, dt: float) -> kernel.State:
+def charged_state(consist: Consist, variant: Variant, dt: float) -> State:
     """State of a train that is charged throughout, with empty cylinders and the valves released.
 
     Args:
@@ -120,7 +121,7 @@ def charged_state(consist: Consist, variant: Variant, dt: float) -> kernel.State
     pressures[nodes + 2 * valves : nodes + 3 * valves] = STANDARD_ATMOSPHERE_PA
     content = 0.0 if variant.piston else STANDARD_ATMOSPHERE_PA * consist.cylinder.volume
     delay = max(1, round(variant.rising_delay / dt))
-    return kernel.State(
+    return State(
         pressures=pressures,
         content=np.full(valves, content),
         port=np.full(len(consist.port_nodes), consist.charged),
@@ -132,7 +133,7 @@ def charged_state(consist: Consist, variant: Variant, dt: float) -> kernel.State
     )
 
 
-def stored_air(state: kernel.State, consist: Consist) -> float:
+def stored_air(state: State, consist: Consist) -> float:
     """Air in the train behind the leading locomotive, as P V in J.
 
     Args:
@@ -220,8 +221,8 @@ class BrakedTrain:
         self._watch = _watch(probes, consist)
         self._constants = kernel_constants(consist, variant, time_step)
         root = math.sqrt(TEMPERATURE)
-        self._table = kernel.Table(values=table.values / root, slopes=table.slopes / root)
-        self._layout = kernel.Layout(
+        self._table = Table(values=table.values / root, slopes=table.slopes / root)
+        self._layout = Layout(
             valve_nodes=np.array(consist.valve_nodes, dtype=np.int64) - 1,
             port_nodes=np.array(consist.port_nodes, dtype=np.int64) - 1,
             retained=np.array(
@@ -234,7 +235,7 @@ class BrakedTrain:
         ]
         self._shares = None if all(share == 1.0 for share in shares) else np.array(shares)
         nodes = consist.vehicles
-        self._work = kernel.Work(net=np.zeros(nodes), sums=np.zeros(len(probes)))
+        self._work = Work(net=np.zeros(nodes), sums=np.zeros(len(probes)))
 
     @property
     def stored(self) -> float:
@@ -274,7 +275,7 @@ class BrakedTrain:
                 got=f"{handle.max():g} psi",
                 remedy="raise running_pressure or lower the command",
             )
-        drive = kernel.Drive(
+        drive = Drive(
             command=handle * PSI_IN_PA + STANDARD_ATMOSPHERE_PA,
             remote=heard * PSI_IN_PA + STANDARD_ATMOSPHERE_PA,
             speed=_per_sample(speed, len(handle), "speed"),

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.units import PSI_IN_PA
 
 LONGEST_DELAY = 60.0
@@ -170,13 +170,7 @@ class Variant:
         changes: dict[str, Any] = {}
         for name, value in options.items():
             if name not in fields:
-                raise ConfigError(
-                    f"unknown switch {name}",
-                    where="variant",
-                    expected=f"one of {', '.join(fields)}",
-                    got=name,
-                    remedy=did_you_mean(name, fields, "name one of these"),
-                )
+                raise ConfigError.unknown(f"unknown switch {name}", name, fields, "name one of these", where="variant")
             changes[name] = self._checked(name, value)
         return dataclasses.replace(self, **changes)
 
@@ -186,12 +180,8 @@ class Variant:
                 return QuickService(value)
             except ValueError:
                 choices = [choice.value for choice in QuickService]
-                raise ConfigError(
-                    "unknown quick service",
-                    where="variant",
-                    expected=f"one of {', '.join(choices)}",
-                    got=value,
-                    remedy=did_you_mean(value, choices, "name one of these"),
+                raise ConfigError.unknown(
+                    "unknown quick service", value, choices, "name one of these", where="variant"
                 ) from None
         printed = getattr(LISTING, name)
         if isinstance(printed, bool) and isinstance(value, bool):

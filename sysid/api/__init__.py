@@ -22,122 +22,47 @@ from typing import TYPE_CHECKING
 from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
-    from sysid.api.comparison import Comparison, compare
-    from sysid.api.fits import Fit, SystemFit
-    from sysid.api.fitting import fit, load
-    from sysid.api.looking import advise, excite, frequency_response, impulse_response
-    from sysid.api.orders import OrderSearch, search_orders
-    from sysid.api.responses import bode, poles, step
-    from sysid.api.saving import read_bundle, save
-    from sysid.estimation import (
-        JointTraining,
-        PolynomialTraining,
-        StabilityOptions,
-        StateSpaceTraining,
-        Training,
-        TransferFunctionTraining,
-    )
-    from sysid.ingest.arrays import data
-    from sysid.models import (
-        ARMAX,
-        ARX,
-        BJ,
-        NARX,
-        OE,
-        GreyBox,
-        HammersteinWiener,
-        LinearStateSpace,
-        NeuralStateSpace,
-        PolynomialNARX,
-        Start,
-        TransferFunction,
-        VectorGreyBox,
-        VectorNARX,
-        VectorNeuralStateSpace,
-        VectorStateSpace,
-        WienerHammerstein,
-    )
-    from sysid.traces import Role
+    from sysid.api.comparison import Comparison as Comparison
+    from sysid.api.comparison import compare as compare
+    from sysid.api.fits import Fit as Fit
+    from sysid.api.fitting import fit as fit
+    from sysid.api.fitting import load as load
+    from sysid.api.looking import advise as advise
+    from sysid.api.looking import excite as excite
+    from sysid.api.looking import frequency_response as frequency_response
+    from sysid.api.looking import impulse_response as impulse_response
+    from sysid.api.orders import OrderSearch as OrderSearch
+    from sysid.api.orders import search_orders as search_orders
+    from sysid.api.responses import bode as bode
+    from sysid.api.responses import poles as poles
+    from sysid.api.responses import step as step
+    from sysid.api.saving import read_bundle as read_bundle
+    from sysid.api.saving import save as save
+    from sysid.api.system_fit import SystemFit as SystemFit
+    from sysid.estimation import JointTraining as JointTraining
+    from sysid.estimation import PolynomialTraining as PolynomialTraining
+    from sysid.estimation import StabilityOptions as StabilityOptions
+    from sysid.estimation import StateSpaceTraining as StateSpaceTraining
+    from sysid.estimation import Training as Training
+    from sysid.estimation import TransferFunctionTraining as TransferFunctionTraining
+    from sysid.ingest.arrays import data as data
+    from sysid.models import ARMAX as ARMAX
+    from sysid.models import ARX as ARX
+    from sysid.models import BJ as BJ
+    from sysid.models import NARX as NARX
+    from sysid.models import OE as OE
+    from sysid.models import GreyBox as GreyBox
+    from sysid.models import HammersteinWiener as HammersteinWiener
+    from sysid.models import LinearStateSpace as LinearStateSpace
+    from sysid.models import NeuralStateSpace as NeuralStateSpace
+    from sysid.models import PolynomialNARX as PolynomialNARX
+    from sysid.models import Start as Start
+    from sysid.models import TransferFunction as TransferFunction
+    from sysid.models import VectorGreyBox as VectorGreyBox
+    from sysid.models import VectorNARX as VectorNARX
+    from sysid.models import VectorNeuralStateSpace as VectorNeuralStateSpace
+    from sysid.models import VectorStateSpace as VectorStateSpace
+    from sysid.models import WienerHammerstein as WienerHammerstein
+    from sysid.traces import Role as Role
 
-__all__ = [
-    "ARX",
-    "NARX",
-    "Comparison",
-    "Fit",
-    "GreyBox",
-    "NeuralStateSpace",
-    "OrderSearch",
-    "Role",
-    "StabilityOptions",
-    "Start",
-]
-__all__ += ["ARMAX", "BJ", "OE", "LinearStateSpace", "PolynomialTraining", "StateSpaceTraining", "VectorStateSpace"]
-__all__ += ["HammersteinWiener", "PolynomialNARX", "VectorGreyBox", "VectorNeuralStateSpace", "WienerHammerstein"]
-__all__ += ["JointTraining", "SystemFit", "Training", "TransferFunction", "TransferFunctionTraining", "VectorNARX"]
-__all__ += ["advise", "bode", "excite", "frequency_response", "impulse_response", "poles", "step"]
-__all__ += ["compare", "data", "fit", "load", "read_bundle", "save", "search_orders"]
-
-_WHERE = {
-    "sysid.api.comparison": (
-        "Comparison",
-        "compare",
-    ),
-    "sysid.api.fits": (
-        "Fit",
-        "SystemFit",
-    ),
-    "sysid.api.fitting": (
-        "fit",
-        "load",
-    ),
-    "sysid.api.looking": (
-        "advise",
-        "excite",
-        "frequency_response",
-        "impulse_response",
-    ),
-    "sysid.api.orders": (
-        "OrderSearch",
-        "search_orders",
-    ),
-    "sysid.api.responses": (
-        "bode",
-        "poles",
-        "step",
-    ),
-    "sysid.api.saving": (
-        "read_bundle",
-        "save",
-    ),
-    "sysid.estimation": (
-        "JointTraining",
-        "PolynomialTraining",
-        "StabilityOptions",
-        "StateSpaceTraining",
-        "Training",
-        "TransferFunctionTraining",
-    ),
-    "sysid.ingest.arrays": ("data",),
-    "sysid.models": (
-        "ARMAX",
-        "ARX",
-        "BJ",
-        "NARX",
-        "OE",
-        "GreyBox",
-        "HammersteinWiener",
-        "LinearStateSpace",
-        "NeuralStateSpace",
-        "PolynomialNARX",
-        "Start",
-        "TransferFunction",
-        "VectorGreyBox",
-        "VectorNARX",
-        "VectorNeuralStateSpace",
-        "VectorStateSpace",
-        "WienerHammerstein",
-    ),
-    "sysid.traces": ("Role",),
-}
-
-__getattr__ = imported_when_asked(_WHERE)
+__getattr__, __all__ = imported_when_asked(__file__)

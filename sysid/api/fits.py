@@ -7,31 +7,27 @@ from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.api.abstract_fit import AbstractFit
 from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ChannelError, TraceError, shortened
 from sysid.estimation import FitResult
 from sysid.estimation.experiment import Experiment
 from sysid.ingest.run_inputs import inputs_of
 from sysid.ingest.run_records import before_a_run, level_of, measured_of
-from sysid.models import Cascade, History, Start
+from sysid.models import History, Start
 from sysid.models.curve_values import curve_values
 from sysid.models.form import unheeded
 from sysid.traces import Role, TraceSet
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.figure import Figure
 
-    from sysid.api.responses import Bode, Poles, StepResponse
     from sysid.estimation.grey_box.profile import Profile
-    from sysid.export import Bundle
     from sysid.validation.residuals import ResidualAnalysis
 
 Initial = float | Dict[str, float] | History | tuple[Any, Any] | None
@@ -39,7 +35,7 @@ Initial = float | Dict[str, float] | History | tuple[Any, Any] | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Fit(FitResult):
+class Fit(FitResult, AbstractFit):
     """A fit with the data that it was made of.
 
     Args:
@@ -168,64 +164,6 @@ class Fit(FitResult):
 
         return analyse_residuals(self.model, records, self.start, free_run=free_run, output=output)
 
-    def plot(self, traces: TraceSet | None = None) -> Figure:
-        """Its free run over the measured output, case by case.
-
-        Args:
-            traces: The cases; all of its data set by default.
-
-        Returns:
-            A figure of matplotlib's, to restyle, show or save.
-        """
-        from sysid.api.comparison import compare
-
-        return compare(self.traces if traces is None else traces, self, start=self.start).plot()
-
-    def step(self, *, seconds: float | None = None) -> StepResponse:
-        """Its step responses with their intervals; see :func:`sysid.step`.
-
-        Args:
-            seconds: Length in s; by default until the slowest pole has settled.
-
-        Returns:
-            The change of each output after a step of one unit in each input, in its unit, and 95 % intervals.
-
-        Raises:
-            ConfigError: If it is not linear, no input moves it, or the length is none.
-        """
-        from sysid.api.responses import step
-
-        return step(self, seconds=seconds)
-
-    def bode(self, *, frequency: Any = None) -> Bode:
-        """Its Bode diagram with its intervals; see :func:`sysid.bode`.
-
-        Args:
-            frequency: In rad/s, shape ``(n,)``; by default four decades up to the Nyquist frequency.
-
-        Returns:
-            Gain, in units of the output per unit of the input, and phase in degrees, with 95 % intervals.
-
-        Raises:
-            ConfigError: If it is not linear, no input moves it, or a frequency is none.
-        """
-        from sysid.api.responses import bode
-
-        return bode(self, frequency=frequency)
-
-    def poles(self) -> Poles:
-        """Its poles with their intervals; see :func:`sysid.poles`.
-
-        Returns:
-            The poles, the slowest first, with time constants in s and natural frequencies in rad/s.
-
-        Raises:
-            ConfigError: If it is not linear.
-        """
-        from sysid.api.responses import poles
-
-        return poles(self)
-
     def plot_curves(self, traces: TraceSet | None = None) -> Figure:
         """The static curves of a block-oriented model, over what the records range over, and where these lie.
 
@@ -244,23 +182,6 @@ class Fit(FitResult):
         runs = [Experiment.for_model(trace, self.model, self.start) for trace in records]
         curves = curve_values(self.model, [(run.inputs, run.history) for run in runs])
         return curves_figure([curve.drawn() for curve in curves])
-
-    def save(
-        self, folder: str | Path, traces: TracesLike | None = None, *, formats: tuple[str, ...] | None = None
-    ) -> Bundle:
-        """Write it as files that run elsewhere, with its figures on the records of the fit; see :func:`sysid.save`.
-
-        Args:
-            folder: Where the bundle goes.
-            traces: Further records to check the files and to score the model on.
-            formats: As for :func:`sysid.save`.
-
-        Returns:
-            The bundle.
-        """
-        from sysid.api.saving import save
-
-        return save(self, self.traces if traces is None else traces, folder, formats=formats, start=self.start)
 
     def summary(self) -> str:
         """What was fitted, how it ended, its parameters as far as there is an uncertainty of them, and its fit.
@@ -287,9 +208,6 @@ class Fit(FitResult):
 
     def __repr__(self) -> str:
         return f"<Fit of {self.model.label}, {self.model.mapping}: {self.status.name}>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"
 
     @cached_property
     def _compared(self) -> Any:
@@ -329,177 +247,3 @@ def check_outputs(given: Iterable[str], names: tuple[str, ...]) -> None:
     strangers = [name for name in given if name not in names]
     if strangers:
         raise ChannelError(strangers, names, where="initial")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class SystemFit:
-    """Several outputs: one fit each, run as one system.
-
-    Args:
-        fits: By output.
-        model: Their models side by side.
-        traces: The data set.
-        start: How each free run begins where nothing else is said.
-    """
-
-    fits: Dict[str, Fit]
-    model: Cascade
-    traces: TraceSet
-    start: Start
-
-    @classmethod
-    def of(cls, fits: Dict[str, Fit]) -> SystemFit:
-        """Fits of the same data, one an output."""
-        first = next(iter(fits.values()))
-        model = Cascade(models=tuple(fit.model for fit in fits.values()))
-        return cls(fits=fits, model=model, traces=first.traces, start=first.start)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs, in the mapping's order."""
-        return tuple(self.fits)
-
-    def __getitem__(self, output: str) -> Fit:
-        if output not in self.fits:
-            raise ChannelError([output], self.outputs, where="the outputs of a fit")
-        return self.fits[output]
-
-    def simulate(self, u: Any, *, initial: Dict[str, float] | tuple[Any, Any] | None = None) -> NDArray[np.float64]:
-        """Free run of all outputs.
-
-        Args:
-            u: Inputs, as for :meth:`Fit.simulate`, in the order of the first output's mapping.
-            initial: The output that the system has stood at, by name; or a pair ``(u, y)`` of the samples before,
-                oldest first, with a column of ``y`` for each output. The rest values where nothing is said.
-
-        Returns:
-            Shape ``(n_samples, n_outputs)``, in the outputs' units.
-        """
-        given = self._begun(initial)
-        return np.column_stack([fit.simulate(u, initial=given.get(name)) for name, fit in self.fits.items()])
-
-    def predict(
-        self, y: Any, u: Any, *, steps: int = 1, initial: Dict[str, float] | tuple[Any, Any] | None = None
-    ) -> NDArray[np.float64]:
-        """Prediction of all outputs from measured ones; see :meth:`Fit.predict`.
-
-        Args:
-            y: Measured outputs: an array of shape ``(n_samples, n_outputs)`` in their order, a frame or dict with
-                columns by name, or a trace.
-            u: Inputs, as for :meth:`Fit.simulate`.
-            steps: How many samples ahead.
-            initial: As for :meth:`simulate`.
-
-        Returns:
-            Shape ``(n_samples, n_outputs)``, in the outputs' units.
-        """
-        given, columns = (
-            self._begun(initial),
-            measured_of(y, u, self.outputs, self.model.units, sample_time=self.model.sample_time).T,
-        )
-        runs = zip(self.fits.items(), columns, strict=True)
-        found = [fit.predict(column, u, steps=steps, initial=given.get(name)) for (name, fit), column in runs]
-        return np.column_stack(found)
-
-    def _begun(self, initial: Dict[str, float] | tuple[Any, Any] | None) -> Dict[str, Any]:
-        """What stands before the first sample, output by output."""
-        if not isinstance(initial, tuple):
-            check_outputs(initial or {}, self.outputs)
-            return initial or {}
-        inputs = self[self.outputs[0]].model.mapping.inputs
-        before, output = before_a_run(
-            initial, inputs, self.outputs, self.model.units, sample_time=self.model.sample_time
-        )
-        return {name: (before, column) for name, column in zip(self.outputs, output.T, strict=True)}
-
-    def step(self, *, seconds: float | None = None) -> StepResponse:
-        """The step responses of all outputs with their intervals; see :func:`sysid.step`.
-
-        Args:
-            seconds: Length in s; by default until the slowest pole has settled.
-
-        Returns:
-            The change of each output after a step of one unit in each input, in its unit, and 95 % intervals.
-
-        Raises:
-            ConfigError: If it is not linear, no input moves it, or the length is none.
-        """
-        from sysid.api.responses import step
-
-        return step(self, seconds=seconds)
-
-    def bode(self, *, frequency: Any = None) -> Bode:
-        """The Bode diagrams of all outputs with their intervals; see :func:`sysid.bode`.
-
-        Args:
-            frequency: In rad/s, shape ``(n,)``; by default four decades up to the Nyquist frequency.
-
-        Returns:
-            Gain, in units of the output per unit of the input, and phase in degrees, with 95 % intervals.
-
-        Raises:
-            ConfigError: If it is not linear, no input moves it, or a frequency is none.
-        """
-        from sysid.api.responses import bode
-
-        return bode(self, frequency=frequency)
-
-    def poles(self) -> Poles:
-        """The poles of all models with their intervals; see :func:`sysid.poles`.
-
-        Returns:
-            The poles, the slowest first, with time constants in s and natural frequencies in rad/s.
-
-        Raises:
-            ConfigError: If it is not linear.
-        """
-        from sysid.api.responses import poles
-
-        return poles(self)
-
-    def plot(self, traces: TraceSet | None = None) -> Figure:
-        """The free run of each output over its measurement, case by case.
-
-        Args:
-            traces: The cases; all of its data set by default.
-
-        Returns:
-            A figure of matplotlib's.
-        """
-        from sysid.api.comparison import compare
-
-        return compare(self.traces if traces is None else traces, self, start=self.start).plot()
-
-    def save(
-        self, folder: str | Path, traces: TracesLike | None = None, *, formats: tuple[str, ...] | None = None
-    ) -> Bundle:
-        """Write it as files of several outputs that run elsewhere; see :meth:`Fit.save`.
-
-        Args:
-            folder: Where the bundle goes.
-            traces: Further records to check the files and to score the models on.
-            formats: As for :func:`sysid.save`.
-
-        Returns:
-            The bundle.
-
-        Raises:
-            ParityError: If a file differs from its model; nothing is published then.
-        """
-        from sysid.api.saving import save
-
-        return save(self, self.traces if traces is None else traces, folder, formats=formats, start=self.start)
-
-    def summary(self) -> str:
-        """The summaries of its fits.
-
-        Returns:
-            Lines of text, those of each fit behind an empty one.
-        """
-        return "\n\n".join(fit.summary() for fit in self.fits.values())
-
-    def __repr__(self) -> str:
-        return f"<SystemFit of {', '.join(self.outputs)}: {', '.join(fit.status.name for fit in self.fits.values())}>"
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"

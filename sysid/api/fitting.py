@@ -6,8 +6,9 @@ from collections.abc import Mapping as Dict
 from pathlib import Path
 from typing import Any
 
-from sysid.api.fits import Fit, SystemFit
+from sysid.api.fits import Fit
 from sysid.api.given import ESTIMATED, TracesLike, check_order, path_of, traces_of
+from sysid.api.system_fit import SystemFit
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options

@@ -22,8 +22,8 @@ from sysid.excitation import AbstractExcitation, excitation
 from sysid.ingest.writers import write_trace
 from sysid.models import Mapping
 from sysid.models.typed_fields import plain_values
-from sysid.reporting.advice_record import AdviceRecord
-from sysid.reporting.advice_words import lines
+from sysid.reporting.advice.record import AdviceRecord
+from sysid.reporting.advice.words import lines
 from sysid.traces import Role, TraceSet
 
 if TYPE_CHECKING:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,57 +11,8 @@ from sysid.estimation import FitResult
 from sysid.export.own_figures import side_by_side
 from sysid.models import AbstractModel, Cascade
 from sysid.models.typed_fields import plain_values
-from sysid.reporting import responses as room
-from sysid.reporting.responses import Known, bode_of, check_linear, poles_of, step_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
-class StepResponse(room.StepResponse):
-    """Step responses that draw themselves."""
-
-    def plot(self) -> Figure:
-        """The responses with their bands.
-
-        Returns:
-            A figure of matplotlib's, one panel a pair.
-        """
-        from sysid.reporting.figures.linear_figures import draw_step
-
-        return draw_step(self)
-
-
-class Bode(room.Bode):
-    """Frequency responses that draw themselves."""
-
-    def plot(self) -> Figure:
-        """Gain and phase with their bands.
-
-        Returns:
-            A figure of matplotlib's, one column a pair.
-        """
-        from sysid.reporting.figures.linear_figures import draw_bode
-
-        return draw_bode(self)
-
-
-class Poles(room.Poles):
-    """Poles that draw themselves."""
-
-    def plot(self) -> Figure:
-        """Poles and zeros of every input, with the cloud of poles that the uncertainty allows, of the first model.
-
-        Returns:
-            A figure of matplotlib's.
-        """
-        from sysid.reporting.figures.linear_figures import pole_zero_figure
-
-        return pole_zero_figure(*self.models[0])
-
-
-def _fields(found: Any) -> dict[str, Any]:
-    return {one.name: getattr(found, one.name) for one in fields(found)}
+from sysid.reporting.linear.computing import bode_of, check_linear, poles_of, step_of
+from sysid.reporting.linear.responses import Bode, Known, Poles, StepResponse
 
 
 def step(fit: Any, *, seconds: float | None = None) -> StepResponse:
@@ -82,7 +32,7 @@ def step(fit: Any, *, seconds: float | None = None) -> StepResponse:
     known = known_of(fit)
     check_linear(known)
     if seconds is None:
-        return StepResponse(**_fields(step_of(known)))
+        return step_of(known)
     T = known[0][0].sample_time
     seconds = plain_values(seconds)
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not T <= seconds <= LONGEST * T:
@@ -94,7 +44,7 @@ def step(fit: Any, *, seconds: float | None = None) -> StepResponse:
             remedy="leave it out for the time until the slowest pole has settled",
         )
     samples = int(np.floor(seconds / T * (1.0 + 1e-12))) + 1
-    return StepResponse(**_fields(step_of(known, samples=samples)))
+    return step_of(known, samples=samples)
 
 
 LONGEST = 100_000
@@ -114,7 +64,7 @@ def bode(fit: Any, *, frequency: Any = None) -> Bode:
     Raises:
         ConfigError: If it is not linear, no input moves it, or a frequency is none.
     """
-    return Bode(**_fields(bode_of(known_of(fit), frequency=frequency)))
+    return bode_of(known_of(fit), frequency=frequency)
 
 
 def poles(fit: Any) -> Poles:
@@ -129,7 +79,7 @@ def poles(fit: Any) -> Poles:
     Raises:
         ConfigError: If it is not linear.
     """
-    return Poles(**_fields(poles_of(known_of(fit))))
+    return poles_of(known_of(fit))
 
 
 def known_of(fit: Any) -> Known:

@@ -7,87 +7,62 @@ call :func:`train`; or call its stages one by one: :func:`fit_member`, :func:`ch
 Nothing here knows a run folder, a screen or a tracker: a :class:`Keeper` is given from outside.
 """
 
-from sysid.composite.active_learning import ActiveLearned, Assessment, learn_actively, sequence_errors
-from sysid.composite.candidates import Candidate, Candidates, fit_candidates
-from sysid.composite.committee import committee
-from sysid.composite.composite import Composite, Member
-from sysid.composite.doubt_figures import DoubtFigures, doubt_figures, doubt_threshold
-from sysid.composite.doubting import Doubt, Doubting, Perturbation, doubting
-from sysid.composite.fixed_equations import equation_of, fixed_by_equations
-from sysid.composite.fixed_member import FixedMember, Standing
-from sysid.composite.fixed_members import fixed_model, with_fixed
-from sysid.composite.keeper import Keeper, MakeAll, Task
-from sysid.composite.limit_check import LimitCheck, check_limits
-from sysid.composite.limits_held import Holding, holding
-from sysid.composite.members import assembled, dealt, own_traces, simulated_inputs, whole_score
-from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
-from sysid.composite.perturbed import perturbed
-from sysid.composite.plan import ActiveLearning, OneStep, Retraining, RoundPlan, TrainingPlan
-from sysid.composite.rehearsal import rehearse
-from sysid.composite.round import JointRound, TrainedRound, train_round
-from sysid.composite.stages import Choice, choose_together, fit_member, model_of, one_step_of, reading_more, retrain
-from sysid.composite.training import Retrained, TrainedComposite, train
-from sysid.composite.training_data import TrainingData
-from sysid.composite.warm_start import started_from
-
-__all__ = [
-    "ActiveLearned",
-    "ActiveLearning",
-    "Assessment",
-    "Candidate",
-    "Candidates",
-    "Choice",
-    "Composite",
-    "Doubt",
-    "DoubtFigures",
-    "Doubting",
-    "FixedMember",
-    "Holding",
-    "JointRound",
-    "Keeper",
-    "LimitCheck",
-    "MakeAll",
-    "Member",
-    "MonteCarlo",
-    "OneStep",
-    "Perturbation",
-    "Retrained",
-    "Retraining",
-    "RoundPlan",
-    "Standing",
-    "Task",
-    "TrainedComposite",
-    "TrainedRound",
-    "TrainingData",
-    "TrainingPlan",
-    "assembled",
-    "check_limits",
-    "choose_together",
-    "committee",
-    "dealt",
-    "doubt_figures",
-    "doubt_threshold",
-    "doubting",
-    "equation_of",
-    "fit_candidates",
-    "fit_member",
-    "fixed_by_equations",
-    "fixed_model",
-    "holding",
-    "learn_actively",
-    "model_of",
-    "one_step_of",
-    "own_traces",
-    "perturbed",
-    "reading_more",
-    "rehearse",
-    "retrain",
-    "run_monte_carlo",
-    "sequence_errors",
-    "simulated_inputs",
-    "started_from",
-    "train",
-    "train_round",
-    "whole_score",
-    "with_fixed",
-]
+from sysid.composite.active_learning import ActiveLearned as ActiveLearned
+from sysid.composite.active_learning import Assessment as Assessment
+from sysid.composite.active_learning import learn_actively as learn_actively
+from sysid.composite.active_learning import sequence_errors as sequence_errors
+from sysid.composite.candidates import Candidate as Candidate
+from sysid.composite.candidates import Candidates as Candidates
+from sysid.composite.candidates import fit_candidates as fit_candidates
+from sysid.composite.composite import Composite as Composite
+from sysid.composite.composite import Member as Member
+from sysid.composite.doubt.committee import committee as committee
+from sysid.composite.doubt.doubting import Doubt as Doubt
+from sysid.composite.doubt.doubting import Doubting as Doubting
+from sysid.composite.doubt.doubting import Perturbation as Perturbation
+from sysid.composite.doubt.doubting import doubting as doubting
+from sysid.composite.doubt.figures import DoubtFigures as DoubtFigures
+from sysid.composite.doubt.figures import doubt_figures as doubt_figures
+from sysid.composite.doubt.figures import doubt_threshold as doubt_threshold
+from sysid.composite.doubt.monte_carlo import MonteCarlo as MonteCarlo
+from sysid.composite.doubt.monte_carlo import run_monte_carlo as run_monte_carlo
+from sysid.composite.doubt.perturbed import perturbed as perturbed
+from sysid.composite.fixed.equations import equation_of as equation_of
+from sysid.composite.fixed.equations import fixed_by_equations as fixed_by_equations
+from sysid.composite.fixed.member import FixedMember as FixedMember
+from sysid.composite.fixed.member import Standing as Standing
+from sysid.composite.fixed_members import fixed_model as fixed_model
+from sysid.composite.fixed_members import with_fixed as with_fixed
+from sysid.composite.keeper import Keeper as Keeper
+from sysid.composite.keeper import MakeAll as MakeAll
+from sysid.composite.keeper import Task as Task
+from sysid.composite.limit_check import LimitCheck as LimitCheck
+from sysid.composite.limit_check import check_limits as check_limits
+from sysid.composite.limits_held import Holding as Holding
+from sysid.composite.limits_held import holding as holding
+from sysid.composite.members import assembled as assembled
+from sysid.composite.members import dealt as dealt
+from sysid.composite.members import own_traces as own_traces
+from sysid.composite.members import simulated_inputs as simulated_inputs
+from sysid.composite.members import whole_score as whole_score
+from sysid.composite.plan import ActiveLearning as ActiveLearning
+from sysid.composite.plan import OneStep as OneStep
+from sysid.composite.plan import Retraining as Retraining
+from sysid.composite.plan import RoundPlan as RoundPlan
+from sysid.composite.plan import TrainingPlan as TrainingPlan
+from sysid.composite.rounds.rehearsal import rehearse as rehearse
+from sysid.composite.rounds.round import JointRound as JointRound
+from sysid.composite.rounds.round import TrainedRound as TrainedRound
+from sysid.composite.rounds.round import train_round as train_round
+from sysid.composite.stages import Choice as Choice
+from sysid.composite.stages import choose_together as choose_together
+from sysid.composite.stages import fit_member as fit_member
+from sysid.composite.stages import model_of as model_of
+from sysid.composite.stages import one_step_of as one_step_of
+from sysid.composite.stages import reading_more as reading_more
+from sysid.composite.stages import retrain as retrain
+from sysid.composite.training import Retrained as Retrained
+from sysid.composite.training import TrainedComposite as TrainedComposite
+from sysid.composite.training import train as train
+from sysid.composite.training_data import TrainingData as TrainingData
+from sysid.composite.warm_start import started_from as started_from

@@ -10,10 +10,10 @@ from collections.abc import Mapping as Dict
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from sysid.composite.fixed_member import FixedMember, Standing, parameters_of
-from sysid.composite.limit_expressions import named_limits
+from sysid.composite.fixed.limits import named_limits
+from sysid.composite.fixed.member import FixedMember, Standing, parameters_of
 from sysid.composite.parameters import check_names, declared
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training, estimators
 from sysid.models import NARX, AbstractStructure, Limit, Mapping
 from sysid.models.cascade_run import Level
@@ -122,7 +122,7 @@ class Composite:
         rest: Levels at rest that are inputs' (``{"BP": "STP"}``: charged to where the handle stands).
         limits: Limits of outputs; in its other instances a member has those of its first, unless they have their own.
             A side may be any expression of channels, ``"min(BP, 1.2*AR[k-1])"``: it becomes a fixed submodel, called
-            after the output (:mod:`sysid.composite.limit_expressions`).
+            after the output (:mod:`sysid.composite.fixed.limits`).
         parameters: What limits name that is estimated, by name as in :class:`~sysid.composite.FixedMember`; those of
             the fixed submodels are known in limits as well.
 
@@ -197,10 +197,6 @@ class Composite:
         for one in self.members:
             if one.output == output:
                 return one
-        raise ConfigError(
-            f"no member writes {output}",
-            where="members",
-            expected=f"one of {', '.join(one.output for one in self.members)}",
-            got=output,
-            remedy=did_you_mean(output, [one.output for one in self.members], "correct the name, or add a member"),
-        )
+        known = [one.output for one in self.members]
+        what, otherwise = f"no member writes {output}", "correct the name, or add a member"
+        raise ConfigError.unknown(what, output, known, otherwise, where="members")

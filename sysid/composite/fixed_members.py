@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.composite.fixed_member import FixedMember
+from sysid.composite.fixed.member import FixedMember
 from sysid.composite.members import bounds_of, placed
 from sysid.errors import ConfigError
 from sysid.models import NARX, Cascade, GreyBoxModel, NARXModel, Scaling

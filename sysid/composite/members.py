@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sysid.composite.composite import Composite, Member
-from sysid.composite.fixed_member import FixedMember, Standing
+from sysid.composite.fixed.member import FixedMember, Standing
 from sysid.estimation.estimators import JOINING
 from sysid.models import AbstractModel, Cascade, Limit, Mapping, NARXModel
 from sysid.traces import Trace

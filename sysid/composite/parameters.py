@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.composite.fixed_member import FixedMember, Standing
+from sysid.composite.fixed.member import FixedMember, Standing
 from sysid.errors import ConfigError
 from sysid.estimation.named import check_alike
 from sysid.models import Cascade, GreyBoxModel

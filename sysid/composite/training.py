@@ -21,8 +21,8 @@ from sysid.composite.limit_check import LimitCheck, check_limits
 from sysid.composite.members import Members, assembled, dealt, whole_score
 from sysid.composite.parameters import values_in
 from sysid.composite.plan import Retraining, RoundPlan, TrainingPlan
-from sysid.composite.rehearsal import rehearse
-from sysid.composite.round import JointRound, TrainedRound
+from sysid.composite.rounds.rehearsal import rehearse
+from sysid.composite.rounds.round import JointRound, TrainedRound
 from sysid.composite.stages import model_of, reading_more, retrain
 from sysid.composite.training_data import TrainingData
 from sysid.composite.warm_start import started_from

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 
@@ -20,21 +18,16 @@ from sysid.equations.graph import (
     SHARE,
     STEP,
     WEIGHT,
-    Graph,
 )
 from sysid.equations.implicit import MOST_STATES_IMPLICIT, implicit_slopes
-from sysid.equations.lowered import ROSENBROCK, Lowered, Net, Switch, Terms
+from sysid.equations.lowered import ROSENBROCK, Lowered, Net, Terms
+from sysid.equations.named_values import Names
 from sysid.equations.nets import asked, check_weights, layer
 from sysid.equations.slopes import slopes_of
 from sysid.equations.syntax import Call, Delayed, Name, Node, Number, Operation, equation_error
 from sysid.equations.system import System
 from sysid.errors import ConfigError
 from sysid.kernels import register_machine as machine
-
-MOST_DELAYED = 100
-"""Samples that are kept of what is computed; what goes in may be delayed by any number of samples."""
-LONGEST_DELAY = 1_000_000
-"""Samples."""
 
 
 def lower(system: System, terms: Terms) -> Lowered:
@@ -64,172 +57,11 @@ def lower(system: System, terms: Terms) -> Lowered:
 
 
 @dataclass(kw_only=True)
-class _Lowering:
-    system: System
-    terms: Terms
-    graph: Graph = field(default_factory=Graph)
-    updates: dict[int, int] = field(default_factory=dict)
-    """By the leaf of a state what it is at the next sample."""
-    hidden: list[str] = field(default_factory=list)
-    """Names of the states of what remembers."""
-    lagged: dict[tuple[int, float], int] = field(default_factory=dict)
-    chains: dict[object, list[int]] = field(default_factory=dict)
-    unfinished: list[str] = field(default_factory=list)
-    definitions: dict[str, int] = field(default_factory=dict)
-    entered: list[str] = field(default_factory=list)
-    remembering: dict[object, int] = field(default_factory=dict)
+class _Lowering(Names):
     nets: list[Net] = field(default_factory=list)
     norms: list[float] = field(default_factory=list)
-    switches: list[Switch] = field(default_factory=list)
-    probed: list[int] = field(default_factory=list)
     steep: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     """Tables that are slopes of others."""
-
-    # What functions make values with
-
-    def constant(self, value: float) -> int:
-        return self.graph.constant(value)
-
-    def value_of(self, node: int) -> float | None:
-        return self.graph.value_of(node)
-
-    def apply(self, operation: int, a: int, b: int | None = None, c: int | None = None, own: int = 0) -> int:
-        return self.graph.apply(operation, a, b, c, own)
-
-    def switch(self, operation: int, a: int) -> int:
-        """A switch or a root with a width of its own, the same for the same argument."""
-        root, known = operation == machine.SQRT, self.value_of(a)
-        if root and known is not None:
-            return self.constant(math.sqrt(max(known, 0.0)))
-        key = ("root" if root else "switch", a)
-        if key not in self.remembering:
-            self.remembering[key] = len(self.switches)
-            self.switches.append(Switch(probe=self.probe(a), root=root))
-        return self.graph.apply(operation, a, own=self.remembering[key])
-
-    def probe(self, value: int) -> int:
-        self.probed.append(value)
-        return len(self.probed) - 1
-
-    # Names
-
-    def state(self, name: str) -> int:
-        """The leaf of a state with a name."""
-        if name in self.system.continuous:
-            return self.graph.leaf(CONTINUOUS_STATE, self.system.continuous.index(name))
-        return self.graph.leaf(DISCRETE_STATE, self.system.discrete.index(name))
-
-    def memory(self, name: str) -> int:
-        """The leaf of a new state of something that remembers."""
-        self.hidden.append(name)
-        return self.graph.leaf(DISCRETE_STATE, len(self.system.discrete) + len(self.hidden) - 1)
-
-    def named(self, name: str, at: int) -> int:
-        """The value of a name, now."""
-        terms = self.terms
-        if name in self.system.states:
-            return self.state(name)
-        if name in self.system.definitions:
-            return self._definition(name, at)
-        if name in terms.free:
-            return self.graph.leaf(FREE, terms.free.index(name))
-        if name in terms.fixed:
-            return self.graph.leaf(FIXED, terms.fixed.index(name))
-        return self.input(name, 0.0, at)
-
-    def input(self, name: str, lag: float, at: int) -> int:
-        """An input of the mapping, some samples ago."""
-        if name not in self.terms.inputs:
-            raise equation_error(
-                f"nothing says what {name} is",
-                self.system.text,
-                at,
-                expected=f"an input: {', '.join(self.terms.inputs) or 'there is none'}",
-                got=name,
-                remedy=f"add {name} to the mapping's inputs, or {name}: 1 to the parameters",
-            )
-        key = (self.terms.inputs.index(name), lag)
-        return self.graph.leaf(INPUT, self.lagged.setdefault(key, len(self.lagged)))
-
-    def _definition(self, name: str, at: int) -> int:
-        if name in self.entered:
-            raise equation_error(
-                f"{name} needs itself: {' -> '.join([*self.entered[self.entered.index(name) :], name])}",
-                self.system.text,
-                at,
-                expected="definitions that can be computed one after the other",
-                remedy="a delay of less than a sample reads what is now too: make it a sample or more",
-            )
-        if name not in self.definitions:
-            self.entered.append(name)
-            self.definitions[name] = self.value(self.system.definitions[name].right)
-            self.entered.pop()
-        return self.definitions[name]
-
-    # Delays
-
-    def _samples(self, node: Delayed | Call, seconds: float) -> float:
-        """A delay in samples; a whole number but for rounding is one."""
-        if not 0.0 <= seconds < math.inf:
-            raise equation_error(
-                "a delay is a number of seconds from 0 on", self.system.text, node.at, remedy="correct it"
-            )
-        if self.terms.sample_time is None:
-            return min(math.ceil(seconds), 1)
-        lag = seconds / self.terms.sample_time
-        return float(round(lag)) if abs(lag - round(lag)) < _WHOLE else lag
-
-    def delayed(self, node: Delayed) -> int:
-        lag = self._samples(node, node.lag) if node.seconds else node.lag
-        if lag > LONGEST_DELAY:
-            raise equation_error(
-                f"a delay of {lag:,.0f} samples",
-                self.system.text,
-                node.at,
-                expected=f"at most {LONGEST_DELAY:,}",
-                remedy="correct the delay, or the sample time of the data",
-            )
-        name = node.name
-        if name not in {*self.system.states, *self.system.definitions, *self.system.parameters}:
-            return self.input(name, lag, node.at)
-        if name in self.system.parameters or lag == 0.0:
-            return self.named(name, node.at)
-        if name not in self.chains:
-            self.unfinished.append(name)
-        return self._kept(name, name, lag, node.at, lambda: self.named(name, node.at))
-
-    def _kept(self, key: object, name: str, lag: float, at: int, now: Callable[[], int]) -> int:
-        """What something was some samples ago, from states that hand it on."""
-        chain = self.chains.setdefault(key, [])
-        while len(chain) < math.ceil(lag):
-            if sum(map(len, self.chains.values())) >= MOST_DELAYED:
-                raise equation_error(
-                    f"more than {MOST_DELAYED} past samples of what is computed are read",
-                    self.system.text,
-                    at,
-                    expected="short delays of states and definitions; inputs may be delayed by any time",
-                    remedy="delay the inputs that it is computed from instead, or use a larger sample time",
-                )
-            chain.append(self.memory(f"{name}[k-{len(chain) + 1}]"))
-        whole = math.floor(lag)
-        rest = lag - whole
-        newer = chain[whole - 1] if whole else now()
-        if rest == 0.0:
-            return newer
-        share = self.apply(machine.MUL, self.constant(rest), self.apply(machine.SUB, chain[whole], newer))
-        return self.apply(machine.ADD, newer, share)
-
-    def finish_delays(self) -> None:
-        """Say what the first state of each delay holds next: what the name is now."""
-        while self.unfinished:
-            name = self.unfinished.pop()
-            self.chains[name] = self.chains.get(name, [])
-            value = self.named(name, 0)
-            if self.chains[name]:
-                self.updates[self.chains[name][0]] = value
-        for chain in self.chains.values():
-            for newer, older in pairwise(chain):
-                self.updates[older] = newer
 
     # Expressions
 
@@ -336,12 +168,12 @@ class _Lowering:
 
     def _delay(self, node: Call) -> int:
         inside, seconds = self._taken(node, ("x", "tau"))
-        lag = self._samples(node, self._number(seconds, "a delay"))
+        lag = self.samples(node, self._number(seconds, "a delay"))
         value = self.value(inside)
         if lag == 0.0:
             return value
         key = ("delay", value)
-        found = self._kept(key, f"delay {value}", lag, node.at, lambda: value)
+        found = self.kept(key, f"delay {value}", lag, node.at, lambda: value)
         self.updates[self.chains[key][0]] = value
         return found
 
@@ -433,7 +265,3 @@ class _Lowering:
             table=np.array([point for one in points for point in one], dtype=np.float64).reshape(-1, 2),
             ahead=ahead,
         )
-
-
-_WHOLE = 1e-6
-"""Samples by which a delay may miss a whole number."""

@@ -17,8 +17,8 @@ from sysid.estimation.linear.polynomial.fit import PolynomialTraining
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.linear_posteriors import LinearPosterior
-from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.posterior import calibrate
+from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.training import Training
 from sysid.estimation.record_notes import (
     between_levels,

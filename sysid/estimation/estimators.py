@@ -37,14 +37,14 @@ from sysid.estimation.linear_posteriors import (
     state_space_posterior,
     transfer_function_posterior,
 )
-from sysid.estimation.networks.joint_options import JointTraining
 from sysid.estimation.networks.narx import fit_narx
-from sysid.estimation.networks.neural_state_space import (
+from sysid.estimation.networks.neural.state_space import (
     STARTS,
     check_neural_initial,
     check_training,
     fit_neural_state_space,
 )
+from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.training import FitProgress, Training, check_lagged
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial

@@ -45,12 +45,7 @@ def kind_of(name: str, options: Mapping[str, Any]) -> AbstractExcitation:
         PRBS(clock=4, order=None)
     """
     if name not in KINDS:
-        raise ConfigError(
-            "there is no such excitation",
-            expected=f"one of {', '.join(KINDS)}",
-            got=name,
-            remedy=did_you_mean(name, KINDS, "name one of these"),
-        )
+        raise ConfigError.unknown("there is no such excitation", name, KINDS, "name one of these")
     kind: Any = KINDS[name]
     hints = get_type_hints(kind)
     known = {field.name: hints[field.name] for field in dataclasses.fields(kind)}

@@ -9,68 +9,34 @@ from typing import TYPE_CHECKING
 from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
-    from sysid.export.bundle import Bundle, BundleFile
-    from sysid.export.command_table import CommandTable, read_command
-    from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run
-    from sysid.export.exporters import EXPORTERS
-    from sysid.export.flags import Flag, expected_flags
-    from sysid.export.jax_exporter import jax_run, jax_step
-    from sysid.export.layout import DelayLine, StateLayout
-    from sysid.export.parity import Parity, ParityCase, check_parity, parity_cases, random_cases
-    from sysid.export.reading import read_bundle
-    from sysid.export.renewing import renew_bundle
-    from sysid.export.simulation import Simulation, simulate_bundle
-    from sysid.export.stage import Port, Stage
-    from sysid.export.surrogate import Surrogate
-    from sysid.export.writing import export_bundle, zip_bundle
+    from sysid.export.bundle import Bundle as Bundle
+    from sysid.export.bundle import BundleFile as BundleFile
+    from sysid.export.command_table import CommandTable as CommandTable
+    from sysid.export.command_table import read_command as read_command
+    from sysid.export.exporter import AbstractExporter as AbstractExporter
+    from sysid.export.exporter import ExportedFile as ExportedFile
+    from sysid.export.exporter import Kind as Kind
+    from sysid.export.exporter import Run as Run
+    from sysid.export.exporters import EXPORTERS as EXPORTERS
+    from sysid.export.flags import Flag as Flag
+    from sysid.export.flags import expected_flags as expected_flags
+    from sysid.export.forms.layout import DelayLine as DelayLine
+    from sysid.export.forms.layout import StateLayout as StateLayout
+    from sysid.export.forms.stage import Port as Port
+    from sysid.export.forms.stage import Stage as Stage
+    from sysid.export.jax_exporter import jax_run as jax_run
+    from sysid.export.jax_exporter import jax_step as jax_step
+    from sysid.export.parity import Parity as Parity
+    from sysid.export.parity import ParityCase as ParityCase
+    from sysid.export.parity import check_parity as check_parity
+    from sysid.export.parity import parity_cases as parity_cases
+    from sysid.export.parity import random_cases as random_cases
+    from sysid.export.reading import read_bundle as read_bundle
+    from sysid.export.renewing import renew_bundle as renew_bundle
+    from sysid.export.simulation import Simulation as Simulation
+    from sysid.export.simulation import simulate_bundle as simulate_bundle
+    from sysid.export.surrogate import Surrogate as Surrogate
+    from sysid.export.writing import export_bundle as export_bundle
+    from sysid.export.writing import zip_bundle as zip_bundle
 
-__all__ = [
-    "EXPORTERS",
-    "AbstractExporter",
-    "Bundle",
-    "BundleFile",
-    "CommandTable",
-    "DelayLine",
-    "ExportedFile",
-    "Flag",
-    "Kind",
-    "Parity",
-    "ParityCase",
-    "Port",
-    "Run",
-    "Simulation",
-    "Stage",
-    "StateLayout",
-    "Surrogate",
-    "check_parity",
-    "expected_flags",
-    "export_bundle",
-    "jax_run",
-    "jax_step",
-    "parity_cases",
-    "random_cases",
-    "read_bundle",
-    "read_command",
-    "renew_bundle",
-    "simulate_bundle",
-    "zip_bundle",
-]
-
-_WHERE = {
-    "sysid.export.bundle": ("Bundle", "BundleFile"),
-    "sysid.export.command_table": ("CommandTable", "read_command"),
-    "sysid.export.exporter": ("AbstractExporter", "ExportedFile", "Kind", "Run"),
-    "sysid.export.exporters": ("EXPORTERS",),
-    "sysid.export.flags": ("Flag", "expected_flags"),
-    "sysid.export.jax_exporter": ("jax_run", "jax_step"),
-    "sysid.export.layout": ("DelayLine", "StateLayout"),
-    "sysid.export.parity": ("Parity", "ParityCase", "check_parity", "parity_cases", "random_cases"),
-    "sysid.export.reading": ("read_bundle",),
-    "sysid.export.renewing": ("renew_bundle",),
-    "sysid.export.simulation": ("Simulation", "simulate_bundle"),
-    "sysid.export.stage": ("Port", "Stage"),
-    "sysid.export.surrogate": ("Surrogate",),
-    "sysid.export.writing": ("export_bundle", "zip_bundle"),
-}
-
-__getattr__ = imported_when_asked(_WHERE)
+__getattr__, __all__ = imported_when_asked(__file__)

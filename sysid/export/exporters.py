@@ -7,18 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sysid.errors import ConfigError, did_you_mean
-from sysid.export.arduino_exporter import ArduinoExporter
-from sysid.export.c_exporter import CExporter
+from sysid.export.c.arduino_exporter import ArduinoExporter
+from sysid.export.c.cpp_exporter import CppExporter
+from sysid.export.c.exporter import CExporter
 from sysid.export.casadi_exporter import CasadiExporter
-from sysid.export.cpp_exporter import CppExporter
 from sysid.export.exporter import AbstractExporter
-from sysid.export.fmu_exporter import FmuExporter
+from sysid.export.fmi.exporter import FmuExporter
 from sysid.export.jax_exporter import JaxExporter
 from sysid.export.matlab_exporter import MatlabExporter
-from sysid.export.onnx_exporter import OnnxExporter
+from sysid.export.onnx.exporter import OnnxExporter
 from sysid.export.st_exporter import StructuredTextExporter
-from sysid.export.torch_export import TorchExportExporter
-from sysid.export.torchscript import TorchScriptExporter
+from sysid.export.torch.torch_export import TorchExportExporter
+from sysid.export.torch.torchscript import TorchScriptExporter
 from sysid.export.wasm_exporter import WasmExporter
 
 EXPORTERS: dict[str, AbstractExporter] = {

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.stage import Side, Stage
+from sysid.export.forms.stage import Side, Stage
 from sysid.export.surrogate import Surrogate
 
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
 from sysid.export.flags import Flag
-from sysid.export.program_form import INPUT, STATE, Listing, ProgramForm
-from sysid.export.stage import Side, Stage
-from sysid.export.state_space_form import Neurons, StateSpaceForm
+from sysid.export.forms.programs import INPUT, STATE, Listing, ProgramForm
+from sysid.export.forms.stage import Side, Stage
+from sysid.export.forms.state_space import Neurons, StateSpaceForm
 from sysid.export.surrogate import Surrogate
 from sysid.extras import need
 from sysid.models import AbstractModel, Cascade

@@ -17,10 +17,10 @@ import numpy as np
 import sysid
 from sysid.estimation.result import FitResult
 from sysid.export.exporter import ExportedFile
-from sysid.export.layout import HiddenState
+from sysid.export.forms.layout import HiddenState
+from sysid.export.forms.stage import Port, Stage
 from sysid.export.parity import Parity, ParityCase
 from sysid.export.ranges import example_of, range_of
-from sysid.export.stage import Port, Stage
 from sysid.export.surrogate import Surrogate
 from sysid.extras import has
 from sysid.models import Start

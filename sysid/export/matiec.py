@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 from sysid.errors import ConfigError
-from sysid.export.compiler import CompilerError, build_library, compiler
+from sysid.export.c.compiler import CompilerError, build_library, compiler
 
 PROGRAM = "iec2c"
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 import sysid
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner
 from sysid.export.flags import MEANING, Flag
+from sysid.export.forms.programs import ProgramForm
 from sysid.export.octave import octave, session
 from sysid.export.plain_source import plain_stage, program_lines, rest_values
-from sysid.export.program_form import ProgramForm
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import render
 from sysid.names import c_comment, shortened

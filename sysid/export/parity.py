@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sysid.errors import ParityError
 from sysid.export.exporter import ExportedFile, Runner
 from sysid.export.exporters import exporter
-from sysid.export.stage import Port
+from sysid.export.forms.stage import Port
 from sysid.export.surrogate import Surrogate
 from sysid.models import AbstractModel, History, Start, beginning
 from sysid.traces import Trace, TraceSet

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from sysid.export.flags import Flag
-from sysid.export.layout import EquationState, HiddenState
-from sysid.export.operations import Operation, Points
-from sysid.export.program_form import INPUT, STATE, Listing, ProgramForm, Read
-from sysid.export.stage import Level, Stage
-from sysid.export.state_space_form import StateSpaceForm
+from sysid.export.forms.layout import EquationState, HiddenState
+from sysid.export.forms.operations import Operation, Points
+from sysid.export.forms.programs import INPUT, STATE, Listing, ProgramForm, Read
+from sysid.export.forms.stage import Level, Stage
+from sysid.export.forms.state_space import StateSpaceForm
 from sysid.export.surrogate import Surrogate
 
 

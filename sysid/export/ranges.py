@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sysid.export.stage import Range
+from sysid.export.forms.stage import Range
 from sysid.traces import Role, Trace, TraceSet
 
 

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 import sysid
-from sysid.export.c_exporter import caller
+from sysid.export.c.exporter import caller
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Runner
 from sysid.export.flags import MEANING, Flag
+from sysid.export.forms.operations import pieces
+from sysid.export.forms.programs import Listing, ProgramForm
 from sysid.export.matiec import build, matiec
-from sysid.export.operations import pieces
 from sysid.export.plain_source import plain_stage, program_lines, rest_values, tables
-from sysid.export.program_form import Listing, ProgramForm
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import render
 from sysid.names import c_comment

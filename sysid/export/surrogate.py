@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.lagged_form import lowered_form
-from sysid.export.layout import DelayLine, HiddenState
-from sysid.export.stage import Late, Level, Port, Range, Stage, stages_of
+from sysid.export.forms.lagged import lowered_form
+from sysid.export.forms.layout import DelayLine, HiddenState
+from sysid.export.forms.stage import Late, Level, Port, Range, Stage, stages_of
 from sysid.models import AbstractModel, Cascade
 from sysid.models.form import unheeded
 from sysid.models.history import known_inputs

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.compiler import build_module
+from sysid.export.c.compiler import build_module
 from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner
 from sysid.export.flags import MEANING
-from sysid.export.stage import Port
+from sysid.export.forms.stage import Port
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import render
 
@@ -27,7 +27,7 @@ class WasmExporter(AbstractExporter):
 
     def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
         """Compile the C source, and write the page around it."""
-        from sysid.export.c_source import c_files
+        from sysid.export.c.source import c_files
 
         prefix = surrogate.identifier
         names = {"p": prefix, "P": prefix.upper()}

@@ -11,70 +11,36 @@ from typing import TYPE_CHECKING
 from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
-    from sysid.ingest.cache import TraceCache, content_key, default_cache_folder
-    from sysid.ingest.columns import RawColumn
-    from sysid.ingest.dataset import Progress, find_dataset, load_dataset, load_described
-    from sysid.ingest.description import DatasetDescription, read_description
-    from sysid.ingest.findings import ColumnFinding, FileFinding
-    from sysid.ingest.generators import Generator, find_generator
-    from sysid.ingest.inspection import inspect_file
-    from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
-    from sysid.ingest.proposal import propose_dataset
-    from sysid.ingest.readers import READERS, Reader
-    from sysid.ingest.reading import read_table, read_trace
-    from sysid.ingest.table import RawTable
-    from sysid.ingest.timing import Timing, survey
-    from sysid.ingest.writers import write_csv, write_parquet, write_trace
+    from sysid.ingest.cache import TraceCache as TraceCache
+    from sysid.ingest.cache import content_key as content_key
+    from sysid.ingest.cache import default_cache_folder as default_cache_folder
+    from sysid.ingest.columns import RawColumn as RawColumn
+    from sysid.ingest.dataset import Progress as Progress
+    from sysid.ingest.dataset import find_dataset as find_dataset
+    from sysid.ingest.dataset import load_dataset as load_dataset
+    from sysid.ingest.dataset import load_described as load_described
+    from sysid.ingest.description import DatasetDescription as DatasetDescription
+    from sysid.ingest.description import read_description as read_description
+    from sysid.ingest.findings import ColumnFinding as ColumnFinding
+    from sysid.ingest.findings import FileFinding as FileFinding
+    from sysid.ingest.generators import Generator as Generator
+    from sysid.ingest.generators import find_generator as find_generator
+    from sysid.ingest.inspection import inspect_file as inspect_file
+    from sysid.ingest.options import ColumnOptions as ColumnOptions
+    from sysid.ingest.options import FileOptions as FileOptions
+    from sysid.ingest.options import GridOptions as GridOptions
+    from sysid.ingest.options import RepairOptions as RepairOptions
+    from sysid.ingest.options import TimeOptions as TimeOptions
+    from sysid.ingest.proposal import propose_dataset as propose_dataset
+    from sysid.ingest.readers import READERS as READERS
+    from sysid.ingest.readers import Reader as Reader
+    from sysid.ingest.reading import read_table as read_table
+    from sysid.ingest.reading import read_trace as read_trace
+    from sysid.ingest.table import RawTable as RawTable
+    from sysid.ingest.timing import Timing as Timing
+    from sysid.ingest.timing import survey as survey
+    from sysid.ingest.writers import write_csv as write_csv
+    from sysid.ingest.writers import write_parquet as write_parquet
+    from sysid.ingest.writers import write_trace as write_trace
 
-__all__ = [
-    "READERS",
-    "ColumnFinding",
-    "ColumnOptions",
-    "DatasetDescription",
-    "FileFinding",
-    "FileOptions",
-    "Generator",
-    "GridOptions",
-    "Progress",
-    "RawColumn",
-    "RawTable",
-    "Reader",
-    "RepairOptions",
-    "TimeOptions",
-    "Timing",
-    "TraceCache",
-    "content_key",
-    "default_cache_folder",
-    "find_dataset",
-    "find_generator",
-    "inspect_file",
-    "load_dataset",
-    "load_described",
-    "propose_dataset",
-    "read_description",
-    "read_table",
-    "read_trace",
-    "survey",
-    "write_csv",
-    "write_parquet",
-    "write_trace",
-]
-
-__getattr__ = imported_when_asked(
-    {
-        "sysid.ingest.cache": ("TraceCache", "content_key", "default_cache_folder"),
-        "sysid.ingest.columns": ("RawColumn",),
-        "sysid.ingest.dataset": ("Progress", "find_dataset", "load_dataset", "load_described"),
-        "sysid.ingest.description": ("DatasetDescription", "read_description"),
-        "sysid.ingest.findings": ("ColumnFinding", "FileFinding"),
-        "sysid.ingest.generators": ("Generator", "find_generator"),
-        "sysid.ingest.inspection": ("inspect_file",),
-        "sysid.ingest.options": ("ColumnOptions", "FileOptions", "GridOptions", "RepairOptions", "TimeOptions"),
-        "sysid.ingest.proposal": ("propose_dataset",),
-        "sysid.ingest.readers": ("READERS", "Reader"),
-        "sysid.ingest.reading": ("read_table", "read_trace"),
-        "sysid.ingest.table": ("RawTable",),
-        "sysid.ingest.timing": ("Timing", "survey"),
-        "sysid.ingest.writers": ("write_csv", "write_parquet", "write_trace"),
-    }
-)
+__getattr__, __all__ = imported_when_asked(__file__)

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError, UserError, did_you_mean
+from sysid.errors import ConfigError, TraceError, UserError
 from sysid.ingest import repairs as repair
 from sysid.ingest.columns import RawColumn
 from sysid.ingest.grid import Gridded, fill, grid_places, place, resample
 from sysid.ingest.in_units import check_units_said, clock_by_its_steps, in_unit, stamps_in_seconds
 from sysid.ingest.options import ColumnOptions, FileOptions, GridOptions, RepairOptions
-from sysid.ingest.repairs import Record
+from sysid.ingest.record import Record
+from sysid.ingest.stamp_repairs import STEPS
 from sysid.ingest.table import RawTable
 from sysid.ingest.timing import Timing, survey
 from sysid.traces import Channel, Trace
@@ -80,7 +81,7 @@ def assemble(
     record = _select(table, wanted, files, repairs)
     source = table.source
     del table  # its columns stand in the record now, and may be large
-    for step in repair.STEPS:
+    for step in STEPS:
         record = step(record, repairs)
     record = _cut(record, wanted)
     if len(record.stamps) < grid.fewest_samples:
@@ -162,14 +163,12 @@ def _check_names(channels: Sequence[Channel], files: FileOptions, source: Path) 
     for field_name, group in groups.items():
         strangers = sorted(set(group) - names) if isinstance(group, Mapping) else []
         if strangers:
-            raise ConfigError(
+            raise ConfigError.unknown(
                 f"{field_name} names {strangers[0]}, which is not a channel",
+                strangers[0],
+                sorted(names),
+                "write channel names on the left, column names or values on the right",
                 where=f"the description of {source}, field source.files.{field_name}",
-                expected=f"one of {', '.join(sorted(names))}",
-                got=strangers[0],
-                remedy=did_you_mean(
-                    strangers[0], names, "write channel names on the left, column names or values on the right"
-                ),
             )
 
 

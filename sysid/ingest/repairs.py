@@ -1,68 +1,18 @@
-"""What can be wrong with the samples of a record: refused, or repaired where that repair was asked for."""
+"""What can be wrong with the values of a record: refused, or repaired where that repair was asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError, did_you_mean
+from sysid.errors import ConfigError, TraceError
 from sysid.ingest.blanks import marks_in
 from sysid.ingest.columns import RawColumn
 from sysid.ingest.options import RepairOptions
+from sysid.ingest.record import Record
 from sysid.ingest.table import RawTable
-
-HOUR = 3600.0
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Record:
-    """The samples of one file on their way to a trace.
-
-    Args:
-        table: The file they came from.
-        rows: Shape ``(n,)``: row of the file that each sample was; ``None`` while it is all of them, in their order.
-        stamps: Shape ``(n,)``, seconds.
-        names: Channel names.
-        values: Shape ``(n, n_channels)``.
-        marked: Shape ``(n, n_channels)``: values that must not count.
-        notes: What was done, one sentence each.
-    """
-
-    table: RawTable
-    rows: NDArray[np.intp] | None = None
-    stamps: NDArray[np.float64]
-    names: tuple[str, ...]
-    values: NDArray[np.float64]
-    marked: NDArray[np.bool_]
-    notes: tuple[str, ...] = field(default=())
-
-    def at(self, index: int) -> str:
-        """Where a sample is in the file, for messages."""
-        return self.table.place(index if self.rows is None else int(self.rows[index]))
-
-    def where(self, index: int, channel: str | None = None) -> str:
-        """File, channel and sample, for messages."""
-        middle = "" if channel is None else f", channel {channel}"
-        return f"{self.table.source}{middle}, {self.at(index)}"
-
-    def keep(self, chosen: NDArray[np.intp] | NDArray[np.bool_], note: str | None = None) -> Record:
-        """Some of the samples, in the order given."""
-        taken = np.arange(len(self.stamps))[chosen]
-        return replace(
-            self,
-            rows=taken if self.rows is None else self.rows[taken],
-            stamps=self.stamps[chosen],
-            values=self.values[chosen],
-            marked=self.marked[chosen],
-            notes=self.notes if note is None else (*self.notes, note),
-        )
-
-    def noted(self, note: str) -> Record:
-        """The same samples with a sentence added."""
-        return replace(self, notes=(*self.notes, note))
 
 
 def marks(table: RawTable, column: RawColumn, repairs: RepairOptions) -> tuple[RawColumn, str]:
@@ -94,149 +44,6 @@ def marks(table: RawTable, column: RawColumn, repairs: RepairOptions) -> tuple[R
         got=f"{shown} in {count} of {len(there)} samples, far from all others",
         remedy="if it stands for a missing value, ask for repairs: {marks: missing, nan: mask}; if it was measured, "
         "for repairs: {marks: accept}",
-    )
-
-
-def empty_stamps(record: Record, repairs: RepairOptions) -> Record:
-    """Samples without a time stamp.
-
-    Args:
-        record: The samples.
-        repairs: ``stamps: drop`` drops them.
-
-    Returns:
-        The samples that have one.
-
-    Raises:
-        TraceError: If there are such samples and no repair was asked for, or nothing else is left.
-    """
-    bad = ~np.isfinite(record.stamps)
-    if not bad.any():
-        return record
-    first = int(np.flatnonzero(bad)[0])
-    if repairs.stamps is None or bad.all():
-        raise TraceError(
-            f"{int(bad.sum())} samples have no time stamp",
-            where=record.where(first, record.table.time),
-            expected="a number in each row of the time column",
-            got=record.stamps[first],
-            remedy="correct the file, or ask for repairs: {stamps: drop}",
-        )
-    return record.keep(~bad, f"{int(bad.sum())} samples without a time stamp dropped, first at {record.at(first)}")
-
-
-def backward(record: Record, repairs: RepairOptions) -> Record:
-    """Time stamps that step back.
-
-    Args:
-        record: The samples.
-        repairs: ``backward: sort`` sorts by time, ``backward: drop`` drops those that step back.
-
-    Returns:
-        Samples whose stamps never fall.
-
-    Raises:
-        TraceError: If a stamp steps back and no repair was asked for.
-    """
-    if not (record.stamps[1:] < record.stamps[:-1]).any():
-        return record
-    late = record.stamps[1:] < np.maximum.accumulate(record.stamps)[:-1]
-    bad = np.flatnonzero(late) + 1
-    if not len(bad):
-        return record
-    first = int(bad[0])
-    if repairs.backward is None:
-        raise TraceError(
-            f"{len(bad)} time stamps step back",
-            where=record.where(first),
-            expected=f"a time after {record.stamps[first - 1]:g} s",
-            got=f"{record.stamps[first]:g} s",
-            remedy=_zone(record)
-            or _set_back(record)
-            or "split the file where a new recording starts, or ask for repairs: {backward: sort} or {backward: drop}",
-        )
-    told = f"{len(bad)} backward time stamps, first at {record.at(first)}"
-    if repairs.backward == "sort":
-        return record.keep(np.argsort(record.stamps, kind="stable"), f"sorted by time: {told}")
-    keep = np.ones(len(record.stamps), dtype=np.bool_)
-    keep[bad] = False
-    return record.keep(keep, f"dropped: {told}")
-
-
-def _set_back(record: Record) -> str | None:
-    """What to do where the clock goes back once, by an hour: it was set back, and an hour comes twice."""
-    steps = np.diff(record.stamps)
-    back = steps[steps < 0.0]
-    usual = float(np.median(steps))
-    if len(back) != 1 or abs(float(back[0]) - usual + HOUR) > 0.5 * abs(usual):
-        return None
-    return (
-        "a clock that was set back by an hour, as in autumn: say its zone (time: {zone: Europe/Berlin}; of a frame, "
-        'frame.tz_localize("Europe/Berlin", ambiguous="infer")). Sorted by time, two hours would be one'
-    )
-
-
-def _zone(record: Record) -> str | None:
-    """What to do where a clock on the wall explains the stamps."""
-    zone = record.table.settings.get("zone")
-    if not zone:
-        return None
-    return f"an hour comes twice, as on a clock on the wall: write time: {{column: {record.table.time}, zone: {zone}}}"
-
-
-def duplicates(record: Record, repairs: RepairOptions) -> Record:
-    """Time stamps that stand more than once.
-
-    Args:
-        record: Samples whose stamps never fall.
-        repairs: ``duplicates: drop`` keeps the first, ``last`` the last, and ``average`` their mean.
-
-    Returns:
-        Samples whose stamps rise.
-
-    Raises:
-        TraceError: If a stamp stands twice and no repair was asked for.
-    """
-    bad = np.flatnonzero(record.stamps[1:] == record.stamps[:-1]) + 1
-    if not len(bad):
-        return record
-    first = int(bad[0])
-    if repairs.duplicates is None:
-        raise TraceError(
-            f"{len(bad)} time stamps are duplicates",
-            where=record.where(first),
-            expected=f"a time after {record.stamps[first]:g} s",
-            got=f"{record.stamps[first]:g} s again",
-            remedy=_zone(record)
-            or _in_single(record)
-            or "ask for repairs: {duplicates: drop}, {duplicates: last} or {duplicates: average}",
-        )
-    keep = np.ones(len(record.stamps), dtype=np.bool_)
-    keep[bad] = False
-    told = f"{len(bad)} duplicate time stamps, first at {record.at(first)}"
-    if repairs.duplicates == "drop":
-        return record.keep(keep, f"dropped: {told}")
-    if repairs.duplicates == "last":
-        return record.keep(np.append(keep[1:], True), f"the last one of each kept: {told}")
-    group = np.cumsum(keep) - 1
-    with np.errstate(invalid="ignore"):
-        sums = np.column_stack([np.bincount(group, weights=column) for column in record.values.T])
-    means = sums / np.bincount(group)[:, None]
-    return replace(record.keep(keep, f"averaged: {told}"), values=means)
-
-
-def _in_single(record: Record) -> str | None:
-    """What to do where stamps are numbers of 32 bit, which count too coarsely that far from 0."""
-    stamps = record.stamps
-    if not np.array_equal(stamps.astype(np.float32), stamps):
-        return None
-    coarse = float(np.spacing(np.float32(np.abs(stamps).max())))
-    steps = np.diff(stamps)
-    if not float(steps[steps > 0.0].min(initial=np.inf)) < 2.0 * coarse:
-        return None
-    return (
-        f"the stamps are numbers of 32 bit, which count in steps of {coarse:.3g} s here: save them in 64 bit, or leave "
-        "them out and say the sample time. Dropped, samples of different times would be lost"
     )
 
 
@@ -347,12 +154,12 @@ def _check_names(record: Record, repairs: RepairOptions) -> None:
         asked = getattr(repairs, kind)
         strangers = sorted(set(asked) - set(record.names)) if isinstance(asked, dict) else []
         if strangers:
-            raise ConfigError(
+            raise ConfigError.unknown(
                 f"repairs.{kind} names {strangers[0]}, which is not a channel",
+                strangers[0],
+                record.names,
+                "write the names of channels on the left",
                 where=f"the description of {record.table.source}",
-                expected=f"one of {', '.join(record.names)}",
-                got=strangers[0],
-                remedy=did_you_mean(strangers[0], record.names, "write the names of channels on the left"),
             )
 
 
@@ -416,7 +223,3 @@ def constants(record: Record, repairs: RepairOptions) -> Record:
             remedy="check the sensor, leave the channel out, or ask for repairs: {constant: accept}",
         )
     return record.noted(f"constant and accepted: {', '.join(still)}")
-
-
-STEPS: tuple[Callable[[Record, RepairOptions], Record], ...] = (empty_stamps, backward, duplicates)
-"""The repairs of time stamps, in the order in which they are made."""

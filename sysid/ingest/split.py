@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.ingest.frames import seconds
 from sysid.traces import Role, Trace, TraceSet
 
@@ -224,14 +224,12 @@ def _word(role: object) -> str:
 
 def _role(word: str) -> Role:
     if word.strip().lower() not in ROLES:
-        raise ConfigError(
+        raise ConfigError.unknown(
             "unknown role",
+            word,
+            ROLES,
+            "estimation is fitted, selection chooses between fits, validation and test are only scored",
             where="split",
-            expected=f"one of {', '.join(ROLES)}",
-            got=word,
-            remedy=did_you_mean(
-                word, ROLES, "estimation is fitted, selection chooses between fits, validation and test are only scored"
-            ),
         )
     return ROLES[word.strip().lower()]
 

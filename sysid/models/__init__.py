@@ -1,121 +1,69 @@
 """What a model is: structure, parameters, scaling, initial state; free run and prediction."""
 
-from sysid.models.arx import ARX, ARXModel
-from sysid.models.base import AbstractModel
-from sysid.models.beginning import Beginning, beginning
-from sysid.models.block_oriented import HammersteinWiener, WienerHammerstein
-from sysid.models.built_model import BuiltModel
-from sysid.models.cascade import Cascade
-from sysid.models.cascade_batch import simulate_family
-from sysid.models.cascade_program import Limit
-from sysid.models.cascade_run import Activity, CascadeRun
-from sysid.models.declared import InitialState, Parameter
-from sysid.models.ends import Ends
-from sysid.models.equation_form import EquationForm
-from sysid.models.form import AbstractForm
-from sysid.models.grey_box import GreyBox, VectorGreyBox
-from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
-from sysid.models.history import History, Start, StartKind, StartLike
-from sysid.models.innovations import Innovations
-from sysid.models.interpolation import Interpolation
-from sysid.models.lags import Lagged, Lags
-from sysid.models.linear_state_space import (
-    LinearStateSpace,
-    LinearStateSpaceModel,
-    VectorStateSpace,
-    VectorStateSpaceModel,
-)
-from sysid.models.mapping import Mapping
-from sysid.models.narx import NARX, NARXModel
-from sysid.models.neural_ensemble import NeuralEnsemble
-from sysid.models.neural_form import NeuralForm
-from sysid.models.neural_state_space import (
-    NeuralStateSpace,
-    NeuralStateSpaceModel,
-    VectorNeuralStateSpace,
-    VectorNeuralStateSpaceModel,
-)
-from sysid.models.orthonormal_basis import Domain
-from sysid.models.polynomial import PolynomialModel
-from sysid.models.polynomial_narx import PolynomialNARX
-from sysid.models.polynomial_orders import ARMAX, BJ, OE
-from sysid.models.recursion import Recursion, parameter_count
-from sysid.models.scaling import Scaling, VectorScaling
-from sysid.models.several_outputs import SeveralOutputs
-from sysid.models.state_space import StateSpace
-from sysid.models.store import cascade_from_dict, model_from_dict, structure_from_dict
-from sysid.models.structure import AbstractStructure
-from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
-from sysid.models.vector_narx import VectorNARX, VectorNARXModel
-from sysid.models.vector_recursion import VectorRecursion
-from sysid.models.wiring import Member, Wiring
-
-__all__ = [
-    "ARMAX",
-    "ARX",
-    "BJ",
-    "NARX",
-    "OE",
-    "ARXModel",
-    "AbstractForm",
-    "AbstractModel",
-    "AbstractStructure",
-    "Activity",
-    "Beginning",
-    "BuiltModel",
-    "Cascade",
-    "CascadeRun",
-    "Domain",
-    "Ends",
-    "EquationForm",
-    "EquationModel",
-    "GreyBox",
-    "GreyBoxModel",
-    "HammersteinWiener",
-    "History",
-    "InitialState",
-    "Innovations",
-    "Interpolation",
-    "Lagged",
-    "Lags",
-    "Limit",
-    "LinearStateSpace",
-    "LinearStateSpaceModel",
-    "Mapping",
-    "Member",
-    "NARXModel",
-    "NeuralEnsemble",
-    "NeuralForm",
-    "NeuralStateSpace",
-    "NeuralStateSpaceModel",
-    "Parameter",
-    "PolynomialModel",
-    "PolynomialNARX",
-    "Recursion",
-    "Scaling",
-    "SeveralOutputs",
-    "Start",
-    "StartKind",
-    "StartLike",
-    "StateSpace",
-    "TransferFunction",
-    "TransferFunctionModel",
-    "VectorGreyBox",
-    "VectorGreyBoxModel",
-    "VectorNARX",
-    "VectorNARXModel",
-    "VectorNeuralStateSpace",
-    "VectorNeuralStateSpaceModel",
-    "VectorRecursion",
-    "VectorScaling",
-    "VectorStateSpace",
-    "VectorStateSpaceModel",
-    "WienerHammerstein",
-    "Wiring",
-    "beginning",
-    "cascade_from_dict",
-    "model_from_dict",
-    "parameter_count",
-    "simulate_family",
-    "structure_from_dict",
-]
+from sysid.models.arx import ARX as ARX
+from sysid.models.arx import ARXModel as ARXModel
+from sysid.models.base import AbstractModel as AbstractModel
+from sysid.models.beginning import Beginning as Beginning
+from sysid.models.beginning import beginning as beginning
+from sysid.models.block_oriented import HammersteinWiener as HammersteinWiener
+from sysid.models.block_oriented import WienerHammerstein as WienerHammerstein
+from sysid.models.built_model import BuiltModel as BuiltModel
+from sysid.models.cascade import Cascade as Cascade
+from sysid.models.cascade_batch import simulate_family as simulate_family
+from sysid.models.cascade_program import Limit as Limit
+from sysid.models.cascade_run import Activity as Activity
+from sysid.models.cascade_run import CascadeRun as CascadeRun
+from sysid.models.declared import InitialState as InitialState
+from sysid.models.declared import Parameter as Parameter
+from sysid.models.ends import Ends as Ends
+from sysid.models.equation_form import EquationForm as EquationForm
+from sysid.models.form import AbstractForm as AbstractForm
+from sysid.models.grey_box import GreyBox as GreyBox
+from sysid.models.grey_box import VectorGreyBox as VectorGreyBox
+from sysid.models.grey_box_model import EquationModel as EquationModel
+from sysid.models.grey_box_model import GreyBoxModel as GreyBoxModel
+from sysid.models.grey_box_model import VectorGreyBoxModel as VectorGreyBoxModel
+from sysid.models.history import History as History
+from sysid.models.history import Start as Start
+from sysid.models.history import StartKind as StartKind
+from sysid.models.history import StartLike as StartLike
+from sysid.models.innovations import Innovations as Innovations
+from sysid.models.interpolation import Interpolation as Interpolation
+from sysid.models.lags import Lagged as Lagged
+from sysid.models.lags import Lags as Lags
+from sysid.models.linear_state_space import LinearStateSpace as LinearStateSpace
+from sysid.models.linear_state_space import LinearStateSpaceModel as LinearStateSpaceModel
+from sysid.models.linear_state_space import VectorStateSpace as VectorStateSpace
+from sysid.models.linear_state_space import VectorStateSpaceModel as VectorStateSpaceModel
+from sysid.models.mapping import Mapping as Mapping
+from sysid.models.narx import NARX as NARX
+from sysid.models.narx import NARXModel as NARXModel
+from sysid.models.neural_ensemble import NeuralEnsemble as NeuralEnsemble
+from sysid.models.neural_form import NeuralForm as NeuralForm
+from sysid.models.neural_state_space import NeuralStateSpace as NeuralStateSpace
+from sysid.models.neural_state_space import NeuralStateSpaceModel as NeuralStateSpaceModel
+from sysid.models.neural_state_space import VectorNeuralStateSpace as VectorNeuralStateSpace
+from sysid.models.neural_state_space import VectorNeuralStateSpaceModel as VectorNeuralStateSpaceModel
+from sysid.models.orthonormal_basis import Domain as Domain
+from sysid.models.polynomial import PolynomialModel as PolynomialModel
+from sysid.models.polynomial_narx import PolynomialNARX as PolynomialNARX
+from sysid.models.polynomial_orders import ARMAX as ARMAX
+from sysid.models.polynomial_orders import BJ as BJ
+from sysid.models.polynomial_orders import OE as OE
+from sysid.models.recursion import Recursion as Recursion
+from sysid.models.recursion import parameter_count as parameter_count
+from sysid.models.scaling import Scaling as Scaling
+from sysid.models.scaling import VectorScaling as VectorScaling
+from sysid.models.several_outputs import SeveralOutputs as SeveralOutputs
+from sysid.models.state_space import StateSpace as StateSpace
+from sysid.models.store import cascade_from_dict as cascade_from_dict
+from sysid.models.store import model_from_dict as model_from_dict
+from sysid.models.store import structure_from_dict as structure_from_dict
+from sysid.models.structure import AbstractStructure as AbstractStructure
+from sysid.models.transfer_function import TransferFunction as TransferFunction
+from sysid.models.transfer_function import TransferFunctionModel as TransferFunctionModel
+from sysid.models.vector_narx import VectorNARX as VectorNARX
+from sysid.models.vector_narx import VectorNARXModel as VectorNARXModel
+from sysid.models.vector_recursion import VectorRecursion as VectorRecursion
+from sysid.models.wiring import Member as Member
+from sysid.models.wiring import Wiring as Wiring

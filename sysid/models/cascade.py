@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.models.cascade_batch import simulate_records
+from sysid.models.cascade_checks import check_circles, check_levels_and_limits, check_names, own_limits
 from sysid.models.cascade_program import Limit
 from sysid.models.cascade_run import CascadeRun, Level
 from sysid.models.cascade_stages import CompiledStage, ModelStage, stages_of
-from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.ends import Ends, check_record
 from sysid.models.history import input_columns
-from sysid.models.rest_levels import leaders, resting
+from sysid.models.rest_levels import resting
 from sysid.models.to_control import of_wired
 from sysid.models.wiring import Member, Wiring
 from sysid.traces import Trace
@@ -66,21 +66,10 @@ class Cascade:
     def __post_init__(self) -> None:
         wiring = Wiring.of(tuple(self.models), {name: limit.channels for name, limit in self.limits.items()})
         object.__setattr__(self, "models", tuple(self.models[i] for i in wiring.order))
-        _check_circles(self.models, wiring)
+        check_circles(self.models, wiring)
         object.__setattr__(self, "rest", dict(self.rest))
-        object.__setattr__(self, "limits", _own_limits(self.models) | dict(self.limits))
-        _check_names("rest", self.rest, wiring.channels)
-        _check_names("limits", self.limits, wiring.outputs)
-        for name, level in self.rest.items():
-            if isinstance(level, str):
-                _check_names(f"rest of {name}", [level], wiring.channels if name in wiring.outputs else wiring.inputs)
-            leaders(name, self.rest, wiring.outputs)  # which end
-        for i, name in enumerate(wiring.outputs):
-            _check_names(
-                f"limits of {name}",
-                self.limits.get(name, Limit()).channels,
-                (*wiring.inputs, *wiring.outputs[:i]),
-            )
+        object.__setattr__(self, "limits", own_limits(self.models) | dict(self.limits))
+        check_levels_and_limits(self.rest, self.limits, wiring)
 
     @property
     def single(self) -> None:
@@ -160,7 +149,7 @@ class Cascade:
                 got=str(model.mapping),
             )
         models = tuple(model if yes else other for other, yes in zip(self.models, same, strict=True))
-        own = _own_limits(self.models)  # of which those of the former member go with it
+        own = own_limits(self.models)  # of which those of the former member go with it
         declared = {name: limit for name, limit in self.limits.items() if own.get(name) != limit}
         return replace(self, models=models, limits=declared)
 
@@ -235,12 +224,12 @@ class Cascade:
         start = dict(zip(self.inputs, map(float, first), strict=True))
         own = start | self._own_levels
         declared = {**self.rest, **(rest or {})}
-        _check_names("rest", declared, self.wiring.channels)
+        check_names("rest", declared, self.wiring.channels)
         levels = []
         for name in self.wiring.channels:
             level = resting(name, declared, own, self.outputs)
             if isinstance(level, str):
-                _check_names(f"rest of {name}", [level], self.inputs)
+                check_names(f"rest of {name}", [level], self.inputs)
                 level = start[level]
             levels.append(float(level))
         return np.array(levels)
@@ -400,26 +389,3 @@ class Cascade:
             "rest": dict(self.rest),
             "limits": {name: limit.to_dict() for name, limit in self.limits.items()},
         }
-
-
-def _own_limits(models: Sequence[Member]) -> dict[str, Limit]:
-    """Limits that members have of themselves, by channel."""
-    return {name: limit for model in models for name, limit in model.limits.items()}
-
-
-def _check_circles(models: Sequence[Member], wiring: Wiring) -> None:
-    """Members in a circle must run sample by sample, which a model with a state of its own does not."""
-    alone = [model for model in models if ColumnRecursion.of(model) is None]
-    if alone and any(wiring.feeds_back(Ends.of(model)) for model in models):
-        raise ConfigError(
-            "the models cannot be wired",
-            expected="models that read lagged samples (ARX, NARX) where some read each other in a circle",
-            got=", ".join(f"{model.mapping} {model.label}" for model in alone),
-            remedy="fit it as ARX or NARX, or open the circle",
-        )
-
-
-def _check_names(where: str, names: Any, known: Sequence[str]) -> None:
-    strangers = [name for name in names if name not in known]
-    if strangers:
-        raise ChannelError(strangers, known, where=f"{where} of the cascade" if where in {"rest", "limits"} else where)

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.activations import PLAIN, Activation, check_activation
-from sysid.models.base import AbstractModel
 from sysid.models.cascade_program import Limit
-from sysid.models.flat import as_many
 from sysid.models.lags import MOST, Lagged, Lags, LagSpec, is_one_set, parse_lags, whole
 from sysid.models.mapping import Mapping
+from sysid.models.network_model import NetworkModel
 from sysid.models.output_limits import Between, parse_limits, written
 from sysid.models.ranges import IntRange
 from sysid.models.recursion import Recursion
@@ -189,7 +188,7 @@ def _short(lags: tuple[int, ...]) -> str:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NARXModel(AbstractModel):
+class NARXModel(NetworkModel):
     """A fitted NARX network.
 
     Args:
@@ -217,25 +216,13 @@ class NARXModel(AbstractModel):
     between: Between = (None, None)
 
     def __post_init__(self) -> None:
-        theta = np.array(self.theta, dtype=np.float64)
-        theta.setflags(write=False)
-        object.__setattr__(self, "theta", theta)
-        object.__setattr__(self, "input_units", tuple(self.input_units))
+        super().__post_init__()
         object.__setattr__(self, "between", tuple(self.between))
-
-    def with_theta(self, theta: NDArray[np.float64]) -> NARXModel:
-        """The same network with other weights."""
-        return replace(self, theta=as_many(theta, len(self.theta)))
 
     @property
     def structure(self) -> NARX:
         """Delays and neurons."""
         return self.network
-
-    @property
-    def n_parameters(self) -> int:
-        """Length of ``theta``."""
-        return len(self.theta)
 
     @property
     def limits(self) -> Dict[str, Limit]:
@@ -258,18 +245,8 @@ class NARXModel(AbstractModel):
         )
 
     def _written(self) -> dict[str, Any]:
-        return {
-            "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
-            "scaling": self.scaling.to_dict(),
-            "theta": self.theta.tolist(),
-            **({"between": list(self.between)} if self.limits else {}),
-        }
+        return super()._written() | ({"between": list(self.between)} if self.limits else {})
 
     @staticmethod
     def _read(fields: Dict[str, Any]) -> dict[str, Any]:
-        return {
-            "theta": np.array(fields["theta"], dtype=np.float64),
-            "scaling": Scaling.from_dict(fields["scaling"]),
-            "clamp": np.inf if fields["clamp"] is None else fields["clamp"],
-            "between": tuple(fields.get("between", (None, None))),
-        }
+        return NetworkModel._read(fields) | {"between": tuple(fields.get("between", (None, None)))}

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.activations import PLAIN, Activation, check_activation
-from sysid.models.base import AbstractModel
 from sysid.models.history import History
 from sysid.models.lags import whole
 from sysid.models.mapping import Mapping
 from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP
+from sysid.models.network_model import NetworkModel
 from sysid.models.neural_ensemble import NeuralEnsemble, check_shares
 from sysid.models.neural_form import NeuralForm
 from sysid.models.neural_sizes import Sizes
-from sysid.models.scaling import Scaling, VectorScaling, scaling_from_dict
+from sysid.models.scaling import Scaling, VectorScaling
 from sysid.models.several_outputs import SeveralOutputs
 from sysid.models.structure import AbstractStructure
 
@@ -178,7 +178,7 @@ class VectorNeuralStateSpace(NeuralStateSpace):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _NeuralModel(AbstractModel):
+class _NeuralModel(NetworkModel):
     """What neural state spaces of one output and of several have in common; both have the fields below."""
 
     network: NeuralStateSpace
@@ -191,10 +191,7 @@ class _NeuralModel(AbstractModel):
     shares: tuple[int, ...] = (1,)
 
     def __post_init__(self) -> None:
-        theta = np.array(self.theta, dtype=np.float64)
-        theta.setflags(write=False)
-        object.__setattr__(self, "theta", theta)
-        object.__setattr__(self, "input_units", tuple(self.input_units))
+        super().__post_init__()
         object.__setattr__(self, "shares", tuple(self.shares))
         check_shares(self.shares)
 
@@ -257,21 +254,12 @@ class _NeuralModel(AbstractModel):
         return found if self.structure.several_outputs else found[:, 0]
 
     def _written(self) -> dict[str, Any]:
-        return {
-            "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
-            "scaling": self.scaling.to_dict(),
-            "theta": self.theta.tolist(),
-            **({"shares": list(self.shares)} if len(self.shares) > 1 else {}),  # single ones keep their digest
-        }
+        shares = {"shares": list(self.shares)} if len(self.shares) > 1 else {}  # single ones keep their digest
+        return super()._written() | shares
 
     @staticmethod
     def _read(fields: Dict[str, Any]) -> dict[str, Any]:
-        return {
-            "theta": np.array(fields["theta"], dtype=np.float64),
-            "scaling": scaling_from_dict(fields["scaling"]),
-            "clamp": np.inf if fields["clamp"] is None else fields["clamp"],
-            "shares": tuple(fields.get("shares", (1,))),
-        }
+        return NetworkModel._read(fields) | {"shares": tuple(fields.get("shares", (1,)))}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError
 from sysid.models.activations import PLAIN, Activation
 from sysid.models.cascade_program import Limit
-from sysid.models.flat import as_many
 from sysid.models.history import History
 from sysid.models.lags import Lags, LagSpec, is_one_set
 from sysid.models.mapping import Mapping
 from sysid.models.moves import moves_of
 from sysid.models.narx import CLAMP, NARX
+from sysid.models.network_model import NetworkModel
 from sysid.models.output_limits import Between, parse_several, written
 from sysid.models.scaling import VectorScaling
 from sysid.models.several_outputs import SeveralOutputs
@@ -170,7 +170,7 @@ class VectorNARX(AbstractStructure):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VectorNARXModel(SeveralOutputs):
+class VectorNARXModel(NetworkModel, SeveralOutputs):
     r"""A fitted network with several outputs.
 
     In scaled numbers :math:`\hat y_t = \mathrm{clip}(w x_t + c + V\,\sigma(W x_t + b))` with one row of :math:`w` and
@@ -204,18 +204,16 @@ class VectorNARXModel(SeveralOutputs):
     between: tuple[Between, ...] = ()
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "between", tuple(tuple(sides) for sides in self.between))
-        theta = np.array(self.theta, dtype=np.float64)
-        theta.setflags(write=False)
-        object.__setattr__(self, "theta", theta)
-        for name in ("input_units", "output_units", "rest_outputs"):
+        for name in ("output_units", "rest_outputs"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         count = self.network.parameter_count(len(self.mapping.inputs), len(self.mapping.outputs))
-        if theta.shape != (count,):
+        if self.theta.shape != (count,):
             raise TraceError(
                 "the parameter vector does not fit the structure",
                 expected=f"{count} parameters",
-                got=f"shape {theta.shape}",
+                got=f"shape {self.theta.shape}",
                 remedy="use parameters that were fitted with this structure",
             )
 
@@ -223,11 +221,6 @@ class VectorNARXModel(SeveralOutputs):
     def structure(self) -> VectorNARX:
         """Delays and neurons."""
         return self.network
-
-    @property
-    def n_parameters(self) -> int:
-        """Length of ``theta``."""
-        return len(self.theta)
 
     @property
     def lags(self) -> Lags:
@@ -256,10 +249,6 @@ class VectorNARXModel(SeveralOutputs):
             activation=self.network.activation,
         )
 
-    def with_theta(self, theta: NDArray[np.float64]) -> VectorNARXModel:
-        """The same network with other weights."""
-        return replace(self, theta=as_many(theta, len(self.theta)))
-
     def output_moves(
         self,
         factor: NDArray[np.float64],
@@ -278,18 +267,9 @@ class VectorNARXModel(SeveralOutputs):
         return moves_of(run, self.theta, factor, (len(inputs), len(self.mapping.outputs)))
 
     def _written(self) -> dict[str, Any]:
-        return {
-            "clamp": self.clamp if np.isfinite(self.clamp) else None,  # JSON has no infinity
-            "scaling": self.scaling.to_dict(),
-            "theta": self.theta.tolist(),
-            **({"between": [list(sides) for sides in self.between]} if self.limits else {}),
-        }
+        return super()._written() | ({"between": [list(sides) for sides in self.between]} if self.limits else {})
 
     @staticmethod
     def _read(fields: Dict[str, Any]) -> dict[str, Any]:
-        return {
-            "theta": np.array(fields["theta"], dtype=np.float64),
-            "scaling": VectorScaling.from_dict(fields["scaling"]),
-            "clamp": np.inf if fields["clamp"] is None else fields["clamp"],
-            "between": tuple(tuple(sides) for sides in fields.get("between", ())),
-        }
+        between = tuple(tuple(sides) for sides in fields.get("between", ()))
+        return NetworkModel._read(fields) | {"between": between}

@@ -5,66 +5,33 @@ is data. Where it becomes part of another language's text it goes through here, 
 neither end what it stands in nor begin anything of its own.
 """
 
-from sysid.names.fitting import distinct, shortened, told_apart
-from sysid.names.identifiers import (
-    C_WORDS,
-    LONGEST_FILE,
-    LONGEST_IDENTIFIER,
-    LONGEST_KEY,
-    WINDOWS_DEVICES,
-    c_identifier,
-    signal_name,
-    slug,
-    task_slug,
-    tracking_key,
-    xml_name,
-)
-from sysid.names.markup import (
-    c_comment,
-    c_string,
-    csv_cell,
-    from_csv_cell,
-    markdown,
-    markdown_block,
-    markdown_cell,
-    markdown_code,
-    markdown_inline,
-    tracking_text,
-    xml_attribute,
-)
-from sysid.names.shown import DIRECTION, UNKNOWN, visible
-from sysid.names.sides import output_side, read_sides, written_side
-
-__all__ = [
-    "C_WORDS",
-    "DIRECTION",
-    "LONGEST_FILE",
-    "LONGEST_IDENTIFIER",
-    "LONGEST_KEY",
-    "UNKNOWN",
-    "WINDOWS_DEVICES",
-    "c_comment",
-    "c_identifier",
-    "c_string",
-    "csv_cell",
-    "distinct",
-    "from_csv_cell",
-    "markdown",
-    "markdown_block",
-    "markdown_cell",
-    "markdown_code",
-    "markdown_inline",
-    "output_side",
-    "read_sides",
-    "shortened",
-    "signal_name",
-    "slug",
-    "task_slug",
-    "told_apart",
-    "tracking_key",
-    "tracking_text",
-    "visible",
-    "written_side",
-    "xml_attribute",
-    "xml_name",
-]
+from sysid.names.fitting import distinct as distinct
+from sysid.names.fitting import shortened as shortened
+from sysid.names.fitting import told_apart as told_apart
+from sysid.names.identifiers import C_WORDS as C_WORDS
+from sysid.names.identifiers import LONGEST_FILE as LONGEST_FILE
+from sysid.names.identifiers import LONGEST_IDENTIFIER as LONGEST_IDENTIFIER
+from sysid.names.identifiers import LONGEST_KEY as LONGEST_KEY
+from sysid.names.identifiers import WINDOWS_DEVICES as WINDOWS_DEVICES
+from sysid.names.identifiers import c_identifier as c_identifier
+from sysid.names.identifiers import signal_name as signal_name
+from sysid.names.identifiers import slug as slug
+from sysid.names.identifiers import task_slug as task_slug
+from sysid.names.identifiers import tracking_key as tracking_key
+from sysid.names.identifiers import xml_name as xml_name
+from sysid.names.markup import c_comment as c_comment
+from sysid.names.markup import c_string as c_string
+from sysid.names.markup import csv_cell as csv_cell
+from sysid.names.markup import from_csv_cell as from_csv_cell
+from sysid.names.markup import markdown as markdown
+from sysid.names.markup import markdown_block as markdown_block
+from sysid.names.markup import markdown_code as markdown_code
+from sysid.names.markup import markdown_inline as markdown_inline
+from sysid.names.markup import tracking_text as tracking_text
+from sysid.names.markup import xml_attribute as xml_attribute
+from sysid.names.shown import DIRECTION as DIRECTION
+from sysid.names.shown import UNKNOWN as UNKNOWN
+from sysid.names.shown import visible as visible
+from sysid.names.sides import output_side as output_side
+from sysid.names.sides import read_sides as read_sides
+from sysid.names.sides import written_side as written_side

@@ -66,7 +66,7 @@ def xml_attribute(text: object) -> str:
 
 
 def markdown(text: object) -> str:
-    r"""Text as it may stand in a paragraph of Markdown: no HTML, no link, no picture, no table.
+    r"""Text as it may stand in a paragraph or a cell of Markdown: no HTML, no link, no picture, no table.
 
     Args:
         text: Any text; an arrow of two characters becomes one.
@@ -75,8 +75,8 @@ def markdown(text: object) -> str:
         One line.
 
     Example:
-        >>> markdown("V->C <img src=x>"), markdown("[x](http://y)")
-        ('V→C &lt;img src=x>', '[x\\](http://y)')
+        >>> markdown("V->C <img src=x>"), markdown("[x](http://y)"), markdown("a|b")
+        ('V→C &lt;img src=x>', '[x\\](http://y)', 'a\\|b')
     """
     return markdown_inline(visible(text).strip().replace("->", "→"))
 
@@ -99,22 +99,6 @@ def markdown_inline(text: object) -> str:
 def _held(mark: str) -> str:
     """What would begin a heading, a quotation or a list, as itself."""
     return f"{mark[:-1]}\\{mark[-1]}" if mark[0].isdigit() else f"\\{mark}"
-
-
-def markdown_cell(text: object) -> str:
-    r"""Text as it may stand in a cell of a Markdown table; where nothing begins a line.
-
-    Args:
-        text: Any text.
-
-    Returns:
-        One line.
-
-    Example:
-        >>> markdown_cell("a|b"), markdown_cell("=1+1")
-        ('a\\|b', '=1+1')
-    """
-    return markdown_inline(visible(text).strip().replace("->", "→"))
 
 
 def markdown_code(text: object) -> str:

@@ -10,12 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
-import queue
 import shutil
-import signal
-import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -34,10 +29,9 @@ from sysid.errors import ConfigError
 from sysid.ingest import TraceCache, content_key, default_cache_folder
 from sysid.references.config import ReferenceConfig
 from sysid.references.kinds import FORMAT
+from sysid.references.processes import ReferenceProcess
 from sysid.traces import Channel, Trace
 
-STARTING_S = 120.0
-"""Seconds that loading a reference may take."""
 TOO_LONG = "it was not done after"
 FROM_OUTSIDE = ("by signal SIGTERM", "by signal SIGINT", "by signal SIGHUP")
 """How a run ends that a batch system, a container or a person has ended: that says nothing of the experiment."""
@@ -84,73 +78,6 @@ class Outcome:
     stored: bool = False
 
 
-class _Process:
-    """A worker and the lines between it and us."""
-
-    def __init__(self, config: ReferenceConfig) -> None:
-        self.answers: queue.Queue[str] = queue.Queue()
-        self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
-        # It is ended in the middle of what it does: what it unpacked and wrote is cleared away from here.
-        self.place = tempfile.TemporaryDirectory(prefix="sysid-worker-", ignore_cleanup_errors=True)
-        # Our own module, and nothing of a user's but the configuration that names what is run.
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "sysid.references.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=self.errors, text=True, encoding="utf-8", start_new_session=True, env=_environment(self.place.name),
-        )  # fmt: skip
-        threading.Thread(target=self._listen, daemon=True).start()
-        self.send(config.model_dump_json())
-        self.hello = self.receive(STARTING_S)
-
-    def _listen(self) -> None:
-        assert self.process.stdout is not None  # noqa: S101 - it is a pipe
-        for line in self.process.stdout:
-            self.answers.put(line)
-        self.answers.put("")
-
-    def send(self, line: str) -> None:
-        """Pass a line on; one that has ended is found out when it does not answer."""
-        assert self.process.stdin is not None  # noqa: S101 - it is a pipe
-        with contextlib.suppress(OSError):
-            self.process.stdin.write(line + "\n")
-            self.process.stdin.flush()
-
-    def receive(self, limit_s: float) -> dict[str, Any] | None:
-        """The answer; ``None`` if the process has ended. ``TimeoutError`` if none came in time."""
-        try:
-            line = self.answers.get(timeout=limit_s)
-        except queue.Empty:
-            raise TimeoutError from None
-        return dict(json.loads(line)) if line else None
-
-    def kill(self) -> None:
-        """Kill it and all that it started; who waits for its answer hears that it has ended."""
-        if hasattr(os, "killpg"):
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(self.process.pid, signal.SIGKILL)
-        else:
-            self.process.kill()
-
-    def end(self) -> str:
-        """End it and all that it started; gives how it ended, in words."""
-        code = self.process.poll()
-        self.kill()
-        code = self.process.wait() if code is None else code
-        self.errors.seek(0)
-        said = self.errors.read()[-2000:].decode(errors="replace").strip().splitlines()[-1:]
-        for one in (self.process.stdin, self.process.stdout, self.errors):
-            with contextlib.suppress(OSError):
-                one.close()  # type: ignore[union-attr]
-        self.place.cleanup()
-        how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        return how + (f": {said[0]}" if said else "")
-
-
-def _environment(place: str) -> dict[str, str]:
-    """One thread a run, for there are as many runs as processors; and a folder of its own for temporary files."""
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    return {**os.environ, **threads, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), place)}
-
-
 @dataclass(kw_only=True, eq=False)
 class ReferenceRuns:
     """Runs of one reference.
@@ -166,8 +93,8 @@ class ReferenceRuns:
     workers: int = 2
     folder: Path = field(default_factory=default_cache_folder)
     fresh: bool = False
-    _idle: list[_Process] = field(default_factory=list, repr=False)
-    _at_work: set[_Process] = field(default_factory=set, repr=False)
+    _idle: list[ReferenceProcess] = field(default_factory=list, repr=False)
+    _at_work: set[ReferenceProcess] = field(default_factory=set, repr=False)
     _stopped: threading.Event = field(default_factory=threading.Event, repr=False)
     _digest: str = field(default="", repr=False)
 
@@ -193,8 +120,8 @@ class ReferenceRuns:
             self._idle.append(self._start())
         return self._digest
 
-    def _start(self) -> _Process:
-        process = _Process(self.config)
+    def _start(self) -> ReferenceProcess:
+        process = ReferenceProcess(self.config)
         hello = process.hello
         if hello is None:
             how = process.end()
@@ -336,7 +263,7 @@ class ReferenceRuns:
         finally:
             self._at_work.discard(process)
 
-    def _answered(self, process: _Process, case: Case) -> Outcome:
+    def _answered(self, process: ReferenceProcess, case: Case) -> Outcome:
         began = time.perf_counter()
         with _exchange() as (given, made):
             np.save(given, case.inputs, allow_pickle=False)
@@ -361,7 +288,7 @@ class ReferenceRuns:
             wall_s=wall,
         )  # fmt: skip
 
-    def _worker(self) -> _Process:
+    def _worker(self) -> ReferenceProcess:
         """One that is idle, or a new one; between looking and taking another thread may have taken the last."""
         try:
             return self._idle.pop()

@@ -27,21 +27,5 @@ if TYPE_CHECKING:
     from sysid.reporting.signals import CaseSignals as CaseSignals
     from sysid.reporting.signals import read_signals as read_signals
 
-_WHERE = {
-    "sysid.reporting.benchmarks.page": ("publish_benchmarks",),
-    "sysid.reporting.comparing.against": ("compare_runs",),
-    "sysid.reporting.comparing.against_page": ("write_comparison",),
-    "sysid.reporting.figures.fit_figures": ("case_figure",),
-    "sysid.reporting.kinds": ("read_run", "results_json_schema"),
-    "sysid.reporting.pdf": ("write_pdf",),
-    "sysid.reporting.publication": ("publish_run",),
-    "sysid.reporting.published.tables": ("PublishedFigure", "PublishedTable", "published_names", "read_published"),
-    "sysid.reporting.report": ("write_report",),
-    "sysid.reporting.results": ("Results", "parse_results", "read_results", "write_results"),
-    "sysid.reporting.signals": ("CaseSignals", "read_signals"),
-}
-"""Where each name is defined: matplotlib takes longer to import than ``sysid --help`` may take to answer."""
-
-__all__ = [name for names in _WHERE.values() for name in names]
-
-__getattr__ = imported_when_asked(_WHERE)
+__getattr__, __all__ = imported_when_asked(__file__)
+"""Matplotlib takes longer to import than ``sysid --help`` may take to answer."""

@@ -9,13 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from sysid.names import output_side
-from sysid.reporting.advice_section import advice_section
-from sysid.reporting.amplitude import amplitude_section
-from sysid.reporting.beginnings import beginnings_section
-from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures import fit_figures as figures
 from sysid.reporting.fit_records import FitRecord, LearningCurve
-from sysid.reporting.fit_tables import (
+from sysid.reporting.growth import growth_section
+from sysid.reporting.judging.document import judgement_points, judgement_sections
+from sysid.reporting.numbers import quantity
+from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
+from sysid.reporting.published.tables import PublishedTable
+from sysid.reporting.results import Results
+from sysid.reporting.sections.advice import advice_section
+from sysid.reporting.sections.amplitude import amplitude_section
+from sysid.reporting.sections.beginnings import beginnings_section
+from sysid.reporting.sections.evidence import evidence_sections
+from sysid.reporting.sections.fit_tables import (
     accuracy_table,
     case_columns,
     data_table,
@@ -28,22 +34,16 @@ from sysid.reporting.fit_tables import (
     systems_table,
     told_of_drawn,
 )
-from sysid.reporting.growth import growth_section
-from sysid.reporting.judging.document import judgement_points, judgement_sections
-from sysid.reporting.numbers import quantity
-from sysid.reporting.orders_view import orders_section
-from sysid.reporting.overview import overview_section
-from sysid.reporting.parts import Document, Part, Picture, Section, identifier, picture
-from sysid.reporting.published.tables import PublishedTable
-from sysid.reporting.results import Results
-from sysid.reporting.runtime_table import exported_run_times
+from sysid.reporting.sections.orders import orders_section
+from sysid.reporting.sections.overview import overview_section
+from sysid.reporting.sections.runtime_table import exported_run_times
+from sysid.reporting.sections.state_table import state_section
+from sysid.reporting.sections.training import RELATIVE, error_unit, trained_models, training_parts, trust_sections
+from sysid.reporting.sections.verdict import verdict
+from sysid.reporting.sections.warnings_of_fits import warning_points, warnings_section
 from sysid.reporting.signals import CaseSignals, read_signals
-from sysid.reporting.state_table import state_section
 from sysid.reporting.sweep.section import sweep_points, sweep_sections
 from sysid.reporting.tables import DIVERGED, Cell, Table, figure_cell
-from sysid.reporting.training_view import RELATIVE, error_unit, trained_models, training_parts, trust_sections
-from sysid.reporting.verdict import verdict
-from sysid.reporting.warnings_of_fits import warning_points, warnings_section
 from sysid.reporting.worst_instants import Instant, worst_instants
 from sysid.units import squared
 

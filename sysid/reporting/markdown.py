@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sysid.errors import ConfigError
-from sysid.names import markdown, markdown_cell
+from sysid.names import markdown
 from sysid.reporting.parts import Gallery, Part, Picture, Section
 from sysid.reporting.tables import Cell, Table, facts
 
@@ -47,7 +47,7 @@ class Drawings:
             return []
         self.room -= len(text)
         (self.folder / f"{name}.svg").write_text(text + "\n", encoding="utf-8", newline="\n")
-        return [f"![{markdown_cell(part.caption)}]({name}.svg)", "", f"*{markdown(part.caption)}*", ""]
+        return [f"![{markdown(part.caption)}]({name}.svg)", "", f"*{markdown(part.caption)}*", ""]
 
 
 def section_lines(section: Section, drawings: Drawings) -> list[str]:
@@ -75,7 +75,7 @@ def table_lines(table: Table) -> list[str]:
     Returns:
         Lines of Markdown.
     """
-    head = [markdown_cell(" ".join(filter(None, (name, f"({below})" if below else "")))) for name, below in table.head]
+    head = [markdown(" ".join(filter(None, (name, f"({below})" if below else "")))) for name, below in table.head]
     rows = [[_cell(cell) for cell in row] for row in table.rows]
     lines = [markdown(table.caption), "", *rows_lines([head, ["---"] * len(head), *rows])]
     lines += ["", f"*{markdown(table.note)}*"] if table.note else []
@@ -151,5 +151,5 @@ def _name(part: Picture) -> str:
 
 
 def _cell(cell: Cell) -> str:
-    text = f"**{markdown_cell(cell.text)}**" if cell.mark == "best" and cell.text else markdown_cell(cell.text)
-    return f"{text}<br><sub>{markdown_cell(cell.below)}</sub>" if cell.below else text
+    text = f"**{markdown(cell.text)}**" if cell.mark == "best" and cell.text else markdown(cell.text)
+    return f"{text}<br><sub>{markdown(cell.below)}</sub>" if cell.below else text

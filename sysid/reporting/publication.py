@@ -8,8 +8,7 @@ from typing import Final
 
 from sysid.atomic import replacing_folder
 from sysid.errors import ConfigError
-from sysid.names import markdown, markdown_cell, markdown_code
-from sysid.reporting.fit_tables import worst_case
+from sysid.names import markdown, markdown_code
 from sysid.reporting.html import readable
 from sysid.reporting.kinds import read_run, run_document, run_scores
 from sysid.reporting.markdown import (
@@ -21,11 +20,12 @@ from sysid.reporting.markdown import (
     refuse_others,
     section_lines,
 )
-from sysid.reporting.overview import overview_cases
 from sysid.reporting.parts import Document
 from sysid.reporting.records import RunResults
 from sysid.reporting.results import Results
 from sysid.reporting.scores import write_scores
+from sysid.reporting.sections.fit_tables import worst_case
+from sysid.reporting.sections.overview import overview_cases
 
 LEFT_OUT: Final = ("fit-", "frequency-response", "residuals")
 """Beginnings of the anchors of sections that only the whole report has."""
@@ -138,7 +138,7 @@ def _provenance(document: Document, command: str) -> list[str]:
         **machine(results.environment),
         "data": f"{results.data.name}, SHA-256 {results.data.digest}" if results.data.digest else results.data.name,
     }
-    return facts_lines(commands | {key: markdown_cell(text) for key, text in rows.items()})
+    return facts_lines(commands | {key: markdown(text) for key, text in rows.items()})
 
 
 def _belongs(drawing: str, results: RunResults) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import Field
 
-from sysid.reporting.advice_record import AdviceRecord
+from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.records import (
     RESULTS_FILE,

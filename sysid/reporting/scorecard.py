@@ -16,7 +16,7 @@ from typing import Final
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError
-from sysid.names import markdown_cell
+from sysid.names import markdown
 from sysid.reporting.benchmarks.findings import FINDINGS_FILE, Finding, read_findings
 from sysid.reporting.kinds import read_run, run_scores
 from sysid.reporting.markdown import rows_lines
@@ -103,16 +103,16 @@ def _errors(ours: Sequence[Score], peers: Sequence[Score]) -> list[str]:
         unit = of_squares if scale == 1.0 else f"10⁻³ {of_squares}"
         rows.append(
             [
-                f"**{markdown_cell(score.mapping)}** [{unit}]: {markdown_cell(score.model)}",
+                f"**{markdown(score.mapping)}** [{unit}]: {markdown(score.model)}",
                 *_cells(score.mse, cases, scale),
             ]
         )
         if score.published:
-            rows.append([f"published ({markdown_cell(score.source)})", *_cells(score.published, cases, scale)])
+            rows.append([f"published ({markdown(score.source)})", *_cells(score.published, cases, scale)])
         rivals = [peer for peer in peers if (peer.mapping, peer.unit) == (score.mapping, score.unit)]
         if rivals:
             best = min(rivals, key=Score.typical)
-            rows.append([f"best of {len(rivals)} peers: {markdown_cell(best.model)}", *_cells(best.mse, cases, scale)])
+            rows.append([f"best of {len(rivals)} peers: {markdown(best.model)}", *_cells(best.mse, cases, scale)])
     return rows_lines(rows)
 
 
@@ -138,7 +138,7 @@ def _benchmarks(findings: Sequence[Finding]) -> list[str]:
     if not kept:
         return []
     rows = [["benchmark (sources in its report)", "ours", "published", "peer"], ["---"] * 4]
-    rows += [[markdown_cell(one.what), one.ours_text, *map(_brief, (one.published, one.peer))] for one in kept.values()]
+    rows += [[markdown(one.what), one.ours_text, *map(_brief, (one.published, one.peer))] for one in kept.values()]
     return rows_lines(rows)
 
 
@@ -149,7 +149,7 @@ def _rank(one: Finding) -> tuple[bool, float]:
 
 
 def _brief(text: str) -> str:
-    return markdown_cell(_SOURCE.sub("", text))
+    return markdown(_SOURCE.sub("", text))
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -110,12 +110,8 @@ class TraceSet:
         for trace in self.traces:
             if trace.name == name:
                 return trace
-        raise TraceError(
-            f"no trace named {name}",
-            where=f"data set {self.name}",
-            expected=f"one of {', '.join(self.names)}",
-            got=name,
-            remedy=did_you_mean(name, self.names, "correct the name of the case"),
+        raise TraceError.unknown(
+            f"no trace named {name}", name, self.names, "correct the name of the case", where=f"data set {self.name}"
         )
 
     @property

@@ -5,68 +5,30 @@ from typing import TYPE_CHECKING
 from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
-    from sysid.estimation.stability.excursions import Excursions
-    from sysid.estimation.stability.free_run import Stability, check_stability
-    from sysid.estimation.stability.sequences import AbstractSequences, InputSequence, TraceSequences
-    from sysid.validation.cascade_evaluation import CascadeEvaluation, evaluate_cascade
-    from sysid.validation.evaluation import (
-        CaseResult,
-        Evaluation,
-        case_results,
-        evaluate,
-        evaluate_case,
-        evaluate_outputs,
-    )
-    from sysid.validation.intervals import CaseIntervals, Coverage, OutputInterval, predict_interval
-    from sysid.validation.linearity import Linearity, judge_linearity
-    from sysid.validation.metrics import Figures, figures
-    from sysid.validation.residuals import ResidualAnalysis, analyse_residuals
+    from sysid.estimation.stability.excursions import Excursions as Excursions
+    from sysid.estimation.stability.free_run import Stability as Stability
+    from sysid.estimation.stability.free_run import check_stability as check_stability
+    from sysid.estimation.stability.sequences import AbstractSequences as AbstractSequences
+    from sysid.estimation.stability.sequences import InputSequence as InputSequence
+    from sysid.estimation.stability.sequences import TraceSequences as TraceSequences
+    from sysid.validation.cascade_evaluation import CascadeEvaluation as CascadeEvaluation
+    from sysid.validation.cascade_evaluation import evaluate_cascade as evaluate_cascade
+    from sysid.validation.evaluation import CaseResult as CaseResult
+    from sysid.validation.evaluation import Evaluation as Evaluation
+    from sysid.validation.evaluation import case_results as case_results
+    from sysid.validation.evaluation import evaluate as evaluate
+    from sysid.validation.evaluation import evaluate_case as evaluate_case
+    from sysid.validation.evaluation import evaluate_outputs as evaluate_outputs
+    from sysid.validation.intervals import CaseIntervals as CaseIntervals
+    from sysid.validation.intervals import Coverage as Coverage
+    from sysid.validation.intervals import OutputInterval as OutputInterval
+    from sysid.validation.intervals import predict_interval as predict_interval
+    from sysid.validation.linearity import Linearity as Linearity
+    from sysid.validation.linearity import judge_linearity as judge_linearity
+    from sysid.validation.metrics import Figures as Figures
+    from sysid.validation.metrics import figures as figures
+    from sysid.validation.residuals import ResidualAnalysis as ResidualAnalysis
+    from sysid.validation.residuals import analyse_residuals as analyse_residuals
 
-__all__ = [
-    "AbstractSequences",
-    "CascadeEvaluation",
-    "CaseIntervals",
-    "CaseResult",
-    "Coverage",
-    "Evaluation",
-    "Excursions",
-    "Figures",
-    "InputSequence",
-    "Linearity",
-    "OutputInterval",
-    "ResidualAnalysis",
-    "Stability",
-    "TraceSequences",
-    "analyse_residuals",
-    "case_results",
-    "check_stability",
-    "evaluate",
-    "evaluate_cascade",
-    "evaluate_case",
-    "evaluate_outputs",
-    "figures",
-    "judge_linearity",
-    "predict_interval",
-]
-
-_WHERE = {
-    "sysid.estimation.stability.excursions": ("Excursions",),
-    "sysid.estimation.stability.free_run": ("Stability", "check_stability"),
-    "sysid.estimation.stability.sequences": ("AbstractSequences", "InputSequence", "TraceSequences"),
-    "sysid.validation.evaluation": (
-        "CaseResult",
-        "Evaluation",
-        "case_results",
-        "evaluate",
-        "evaluate_case",
-        "evaluate_outputs",
-    ),
-    "sysid.validation.cascade_evaluation": ("CascadeEvaluation", "evaluate_cascade"),
-    "sysid.validation.intervals": ("CaseIntervals", "Coverage", "OutputInterval", "predict_interval"),
-    "sysid.validation.linearity": ("Linearity", "judge_linearity"),
-    "sysid.validation.metrics": ("Figures", "figures"),
-    "sysid.validation.residuals": ("ResidualAnalysis", "analyse_residuals"),
-}
-"""Where each name is defined: the figures of a run are had without what fits models."""
-
-__getattr__ = imported_when_asked(_WHERE)
+__getattr__, __all__ = imported_when_asked(__file__)
+"""The figures of a run are had without what fits models."""

@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
 from sysid.export.simulation import simulate_bundle
 from sysid.ingest import DatasetDescription, Progress, load_described
@@ -48,13 +48,7 @@ def drawn(like: DatasetDescription, case: str | None, seeds: Sequence[int], *, w
     """
     name = next(iter(like.cases)) if case is None else case
     if name not in like.cases:
-        raise ConfigError(
-            "there is no such case",
-            where=where,
-            expected=f"one of {', '.join(like.cases)}",
-            got=name,
-            remedy=did_you_mean(name, like.cases, "name one of these"),
-        )
+        raise ConfigError.unknown("there is no such case", name, like.cases, "name one of these", where=where)
     recipe = like.cases[name].recipe or {}
     if (count := _count_seeds(recipe)) != 1:
         raise ConfigError(
@@ -89,12 +83,8 @@ def errors_of(
     """
     outputs = [str(entry["name"]) for entry in bundle.outputs]
     if output not in outputs:
-        raise ConfigError(
-            "the bundle has no such output",
-            where="option --output",
-            expected=f"one of {', '.join(outputs)}",
-            got=output,
-            remedy=did_you_mean(output, outputs, "name one of these"),
+        raise ConfigError.unknown(
+            "the bundle has no such output", output, outputs, "name one of these", where="option --output"
         )
     names, found = list(sequences.cases), []
     for first in range(0, len(names), AT_ONCE):

@@ -10,7 +10,7 @@ import numpy as np
 import onnx
 from onnx import helper, numpy_helper
 
-from sysid.export.onnx_nodes import IR_VERSION, OPSET
+from sysid.export.onnx.nodes import IR_VERSION, OPSET
 
 SAMPLES = 2000
 REAL, WHOLE = onnx.TensorProto.DOUBLE, onnx.TensorProto.INT64

@@ -45,8 +45,8 @@ from sysid.models.innovations import Innovations
 from sysid.models.linear_state_space import polynomials
 from sysid.models.polynomial_orders import AbstractPolynomial
 from sysid.models.ratio import Ratio
-from sysid.reporting.linear_view import LinearView, linear_views
-from sysid.reporting.step_responses import band
+from sysid.reporting.linear.step_responses import band
+from sysid.reporting.linear_views import LinearView, linear_views
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.estimation.networks.together.provider import CascadeProvider
 from sysid.models import Cascade, Ends
 from sysid.reporting.numbers import number
 from sysid.traces import Channel, Trace

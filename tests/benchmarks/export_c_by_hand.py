@@ -22,7 +22,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from sysid.export import EXPORTERS, Surrogate, read_bundle
-from sysid.export.stage import Stage
+from sysid.export.forms.stage import Stage
 from tests.benchmarks._findings import found
 from tests.benchmarks.export import TIMING
 from tests.benchmarks.export_cascades import CASCADES, feeds

@@ -24,7 +24,7 @@ import torch
 
 from sysid.export import Surrogate, jax_run
 from sysid.export.casadi_exporter import step_function
-from sysid.export.torch_module import SurrogateSequence
+from sysid.export.torch.module import SurrogateSequence
 from sysid.models import NARX
 from tests.benchmarks._findings import found
 from tests.benchmarks.export import RANGES, build, excitation, median

@@ -18,7 +18,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from sysid.estimation.linear.state_space.fit import fit_state_space
-from sysid.estimation.networks.neural_state_space import fit_neural_state_space
+from sysid.estimation.networks.neural.state_space import fit_neural_state_space
 from sysid.estimation.networks.training import Training
 from sysid.models import LinearStateSpace, NeuralStateSpace, Start
 from sysid.traces import Role

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation import CascadeFit, JointTraining, Training, fit_cascade, fit_narx
-from sysid.estimation.networks.joint_provider import CascadeProvider
+from sysid.estimation.networks.together.provider import CascadeProvider
 from sysid.models import NARX, Cascade, Mapping
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found

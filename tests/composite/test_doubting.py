@@ -5,15 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sysid.composite import (
-    Doubt,
-    Perturbation,
-    committee,
-    doubt_figures,
-    doubt_threshold,
-    doubting,
-    perturbed,
-)
+from sysid.composite import Doubt, Perturbation, committee, doubt_figures, doubt_threshold, doubting, perturbed
 from sysid.errors import ConfigError
 from tests.composite.test_committee import WHOLES, measured
 from tests.composite.test_perturbed import record, valve

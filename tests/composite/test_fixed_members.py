@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from sysid.composite.fixed_equations import fixed_by_equations
-from sysid.composite.fixed_member import FixedMember
+from sysid.composite.fixed.equations import fixed_by_equations
+from sysid.composite.fixed.member import FixedMember
 from sysid.composite.fixed_members import fixed_model, with_fixed
 from sysid.errors import ConfigError
 from sysid.models import Mapping

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sysid.composite.doubt.monte_carlo import run_monte_carlo
 from sysid.composite.members import assembled
-from sysid.composite.monte_carlo import run_monte_carlo
 from sysid.traces import Channel, Trace
 from tests.composite.composites import models, pipe, trace
 

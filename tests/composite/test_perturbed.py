@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sysid.composite import (
-    committee,
-    doubt_figures,
-    doubt_threshold,
-    fixed_by_equations,
-    fixed_model,
-    perturbed,
-)
+from sysid.composite import committee, doubt_figures, doubt_threshold, fixed_by_equations, fixed_model, perturbed
 from sysid.errors import ChannelError, ConfigError
 from sysid.export import Flag, Surrogate, expected_flags
 from sysid.models import Cascade, Limit

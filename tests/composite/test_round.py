@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from sysid.composite import round as joint_round
 from sysid.composite.composite import Composite
 from sysid.composite.plan import RoundPlan
-from sysid.composite.round import JointRound, train_round
+from sysid.composite.rounds import round as joint_round
+from sysid.composite.rounds.round import JointRound, train_round
 from sysid.estimation import JointTraining, fit_cascade
 from sysid.models import Cascade
 from sysid.traces import Channel, Trace

@@ -12,8 +12,8 @@ from sysid.composite.composite import Composite
 from sysid.composite.fixed_members import fixed_model, with_fixed
 from sysid.composite.members import assembled
 from sysid.composite.plan import RoundPlan
-from sysid.composite.round import JointRound
-from sysid.composite.shared_weights import SharedWeights
+from sysid.composite.rounds.round import JointRound
+from sysid.composite.rounds.shared_weights import SharedWeights
 from sysid.composite.stages import reading_more
 from sysid.errors import ConfigError
 from sysid.estimation import JointTraining

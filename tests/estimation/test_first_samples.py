@@ -14,7 +14,7 @@ from sysid.estimation.first_samples import is_another, moves_of_shown, other_not
 from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.grey_box.preparing import provider_for
 from sysid.estimation.grey_box.record import Record
-from sysid.estimation.networks.neural_provider import NeuralProvider
+from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.models import GreyBox, GreyBoxModel, Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start, StartKind
 from sysid.traces import Channel, Trace
 

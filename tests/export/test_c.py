@@ -11,9 +11,9 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.export import EXPORTERS, Surrogate
-from sysid.export.compiler import CompilerError, build_library
-from sysid.export.incremental_form import IncrementalForm
-from sysid.export.lagged_form import LaggedForm
+from sysid.export.c.compiler import CompilerError, build_library
+from sysid.export.forms.incremental import IncrementalForm
+from sysid.export.forms.lagged import LaggedForm
 from sysid.models import NARX
 from tests.export.grey_boxes import GREY_BOXES
 

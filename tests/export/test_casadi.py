@@ -12,7 +12,7 @@ import torch
 
 from sysid.export import Surrogate
 from sysid.export.casadi_exporter import CasadiExporter, step_function
-from sysid.export.torch_module import SurrogateSequence
+from sysid.export.torch.module import SurrogateSequence
 from sysid.models import NARX
 
 SAMPLES = 2000

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sysid.export import EXPORTERS, Surrogate, expected_flags
-from sysid.export.compiler import WARNINGS, compiler
+from sysid.export.c.compiler import WARNINGS, compiler
 
 PROGRAM = """#define {P}_IMPLEMENTATION
 #include "{p}.hpp"

@@ -16,9 +16,9 @@ from fmpy.validation import validate_fmu
 
 from sysid.errors import ConfigError
 from sysid.export import EXPORTERS, Flag, Surrogate, expected_flags
-from sysid.export.fmi_units import unit_definitions
-from sysid.export.fmu import HEADERS, fmu_variables
-from sysid.export.fmu_platforms import own_platform
+from sysid.export.fmi.fmu import HEADERS, fmu_variables
+from sysid.export.fmi.platforms import own_platform
+from sysid.export.fmi.units import unit_definitions
 
 VERSIONS = {"fmi2": FMU2Slave, "fmi3": FMU3Slave}
 

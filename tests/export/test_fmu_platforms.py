@@ -9,7 +9,7 @@ import zipfile
 import pytest
 
 from sysid.export import EXPORTERS
-from sysid.export.fmu_platforms import CPU, ONLY_OWN, PLATFORMS, left_out, own_platform, universal, wanted_platforms
+from sysid.export.fmi.platforms import CPU, ONLY_OWN, PLATFORMS, left_out, own_platform, universal, wanted_platforms
 from sysid.extras import has
 
 ELF, PE, MACH, FAT = b"\x7fELF", b"MZ", struct.pack("<I", 0xFEEDFACF), struct.pack(">I", 0xCAFEBABE)
@@ -49,14 +49,14 @@ def version(request):
 
 
 def test_without_the_compiler_for_others_there_is_the_own_one_and_the_rest_is_told(monkeypatch, version):
-    monkeypatch.setattr("sysid.export.fmu_platforms.has", lambda _: False)
+    monkeypatch.setattr("sysid.export.fmi.platforms.has", lambda _: False)
     assert wanted_platforms(version) == (own_platform(version),)
     folders = {one.folder(version) for one in PLATFORMS} - {""}
     assert set(left_out(version)) == folders - {own_platform(version).folder(version)}
 
 
 def test_with_it_nothing_is_left_out_unless_that_is_asked_for(monkeypatch, version):
-    monkeypatch.setattr("sysid.export.fmu_platforms.has", lambda _: True)
+    monkeypatch.setattr("sysid.export.fmi.platforms.has", lambda _: True)
     monkeypatch.delenv(ONLY_OWN, raising=False)
     assert left_out(version) == []
     assert len(wanted_platforms(version)) == (5 if version == 3 else 4)

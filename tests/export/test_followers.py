@@ -9,7 +9,7 @@ import pytest
 
 from sysid.composite import committee
 from sysid.export import EXPORTERS, Surrogate
-from sysid.export.c_exporter import _library
+from sysid.export.c.exporter import _library
 from sysid.export.measured_run import check_able, run_measured
 from sysid.models import NARX, Start, StartKind
 from tests.export.cascades import build_committee, wired_narx

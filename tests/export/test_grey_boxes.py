@@ -17,9 +17,9 @@ from sysid.equations import ROSENBROCK, RUNGE_KUTTA
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
 from sysid.export import EXPORTERS, Surrogate, expected_flags, export_bundle, read_bundle
-from sysid.export.compiler import build_library
-from sysid.export.layout import layout_of
-from sysid.export.operations import OPERATIONS
+from sysid.export.c.compiler import build_library
+from sysid.export.forms.layout import layout_of
+from sysid.export.forms.operations import OPERATIONS
 from sysid.export.parity import largest_difference
 from sysid.kernels import register_machine as machine
 from sysid.models import NARX, Cascade, Limit, Mapping

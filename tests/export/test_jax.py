@@ -13,7 +13,7 @@ import torch
 from sysid.errors import ConfigError
 from sysid.export import Surrogate, jax_run, jax_step
 from sysid.export.jax_exporter import JaxExporter
-from sysid.export.torch_module import SurrogateSequence
+from sysid.export.torch.module import SurrogateSequence
 from sysid.models import NARX
 
 SAMPLES = 2000

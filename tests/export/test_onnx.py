@@ -11,8 +11,8 @@ import onnx
 import pytest
 
 from sysid.export import Kind, Surrogate, expected_flags
-from sysid.export.onnx_core import PRODUCT
-from sysid.export.onnx_exporter import OnnxExporter
+from sysid.export.onnx.core import PRODUCT
+from sysid.export.onnx.exporter import OnnxExporter
 from sysid.models import ARX, NARX, ARXModel, Cascade, Limit, Mapping, VectorNARX
 from tests.export.cascades import wired_narx, wired_vector
 

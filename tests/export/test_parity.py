@@ -13,9 +13,9 @@ from scipy import signal
 import sysid
 from sysid.errors import ParityError
 from sysid.export import EXPORTERS, Surrogate, check_parity, parity_cases, random_cases
+from sysid.export.forms.stage import Port
 from sysid.export.parity import SHARES, Allowed, ParityCase, largest_difference
 from sysid.export.stability import UnboundedRunWarning, state_unbounded
-from sysid.export.stage import Port
 from sysid.models import ARX, NARX, ARXModel, Mapping, Start, StartKind
 from tests.export.conftest import ROWS, usable
 

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from sysid.export import EXPORTERS, StateLayout
-from sysid.export.torch_module import SurrogateSequence
+from sysid.export.torch.module import SurrogateSequence
 from sysid.models import NARX
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.export import Surrogate
-from sysid.export.wide_form import WideForm
+from sysid.export.wide.whole import WideForm
 from sysid.models import NARX, Cascade
 from tests.export.cascades import CASCADES, build_circle, build_limited, wired_narx
 

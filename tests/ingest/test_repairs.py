@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from sysid.errors import ConfigError, TraceError, UserError
 from sysid.ingest import RepairOptions
 from sysid.ingest.memory_table import table_of
-from sysid.ingest.repairs import Record, drifts, repeated_values
+from sysid.ingest.record import Record
+from sysid.ingest.repairs import drifts, repeated_values
 from tests.ingest.one_channel import EVEN, NAN, Done, N, Refused, check_done, check_refused, make, ramp
 
 GAP = EVEN[:5] + EVEN[8:]

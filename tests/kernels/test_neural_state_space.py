@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.networks.neural_provider import NeuralProvider
+from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.program_provider import BLOCK
 from sysid.kernels.neurons import NEURONS
 from sysid.models import History, NeuralForm, NeuralStateSpace, Scaling, VectorNeuralStateSpace, VectorScaling

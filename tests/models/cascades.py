@@ -10,17 +10,21 @@ from sysid.models import (
     NARX,
     ARXModel,
     Cascade,
+    Domain,
     GreyBox,
     GreyBoxModel,
     Limit,
     Mapping,
     NARXModel,
     Scaling,
+    TransferFunction,
+    TransferFunctionModel,
     VectorNARX,
     VectorNARXModel,
     VectorScaling,
     parameter_count,
 )
+from sysid.models.orthonormal_basis import basis_of, numerators
 
 RESTS = {"BP": 90.0, "AR": 90.0, "ER": 90.0, "BC": 0.0, "x": 0.0, "y": 0.0}
 
@@ -221,3 +225,21 @@ def command(n: int = 120, inputs: int = 1, seed: int = 0) -> np.ndarray:
     rng = np.random.default_rng(seed)
     steps = np.repeat(rng.uniform(64.0, 90.0, (n // 20 + 1, inputs)), 20, axis=0)[:n]
     return np.ascontiguousarray(steps)
+
+
+def lag(text: str) -> TransferFunctionModel:
+    """A first-order lag of gain 1 as a transfer function: a model with a state of its own."""
+    section = (np.array([1.0, -0.8]),)
+    table = numerators(basis_of(section, 0, Domain.DISCRETE))[:, :1]
+    return TransferFunctionModel(
+        orders=TransferFunction(poles=(1,), zeros=(0,), delays=(0,)),
+        sections=(section,),
+        taps=(np.linalg.solve(table.T, np.array([0.2])),),
+        constant=0.0,
+        scaling=Scaling.identity(1),
+        mapping=Mapping.parse(text),
+        sample_time=0.1,
+        input_units=("psi",),
+        output_unit="psi",
+        rest_output=90.0,
+    )

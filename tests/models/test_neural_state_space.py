@@ -56,6 +56,13 @@ def test_a_stored_model_is_the_same_model(network):
     assert structure_from_dict(network.to_dict()) == network
 
 
+def test_other_weights_are_as_many_as_there_are():
+    model, other = (a_model(NeuralStateSpace(states=2, neurons=3), seed) for seed in (0, 1))
+    np.testing.assert_array_equal(model.with_theta(other.theta).simulate(signals()), other.simulate(signals()))
+    with pytest.raises(ConfigError, match="parameters"):
+        model.with_theta(other.theta[:-1])
+
+
 @pytest.mark.parametrize(
     ("fields", "match"),
     [

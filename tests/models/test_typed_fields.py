@@ -12,7 +12,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation.estimators import ESTIMATORS
-from sysid.estimation.networks.joint_options import JointTraining
+from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.stability.check import StabilityOptions
 from sysid.models import NARX, HammersteinWiener, VectorNARX
 from sysid.models.curves import Curve

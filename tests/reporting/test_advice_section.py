@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import sysid
-from sysid.reporting.advice_record import AdviceRecord
-from sysid.reporting.advice_section import advice_section
+from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.parts import Picture
+from sysid.reporting.sections.advice import advice_section
 from sysid.reporting.tables import Table
 from sysid.workbench.runner.store import strict
 

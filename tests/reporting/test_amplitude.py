@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sysid.reporting.amplitude import amplitude_figure, bands
+from sysid.reporting.sections.amplitude import amplitude_figure, bands
 from sysid.reporting.signals import CaseSignals
 
 

@@ -17,11 +17,12 @@ from sysid.models import ARX, Mapping
 from sysid.models.curve_values import CurvePoints
 from sysid.reporting import read_results, write_report
 from sysid.reporting.curves import read_curves
-from sysid.reporting.evidence import evidence_sections
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
+from sysid.reporting.linear.computing import bode_of, step_of
 from sysid.reporting.parts import Picture
 from sysid.reporting.residuals import read_residuals
+from sysid.reporting.sections.evidence import evidence_sections
 from sysid.reporting.tables import Table
 from sysid.traces import Trace
 from sysid.validation import analyse_residuals
@@ -166,14 +167,14 @@ def test_the_residual_picture_marks_what_lies_outside_its_bounds(run: Path) -> N
 def test_pictures_of_an_arx_model_are_those_of_its_transfer_function() -> None:
     fit, _ = arx()
     system = fit.model.to_control()
-    bode = bode_figure(fit.model, fit.uncertainty, points=50)
+    bode = bode_figure(bode_of([(fit.model, fit.uncertainty)], points=50))
     for j in range(2):
         frequency, gain = bode.axes[j].lines[0].get_data()
         expected = np.abs(system[0, j](np.exp(1j * np.asarray(frequency) * fit.model.sample_time)))
         np.testing.assert_allclose(gain, expected, rtol=1e-9)
     poles = pole_zero_figure(fit.model, fit.uncertainty).axes[0].lines[1].get_xdata()
     np.testing.assert_allclose(np.sort(poles), np.sort(fit.model.poles.real))
-    step = step_figure(fit.model, fit.uncertainty, samples=100).axes[0]
+    step = step_figure(step_of([(fit.model, fit.uncertainty)], samples=100)).axes[0]
     band = step.collections[0].get_paths()[0].vertices[:, 1]
     final = step.lines[0].get_ydata()[-1]
     assert final == pytest.approx(system[0, 0](1.0).real, rel=1e-3)

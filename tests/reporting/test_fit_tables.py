@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid.reporting.fit_tables import drawn_cases, told_of_drawn, worst_case
+from sysid.reporting.sections.fit_tables import drawn_cases, told_of_drawn, worst_case
 from sysid.traces import Role
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sysid.reporting.fit_records import ExportRecord, FitRecord, RunTimeRecord
 from sysid.reporting.results import Results
-from sysid.reporting.runtime_table import exported_run_times
+from sysid.reporting.sections.runtime_table import exported_run_times
 
 
 def results(run_times):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sysid.reporting.results import read_results
-from sysid.reporting.training_view import (
+from sysid.reporting.sections.training import (
     attempts_figure,
     attempts_table,
     coverage_table,

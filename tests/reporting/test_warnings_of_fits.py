@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from sysid.reporting import read_results
+from sysid.reporting.sections.warnings_of_fits import warning_points, warnings_section
 from sysid.reporting.tables import Table
-from sysid.reporting.warnings_of_fits import warning_points, warnings_section
 
 PAIR = ("ARX", "NARX free run")
 

@@ -23,7 +23,7 @@ from sysid.estimation.blocks.sections import (
     sections_of,
 )
 from sysid.estimation.clock import now
-from sysid.estimation.networks.neural_state_space import fit_neural_state_space
+from sysid.estimation.networks.neural.state_space import fit_neural_state_space
 from sysid.estimation.networks.training import Training
 from sysid.models import Mapping, NeuralStateSpace, NeuralStateSpaceModel, Scaling, Start
 from sysid.traces import Trace

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.estimation.experiment import experiments_of
 from sysid.estimation.grey_box.finishing import noise_of
 from sysid.estimation.grey_box.layout import EquationLayout
@@ -60,10 +60,8 @@ def profile_again(fit: FitResult, traces: Sequence[Trace], start: Start, name: s
         raise ConfigError("not a probability", where="level", expected="between 0 and 1", got=level)
     named = {one.name: one for one in named_of(model.grey, model.cases, model.lowered.n_weights)}
     if name not in named:
-        raise ConfigError(
-            f"no parameter {name} was estimated", where="profile", expected=f"one of {', '.join(named)}", got=name,
-            remedy=did_you_mean(name, named, "name one of these"),
-        )  # fmt: skip
+        what = f"no parameter {name} was estimated"
+        raise ConfigError.unknown(what, name, named, "name one of these", where="profile")
     provider, solution = _again(model, fit, traces, start)
     return Profiler(provider=provider, solution=solution, level=level).of(named[name])
 

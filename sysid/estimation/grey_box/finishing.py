@@ -17,7 +17,7 @@ from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, at_minimum
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.named import Named, named_of
-from sysid.estimation.networks import multistart as starts
+from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.training import Training
 from sysid.estimation.result import Status
 from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel

@@ -34,10 +34,10 @@ from sysid.estimation.grey_box.shot import (
 from sysid.estimation.grey_box.telling import told
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.networks import multistart as starts
-from sysid.estimation.networks.choosing import Choice, choose
-from sysid.estimation.networks.multistart_result import left_on, multistart_result, multistart_status
-from sysid.estimation.networks.race import run_race
+from sysid.estimation.networks.starts import multistart as starts
+from sysid.estimation.networks.starts.choosing import Choice, choose
+from sysid.estimation.networks.starts.race import run_race
+from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.result import FitResult

@@ -19,7 +19,8 @@ from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.named import FLAT_ALPHA, Named
-from sysid.estimation.networks.multistart import PRETRAINED, Candidate, Multistart
+from sysid.estimation.networks.starts.advancing import PRETRAINED
+from sysid.estimation.networks.starts.multistart import Candidate, Multistart
 from sysid.estimation.networks.training import Training
 from sysid.estimation.result import FitResult
 from sysid.models.built_model import BuiltModel
@@ -87,7 +88,7 @@ def shooting_terms(way: str, provider: EquationProvider) -> dict[str, Any]:
         provider: The residuals.
 
     Returns:
-        Fields of :class:`~sysid.estimation.networks.multistart.Multistart`.
+        Fields of :class:`~sysid.estimation.networks.starts.multistart.Multistart`.
     """
     if way == SINGLE:
         return {}

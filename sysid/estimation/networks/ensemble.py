@@ -44,8 +44,9 @@ from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Solution
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.threads import one_blas_thread
-from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.initialise import Layout
+from sysid.estimation.networks.starts import multistart as starts
+from sysid.estimation.networks.starts.advancing import first_prior, judged
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.models import NARXModel
 from sysid.traces import Trace
@@ -153,7 +154,7 @@ def selected(
     found = elect(
         models,
         [c.score for c in usable],
-        lambda model: starts.judged(multistart, model)[0],
+        lambda model: judged(multistart, model)[0],
         unite=united,
         picks=training.ensemble,
         origins=[c.number for c in usable],
@@ -185,7 +186,7 @@ def as_candidate(
         np.asarray(np.linalg.solve(task.to_plain, plain), dtype=np.float64)
         for plain in (ensemble.model.theta, task.layout.centre())
     )
-    prior, evidence = starts.first_prior(multistart.training, task.layout, task.provider, theta, centre), None
+    prior, evidence = first_prior(multistart.training, task.layout, task.provider, theta, centre), None
     with one_blas_thread():
         at = task.provider.linearise(theta)
         for _ in range(EVIDENCE_ROUNDS if multistart.training.regularisation is None else 0):

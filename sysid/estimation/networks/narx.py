@@ -17,16 +17,16 @@ from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks import ensemble
-from sysid.estimation.networks import multistart as starts
 from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
-from sysid.estimation.networks.choosing import Choice, choose
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
-from sysid.estimation.networks.multistart_result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.posterior import calibrate, laplace
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import RecursionProvider
-from sysid.estimation.networks.race import run_race
+from sysid.estimation.networks.starts import multistart as starts
+from sysid.estimation.networks.starts.choosing import Choice, choose
+from sysid.estimation.networks.starts.race import run_race
+from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import check_initial, grown
 from sysid.estimation.networks.windows import Windows, in_place, with_note

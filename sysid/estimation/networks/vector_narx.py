@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.experiment import Experiment
-from sysid.estimation.networks.cascade_fit import CascadeFit
-from sysid.estimation.networks.joint import Joint
-from sysid.estimation.networks.joint_layout import JointLayout
-from sysid.estimation.networks.joint_options import JointTraining
-from sysid.estimation.networks.member_layout import MemberLayout
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
+from sysid.estimation.networks.together.fit import Joint
+from sysid.estimation.networks.together.layout import JointLayout
+from sysid.estimation.networks.together.member_layout import MemberLayout
+from sysid.estimation.networks.together.options import JointTraining
+from sysid.estimation.networks.together.result import CascadeFit
 from sysid.estimation.networks.training import FitProgress
 from sysid.estimation.output_ends import ends_of_several, told
 from sysid.estimation.result import FitResult, Loop

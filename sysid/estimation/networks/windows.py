@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.provider import AbstractProvider
-from sysid.estimation.networks.choosing import Choice
-from sysid.estimation.networks.multistart import Candidate, Multistart, advanced
+from sysid.estimation.networks.starts.advancing import advanced
+from sysid.estimation.networks.starts.choosing import Choice
+from sysid.estimation.networks.starts.multistart import Candidate, Multistart
 from sysid.estimation.networks.training import Training
 from sysid.estimation.result import FitResult
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import ReaderError, did_you_mean
+from sysid.errors import ReaderError
 from sysid.extras import need
 from sysid.ingest.columns import RawColumn
 from sysid.ingest.options import FileOptions, RepairOptions
@@ -38,12 +38,8 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     sheets = _sheets(path, engine)
     names = [sheet.name for sheet in sheets]
     if options.sheet is not None and options.sheet not in names:
-        raise ReaderError(
-            f"there is no sheet {options.sheet}",
-            where=path,
-            expected=f"one of {', '.join(names)}",
-            got=options.sheet,
-            remedy=did_you_mean(options.sheet, names, "correct sheet"),
+        raise ReaderError.unknown(
+            f"there is no sheet {options.sheet}", options.sheet, names, "correct sheet", where=path
         )
     tables: dict[str, RawTable] = {}
     problem: ReaderError | None = None

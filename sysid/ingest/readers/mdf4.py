@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.errors import ReaderError, did_you_mean
+from sysid.errors import ReaderError
 from sysid.extras import need
 from sysid.ingest.joining import Signal
 from sysid.ingest.options import FileOptions, RepairOptions
@@ -106,12 +106,8 @@ def _choose(groups: dict[str, list[Signal]], wanted: str | None, path: Path) -> 
     if wanted is not None:
         if wanted in groups:
             return groups[wanted]
-        raise ReaderError(
-            f"there is no channel group {wanted}",
-            where=path,
-            expected=f"one of {', '.join(groups)}",
-            got=wanted,
-            remedy=did_you_mean(wanted, groups, "correct group, or leave it out"),
+        raise ReaderError.unknown(
+            f"there is no channel group {wanted}", wanted, groups, "correct group, or leave it out", where=path
         )
     signals = [signal for group in groups.values() for signal in group]
     if not signals:

@@ -11,7 +11,7 @@ from pathlib import Path
 from threading import Lock
 
 from sysid.content import nearest_file
-from sysid.errors import ConfigError, ReaderError, did_you_mean
+from sysid.errors import ConfigError, ReaderError
 from sysid.ingest.meaning import with_meaning
 from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.table import RawTable
@@ -65,13 +65,8 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
         for reader in readers:
             if reader.name == name:
                 return reader
-        raise ConfigError(
-            f"no reader named {name}",
-            where=path,
-            expected=f"one of {', '.join(reader.name for reader in readers)}",
-            got=name,
-            remedy=did_you_mean(name, [reader.name for reader in readers], "correct reader"),
-        )
+        known = [reader.name for reader in readers]
+        raise ConfigError.unknown(f"no reader named {name}", name, known, "correct reader", where=path)
     by_suffix = next((reader for reader in readers if path.suffix.lower() in reader.suffixes), None)
     head = _head(path)
     if by_suffix is not None and by_suffix.is_mine is not None and by_suffix.is_mine(head):

@@ -20,7 +20,7 @@ from sysid.airbrake.consist import Consist
 from sysid.airbrake.variant import USUAL_VARIANT, VARIANTS
 from sysid.code_digest import code_digest
 from sysid.content import content_folders
-from sysid.errors import ConfigError, SysidError, did_you_mean
+from sysid.errors import ConfigError, SysidError
 from sysid.models import AbstractModel, Cascade, Interpolation
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.brake import ReferenceBrake
@@ -202,12 +202,12 @@ class _Scene:
 
     def scenario(self, name: str) -> Scenario:
         if name not in self._scenarios:
-            raise ConfigError(
+            raise ConfigError.unknown(
                 f"there is no scenario {name!r}",
+                name,
+                self._scenarios,
+                "correct the name, or leave scenarios out for all of them",
                 where="options, scenarios",
-                expected=f"one of {', '.join(self._scenarios)}",
-                got=name,
-                remedy=did_you_mean(name, self._scenarios, "correct the name, or leave scenarios out for all of them"),
             )
         return self._scenarios[name]
 

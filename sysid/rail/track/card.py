@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.atomic import replacing
-from sysid.errors import ConfigError, ReaderError, did_you_mean
+from sysid.errors import ConfigError, ReaderError
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.track import STRAIGHT, TrackProfile
 
@@ -105,12 +105,8 @@ class TrackCard:
         """
         found = tuple(row for row in self.rows if row.section == code)
         if not found:
-            raise ConfigError(
-                f"the card has no section {code}",
-                where="track card",
-                expected=f"one of {', '.join(self.sections)}",
-                got=code,
-                remedy=did_you_mean(code, self.sections, "name one of these"),
+            raise ConfigError.unknown(
+                f"the card has no section {code}", code, self.sections, "name one of these", where="track card"
             )
         return found
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.rail.constants import GRAVITY
 from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import Train
@@ -256,12 +256,8 @@ def combined(correlations: Sequence[NDArray[np.float64]], how: str) -> NDArray[n
         [2.0]
     """
     if how not in COMBINATIONS:
-        raise ConfigError(
-            "unknown combination of patterns",
-            where="how",
-            expected=f"one of {', '.join(COMBINATIONS)}",
-            got=how,
-            remedy=did_you_mean(how, COMBINATIONS, "choose one of these"),
+        raise ConfigError.unknown(
+            "unknown combination of patterns", how, COMBINATIONS, "choose one of these", where="how"
         )
     return np.asarray(COMBINATIONS[how](np.stack(correlations), axis=0))
 

@@ -27,10 +27,10 @@ from sysid.reporting.assembly.tables import (
     time_table,
 )
 from sysid.reporting.charts import Chart, chart_pictures
-from sysid.reporting.fit_tables import export_table
 from sysid.reporting.numbers import number, quantity, seconds
 from sysid.reporting.parts import Document, Part, Section, Verdict, data_set_section
 from sysid.reporting.published.tables import PublishedTable, read_published
+from sysid.reporting.sections.fit_tables import export_table
 from sysid.reporting.signals import MONTE_CARLO_FILE, read_signals
 from sysid.reporting.tables import Table, plain_table
 from sysid.units import squared

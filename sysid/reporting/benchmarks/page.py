@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from sysid.atomic import replacing
-from sysid.names import markdown, markdown_block, markdown_cell, markdown_code
+from sysid.names import markdown, markdown_block, markdown_code
 from sysid.reporting.benchmarks.findings import (
     FINDINGS_FILE,
     Benchmark,
@@ -58,7 +58,7 @@ def _lines(report: Benchmarks) -> list[str]:
         lines += [f"**{markdown(verdict_on(report.findings))}**", "", *_points(report.findings)]
     machines = [machine(benchmark.environment) for benchmark in report.benchmarks]
     rows = {key: "; ".join(dict.fromkeys(one[key] for one in machines)) for key in ("machine", "versions")}
-    lines += [*facts_lines({key: markdown_cell(text) for key, text in rows.items()})]
+    lines += [*facts_lines({key: markdown(text) for key, text in rows.items()})]
     for benchmark in report.benchmarks:
         lines += ["", *_section(benchmark)]
     return lines
@@ -82,7 +82,7 @@ def _section(benchmark: Benchmark) -> list[str]:
         "date": readable(benchmark.created),
         "commit": machine(benchmark.environment)["commit"],
         "load": "not recorded" if benchmark.load is None else f"{benchmark.load:.1f} when it began",
-        **{f"data: {markdown_cell(name)}": f"SHA-256 {digest}" for name, digest in benchmark.data.items()},
+        **{f"data: {markdown(name)}": f"SHA-256 {digest}" for name, digest in benchmark.data.items()},
     }
     lines = [f"## {markdown(benchmark.title)}", ""]
     if benchmark.findings:
@@ -112,7 +112,7 @@ def _table(findings: Sequence[Finding]) -> list[str]:
         "note": [finding.note for finding in findings],
     }
     # The verdict is Markdown already.
-    cells = {name: [text if name == "" else markdown_cell(text) for text in texts] for name, texts in columns.items()}
+    cells = {name: [text if name == "" else markdown(text) for text in texts] for name, texts in columns.items()}
     filled = {name: texts for name, texts in cells.items() if any(texts)}
     return rows_lines([list(filled), ["---"] * len(filled), *zip(*filled.values(), strict=True)])
 

@@ -18,12 +18,12 @@ from sysid.errors import ConfigError
 from sysid.names import output_side
 from sysid.reporting.assembly.results import AssemblyResults
 from sysid.reporting.fit_records import FitRecord
-from sysid.reporting.fit_tables import SCORED
 from sysid.reporting.judging.results import JudgementResults
 from sysid.reporting.judging.version_1 import ReadyResults
 from sysid.reporting.numbers import number
 from sysid.reporting.records import RunResults
 from sysid.reporting.results import Results
+from sysid.reporting.sections.fit_tables import SCORED
 from sysid.reporting.signals import CaseSignals, read_signals
 from sysid.reporting.tables import Column
 from sysid.traces import Role

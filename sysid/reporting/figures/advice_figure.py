@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sysid.reporting.advice_record import AdviceRecord, ImpulseRecord, ResponseRecord
+from sysid.reporting.advice.record import AdviceRecord, ImpulseRecord, ResponseRecord
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
 
 MOST_INPUTS = 4

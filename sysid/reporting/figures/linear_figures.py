@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import AbstractModel
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
-from sysid.reporting.linear_view import linear_views
-from sysid.reporting.responses import Bode, StepResponse, bode_of, step_of
+from sysid.reporting.linear_views import linear_views
+
+if TYPE_CHECKING:
+    from sysid.reporting.linear.responses import Bode, StepResponse
 
 BAND_COLOUR = "#DDDDDD"
 CLOUD = 600
@@ -20,22 +24,7 @@ SHOWN = 400
 """Samples shown of a step response."""
 
 
-def bode_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, seed: int = 0, points: int = 200) -> Figure:
-    """Magnitude and phase of every input, with 95 % bands.
-
-    Args:
-        model: The model.
-        uncertainty: Of its parameters, as its fit gives it; without it there are no bands.
-        seed: Of the draws for the bands.
-        points: Frequencies, up to the Nyquist frequency.
-
-    Returns:
-        One column per input.
-    """
-    return draw_bode(bode_of([(model, uncertainty)], points=points, seed=seed))
-
-
-def draw_bode(found: Bode) -> Figure:
+def bode_figure(found: Bode) -> Figure:
     """Magnitude and phase of every pair, with their bands.
 
     Args:
@@ -62,24 +51,7 @@ def draw_bode(found: Bode) -> Figure:
         return figure
 
 
-def step_figure(
-    model: AbstractModel, uncertainty: Uncertainty | None = None, *, samples: int | None = None, seed: int = 0
-) -> Figure:
-    """Response of the output to a step of one unit in every input, with 95 % bands.
-
-    Args:
-        model: The model.
-        uncertainty: Of its parameters; without it there are no bands.
-        samples: Length; by default until the slowest pole has settled, 3000 at most.
-        seed: Of the draws for the bands.
-
-    Returns:
-        One panel per input.
-    """
-    return draw_step(step_of([(model, uncertainty)], samples=samples, seed=seed))
-
-
-def draw_step(found: StepResponse) -> Figure:
+def step_figure(found: StepResponse) -> Figure:
     """The response of every pair, with its band.
 
     Args:

@@ -59,13 +59,12 @@ class OrderCurve:
         )
 
 
-def order_figure(curve: OrderCurve, *, unit: str, title: str = "One-step loss of every candidate") -> Figure:
+def order_figure(curve: OrderCurve, *, unit: str) -> Figure:
     """Loss against number of parameters: the range of all candidates, the best of each size, and the choices.
 
     Args:
         curve: What is drawn.
         unit: The output's unit.
-        title: Stands above.
 
     Returns:
         The figure; nothing outside it was touched.
@@ -73,7 +72,7 @@ def order_figure(curve: OrderCurve, *, unit: str, title: str = "One-step loss of
     with styled():
         figure = new_figure(7.6, 3.6)
         axes = figure.subplots()
-        axes.set_title(title)
+        axes.set_title("One-step loss of every candidate")
         axes.fill_between(
             curve.sizes, curve.lowest, curve.highest, color="#DDDDDD", label=f"all {curve.candidates:,} candidates"
         )
@@ -89,12 +88,11 @@ def order_figure(curve: OrderCurve, *, unit: str, title: str = "One-step loss of
         return figure
 
 
-def states_figure(correlations: Sequence[float], *, title: str = "States that the record shows") -> Figure:
+def states_figure(correlations: Sequence[float]) -> Figure:
     """Canonical correlations of past and future, as bars: those that stand out are states.
 
     Args:
         correlations: Descending, from 0 to 1.
-        title: Stands above.
 
     Returns:
         The figure; nothing outside it was touched.
@@ -102,7 +100,7 @@ def states_figure(correlations: Sequence[float], *, title: str = "States that th
     with styled():
         figure = new_figure(7.6, 2.8)
         axes = figure.subplots()
-        axes.set_title(title)
+        axes.set_title("States that the record shows")
         places = range(1, len(correlations) + 1)
         axes.bar(places, correlations, color=PALETTE[0])
         axes.set_xticks(places)

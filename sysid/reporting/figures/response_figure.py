@@ -12,7 +12,7 @@ from sysid.estimation import FitResult
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.reporting.figures.style import DASHES, PALETTE, TARGET, new_figure, styled
-from sysid.reporting.linear_view import linear_views
+from sysid.reporting.linear_views import linear_views
 
 BAND_COLOUR = "#DDDDDD"
 

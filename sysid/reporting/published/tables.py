@@ -15,7 +15,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict
 
 from sysid.content import content_folders
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.field_checks import check
 from sysid.yaml_files import read_yaml
 
@@ -214,13 +214,9 @@ def read_published(name: str, *, workspace: Path | None = None) -> PublishedTabl
                 figures=_read_figures(path.with_name(about.figures)),
             )
     names = published_names(workspace=workspace)
-    raise ConfigError(
-        f"no table of published figures is called {name}",
-        where="report: published",
-        expected=f"one of {', '.join(names)}" if names else "a file reports/published/<name>.yaml",
-        got=name,
-        remedy=did_you_mean(name, names, "correct the name in the pipeline, or leave the line out"),
-    )
+    otherwise, none = "correct the name in the pipeline, or leave the line out", "a file reports/published/<name>.yaml"
+    what = f"no table of published figures is called {name}"
+    raise ConfigError.unknown(what, name, names, otherwise, where="report: published", none=none)
 
 
 def _folders(workspace: Path | None) -> tuple[Path, ...]:

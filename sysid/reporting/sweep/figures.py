@@ -123,17 +123,16 @@ def heat_maps(record: SweepRecord, name: str) -> Figure | None:
         return figure
 
 
-def pareto_figure(record: SweepRecord, names: Sequence[str] | None = None) -> Figure:
-    """Two figures of merit against each other, with the trials that no other beats in both.
+def pareto_figure(record: SweepRecord) -> Figure:
+    """The first two objectives against each other, with the trials that no other beats in both.
 
     Args:
         record: The sweep.
-        names: The figures; the first two objectives by default.
 
     Returns:
         The figure.
     """
-    first, second = list(names or [*record.objectives, "operations"])[:2]
+    first, second = [*record.objectives, "operations"][:2]
     with styled():
         figure = new_figure(7.6, 3.8)
         axes = figure.subplots()

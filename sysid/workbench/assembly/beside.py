@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sysid.composite import Doubting, TrainedComposite, TrainingData, committee, doubting, whole_score
-from sysid.composite.committee import check_alike
+from sysid.composite.doubt.committee import check_alike
 from sysid.models import Cascade
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig

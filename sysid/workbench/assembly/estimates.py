@@ -10,7 +10,7 @@ from functools import cached_property
 from sysid.composite import TrainingData, dealt
 from sysid.composite.candidates import sample_fit
 from sysid.composite.plan import RoundPlan
-from sysid.composite.round_times import RoundTime, stand_in, time_round
+from sysid.composite.rounds.times import RoundTime, stand_in, time_round
 from sysid.errors import SysidError
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig

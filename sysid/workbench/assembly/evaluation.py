@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.composite.active_learning import Assessment, sequence_errors
-from sysid.composite.doubt_figures import DoubtFigures, doubt_figures
-from sysid.composite.doubting import Doubting
+from sysid.composite.doubt.doubting import Doubting
+from sysid.composite.doubt.figures import DoubtFigures, doubt_figures
+from sysid.composite.doubt.monte_carlo import MonteCarlo, run_monte_carlo
 from sysid.composite.keeper import Decision
 from sysid.composite.limits_held import holding
-from sysid.composite.monte_carlo import MonteCarlo, run_monte_carlo
 from sysid.composite.training import TrainedComposite
 from sysid.export.exporters import wanted_formats
 from sysid.models import Cascade

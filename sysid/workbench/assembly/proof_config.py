@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field, model_validator
 
 from sysid.composite import Doubt, Perturbation
-from sysid.composite.committee import SPREAD
+from sysid.composite.doubt.committee import SPREAD
 from sysid.field_checks import FieldError
 from sysid.workbench.old_words import STRICT
 

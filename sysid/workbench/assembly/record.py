@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from sysid.composite import FixedMember
 from sysid.composite.active_learning import ActiveLearned, Assessment
-from sysid.composite.doubt_figures import DoubtFigures
-from sysid.composite.doubting import Doubting
-from sysid.composite.fixed_equations import equation_of
+from sysid.composite.doubt.doubting import Doubting
+from sysid.composite.doubt.figures import DoubtFigures
+from sysid.composite.doubt.monte_carlo import MonteCarlo
+from sysid.composite.fixed.equations import equation_of
 from sysid.composite.limits_held import Holding
-from sysid.composite.monte_carlo import MonteCarlo
 from sysid.composite.parameters import values_in
-from sysid.composite.round import TrainedRound
+from sysid.composite.rounds.round import TrainedRound
 from sysid.composite.training import TrainedComposite
 from sysid.models import Activity, Cascade
 from sysid.reporting.assembly.results import AssemblyResults

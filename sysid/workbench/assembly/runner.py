@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.composite import train, with_fixed
-from sysid.composite.round_times import stand_in
+from sysid.composite.rounds.times import stand_in
 from sysid.errors import ConfigError
 from sysid.export.exporters import wanted_formats
 from sysid.field_checks import check

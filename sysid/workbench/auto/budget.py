@@ -12,7 +12,7 @@ import numpy as np
 from sysid.estimation import Training
 from sysid.estimation.clock import SLOWEST
 from sysid.estimation.estimators import estimator_of
-from sysid.estimation.networks.halving import planned_iterations
+from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.finish import MOST, MOST_KEPT, SPILL, slowness

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from sysid.reporting.fit_tables import DRAWN
+from sysid.reporting.sections.fit_tables import DRAWN
 
 FINISHING_S, OUTPUT_S, PICTURE_S = 4.0, 3.0, 0.2
 """Processor seconds that scores, export and what has to be loaded for them take, those of each output, and each picture
@@ -35,7 +35,7 @@ def drawn_in(wall_s: float | None, outputs: int) -> int:
         outputs: Of each record.
 
     Returns:
-        Cases of each output, :data:`FEWEST` to :data:`~sysid.reporting.fit_tables.DRAWN`.
+        Cases of each output, :data:`FEWEST` to :data:`~sysid.reporting.sections.fit_tables.DRAWN`.
 
     Example:
         >>> drawn_in(30.0, 1), drawn_in(30.0, 5), drawn_in(300.0, 5)

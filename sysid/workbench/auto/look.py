@@ -14,8 +14,8 @@ from sysid.errors import UserError
 from sysid.estimation.output_ends import found_ends
 from sysid.estimation.resets import derived_from, found_resets, grey_box_of, switches
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind, VectorGreyBox
-from sysid.reporting.advice_record import AdviceRecord
-from sysid.reporting.advice_words import lines
+from sysid.reporting.advice.record import AdviceRecord
+from sysid.reporting.advice.words import lines
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.jumps import jumps_of
 from sysid.workbench.auto.mechanisms import mechanism_of

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sysid.api.fits import Fit, SystemFit
+from sysid.api.fits import Fit
 from sysid.api.given import TracesLike, traces_of
 from sysid.api.looking import mapping_of
 from sysid.api.notebook import html_of
+from sysid.api.system_fit import SystemFit
 from sysid.errors import ConfigError
 from sysid.extras import need
 from sysid.field_checks import check

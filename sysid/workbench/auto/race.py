@@ -16,7 +16,7 @@ import numpy as np
 
 from sysid.estimation import Status, Training
 from sysid.estimation.estimators import estimator_of
-from sysid.estimation.networks.halving import better_half
+from sysid.estimation.networks.starts.halving import better_half
 from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.budget import RACE

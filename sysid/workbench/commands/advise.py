@@ -11,7 +11,7 @@ from sysid.advice import Verdict
 from sysid.api.fitting import load
 from sysid.api.looking import Advice, SystemAdvice, advise, mapping_of
 from sysid.names import slug
-from sysid.reporting.advice_words import lines
+from sysid.reporting.advice.words import lines
 from sysid.reporting.figures.advice_figure import advice_figure
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import as_file, svg

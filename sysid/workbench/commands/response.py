@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sysid.api.responses import Bode, StepResponse, bode, poles, step
+from sysid.api.responses import bode, poles, step
 from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation import FitResult
 from sysid.export.bundle import Bundle
@@ -12,6 +12,7 @@ from sysid.export.reading import read_bundle
 from sysid.names import slug
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import as_file, svg
+from sysid.reporting.linear.responses import Bode, StepResponse
 from sysid.reporting.results import read_results
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.runner.console import console

@@ -259,12 +259,11 @@ class Pipeline:
     path: Path
 
 
-def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
+def find_pipeline(name_or_path: str) -> Path:
     """The file of a pipeline.
 
     Args:
         name_or_path: A built-in or workspace pipeline's name, in a folder as ``benchmarks/silverbox``; or a YAML file.
-        workspace: The user's workspace; ``None`` is the current folder.
 
     Returns:
         The file.
@@ -272,7 +271,7 @@ def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
     Raises:
         ConfigError: If there is none.
     """
-    given, folders = Path(name_or_path), content_folders("pipelines", workspace=workspace)
+    given, folders = Path(name_or_path), content_folders("pipelines")
     built_in = [folder / f"{name_or_path}.yaml" for folder in folders if not given.is_absolute()]
     if given.suffix in {".yaml", ".yml"} or len(given.parts) > 1:
         found = next((file for file in (given, *built_in) if file.is_file()), None)
@@ -298,7 +297,7 @@ def find_pipeline(name_or_path: str, *, workspace: Path | None = None) -> Path:
         known.setdefault(file.stem, file)
     if name_or_path in known:
         return known[name_or_path]
-    data_sets = content_folders("datasets", workspace=workspace)
+    data_sets = content_folders("datasets")
     if any((folder / name_or_path / "dataset.yaml").is_file() for folder in data_sets):
         raise ConfigError(
             f"{name_or_path} is a data set and no pipeline",

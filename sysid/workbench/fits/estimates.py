@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, JointTraining, Training
 from sysid.estimation.estimators import estimator_of
-from sysid.estimation.networks.halving import planned_iterations
+from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.estimation.stability.check import LEAST_S
 from sysid.traces import Trace, TraceSet
 from sysid.workbench.fields import given_options, options_of

@@ -13,8 +13,8 @@ import numpy as np
 from sysid.estimation import CascadeFit, FitResult, Posterior, Status
 from sysid.models import Mapping as Mapped
 from sysid.reporting.curves import CURVES_FILE
-from sysid.reporting.fit_tables import DRAWN
 from sysid.reporting.records import SCHEMA_VERSION
+from sysid.reporting.sections.fit_tables import DRAWN
 from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import Role, TraceSet
 from sysid.validation import CaseIntervals, CaseResult, Evaluation, Figures
@@ -243,21 +243,7 @@ def results_document(
         "created": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
         "environment": dict(environment),
         "seed": config.seed,
-        "data": {
-            "name": traces.name,
-            "digest": traces.digest,
-            "sample_time": traces.sample_time,
-            "source": traces.source,
-            "cases": {
-                trace.name: {
-                    "role": traces.roles[trace.name].value,
-                    "samples": len(trace),
-                    "duration_s": trace.duration,
-                    "provenance": list(trace.provenance),
-                }
-                for trace in traces
-            },
-        },
+        "data": _data(traces),
         "selection": {
             "name": config.selection or traces.name,
             "cases": {trace.name: {"samples": len(trace), "digest": trace.digest} for trace in data.selection},
@@ -275,6 +261,20 @@ def results_document(
         "drawn": config.report.drawn or DRAWN,
         "sweep": None if sweep is None else sweep.summary.model_dump(),
     }
+
+
+def _data(traces: TraceSet) -> dict[str, Any]:
+    cases = {
+        trace.name: {
+            "role": traces.roles[trace.name].value,
+            "samples": len(trace),
+            "duration_s": trace.duration,
+            "provenance": list(trace.provenance),
+        }
+        for trace in traces
+    }
+    about = {"name": traces.name, "digest": traces.digest, "sample_time": traces.sample_time, "source": traces.source}
+    return {**about, "cases": cases}
 
 
 def system_records(fits: Sequence[FitReady]) -> list[dict[str, Any]]:

@@ -9,8 +9,8 @@ from rich.text import Text
 
 from sysid.estimation.result import Status
 from sysid.reporting.fit_records import FitRecord
-from sysid.reporting.fit_tables import scored_cases
 from sysid.reporting.results import Results, SystemRecord
+from sysid.reporting.sections.fit_tables import scored_cases
 from sysid.units import squared
 from sysid.validation.metrics import mean_fit, percent
 

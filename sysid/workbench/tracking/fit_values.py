@@ -203,7 +203,7 @@ def drawn(ready: FitReady) -> list[str]:
     Returns:
         Their names, in the order of the file; as many as the report draws.
     """
-    from sysid.reporting.fit_tables import DRAWN, SCORED
+    from sysid.reporting.sections.fit_tables import DRAWN, SCORED
 
     cases = ready.evaluation.cases
     first = sorted(cases, key=lambda name: cases[name].role not in SCORED)[: ready.pipeline.report.drawn or DRAWN]

@@ -10,14 +10,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation.least_squares.counted_rows import counted_rows
-from sysid.estimation.networks.joint_provider import CascadeProvider
-from sysid.estimation.networks.joint_training import unit_errors
 from sysid.estimation.networks.program_provider import LEAST
+from sysid.estimation.networks.together.provider import CascadeProvider
+from sysid.estimation.networks.together.training import unit_errors
 from sysid.models import Cascade, Limit
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace
-from tests.models.cascades import CASCADES, command, equation, linear, network, service
-from tests.models.test_cascade import lag
+from tests.models.cascades import CASCADES, command, equation, lag, linear, network, service
 
 
 def trace(cascade: Cascade, n: int = 60, seed: int = 0, *, usable=None) -> Trace:

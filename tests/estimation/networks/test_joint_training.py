@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
-from sysid.errors import ChannelError, ConfigError
-from sysid.estimation import CascadeFit, JointTraining, Status, fit_cascade, with_upstream_outputs
-from sysid.estimation.networks.joint_provider import CascadeProvider
-from sysid.estimation.networks.leading_windows import lengths
+from sysid.errors import ConfigError
+from sysid.estimation import CascadeFit, JointTraining, Status, fit_cascade
+from sysid.estimation.networks.together.leading_windows import lengths
+from sysid.estimation.networks.together.provider import CascadeProvider
 from sysid.estimation.networks.training import FitProgress
 from sysid.models import Cascade
-from sysid.traces import Role, TraceSet
 from tests.models.cascades import command, linear, network, service
 
 TRUTH = service()
@@ -216,44 +215,6 @@ def test_windows_never_take_a_better_start_away() -> None:
 def test_training_that_cannot_be_is_refused(fields):
     with pytest.raises(ConfigError):
         JointTraining(**fields)
-
-
-class TestUpstream:
-    """Traces with the free run of upstream members in place of what was measured."""
-
-    TRACES = TraceSet(
-        name="set", traces=(measured(), measured(seed=1)), roles={"record 0": Role.ESTIMATION, "record 1": Role.TEST}
-    )
-
-    def test_inputs_are_simulated_and_the_output_stays_measured(self):
-        cascade = disturbed()
-        changed = with_upstream_outputs(self.TRACES, cascade, "BC")
-        trace = self.TRACES["record 0"]
-        run = cascade.simulate_trace(trace)
-        assert changed["record 0"].channel_names == ("BP", "AR", "BC")
-        assert_array_equal(changed["record 0"]["BP"], run["BP"])
-        assert_array_equal(changed["record 0"]["AR"], run["AR"])
-        assert_array_equal(changed["record 0"]["BC"], trace["BC"])
-        assert changed.roles == self.TRACES.roles
-        assert "simulated" in changed["record 0"].provenance[-1]
-
-    def test_a_member_that_is_refitted_on_them_sees_in_the_whole_what_it_was_fitted_on(self):
-        cascade = disturbed()
-        changed = with_upstream_outputs(self.TRACES, cascade, "BC")["record 0"]
-        model = cascade.member("BC")
-        at_rest = cascade.levels(self.TRACES["record 0"]["STP"][:1])
-        alone = Cascade(models=(model,), rest={"BP": float(at_rest[1]), "AR": float(at_rest[2])}).simulate_trace(
-            changed
-        )
-        assert_allclose(alone["BC"], cascade.simulate_trace(self.TRACES["record 0"])["BC"], atol=1e-9)
-
-    def test_the_command_stays_measured(self):
-        changed = with_upstream_outputs(self.TRACES, TRUTH, "BP")
-        assert_array_equal(changed["record 1"]["STP"], self.TRACES["record 1"]["STP"])
-
-    def test_a_stranger_is_refused(self):
-        with pytest.raises(ChannelError, match="missing channel XX"):
-            with_upstream_outputs(self.TRACES, TRUTH, "XX")
 
 
 @pytest.mark.parametrize(

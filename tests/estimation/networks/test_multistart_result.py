@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from sysid.estimation.networks.multistart_result import multistart_status
+from sysid.estimation.networks.starts.result import multistart_status
 from sysid.estimation.result import Status
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import Loop, Status, Training, fit_narx
-from sysid.estimation.networks.choosing import rank
-from sysid.estimation.networks.multistart import judged
+from sysid.estimation.networks.starts.advancing import judged
+from sysid.estimation.networks.starts.choosing import rank
 from sysid.models import NARX, Start, StartKind
 from sysid.traces import Trace
 from tests.estimation.tank import TANK, tank

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.estimation.networks.finer import finer
-from sysid.estimation.networks.neural_state_space import fit_neural_state_space
-from sysid.estimation.networks.thinned import LONG, band_allows, thinned
+from sysid.estimation.networks.neural.finer import finer
+from sysid.estimation.networks.neural.state_space import fit_neural_state_space
+from sysid.estimation.networks.neural.thinned import LONG, band_allows, thinned
 from sysid.estimation.networks.training import Training
 from sysid.models import NeuralForm, NeuralStateSpace, Scaling, Start
 from sysid.traces import Channel, Role, Trace
@@ -107,7 +107,7 @@ def test_a_number_that_thins_nothing_is_refused() -> None:
 
 
 def test_a_fit_whose_thinned_model_is_none_of_all_samples_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sysid.estimation.networks.thinned.finer", lambda *_: None)
+    monkeypatch.setattr("sysid.estimation.networks.neural.thinned.finer", lambda *_: None)
     record, training = shaken(0, 2.0, n=1500), Training(starts=1, max_iterations=2, stable=True)
     structure = NeuralStateSpace(states=2, neurons=1)
     sparse, whole = (

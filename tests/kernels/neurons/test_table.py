@@ -15,7 +15,7 @@ import torch
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ConfigError
-from sysid.export.onnx_nodes import IR_VERSION, OPSET, Nodes
+from sysid.export.onnx.nodes import IR_VERSION, OPSET, Nodes
 from sysid.kernels.neurons import NEURONS, code_of
 from sysid.kernels.neurons.table import activate, activate_with_slopes, slopes_of_sums, slopes_of_values
 from sysid.models import NARX, NeuralStateSpace, VectorNARX

@@ -17,7 +17,7 @@ from sysid.reporting.assembly.tables import (
     stage_table,
     time_table,
 )
-from sysid.reporting.fit_tables import export_table
+from sysid.reporting.sections.fit_tables import export_table
 from sysid.reporting.tables import Table
 
 

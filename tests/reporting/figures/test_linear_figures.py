@@ -12,7 +12,8 @@ from sysid.estimation import FitResult, TransferFunctionTraining, fit_transfer_f
 from sysid.models import Mapping, TransferFunction
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.svg import svg
-from sysid.reporting.step_responses import band, filter_step
+from sysid.reporting.linear.computing import bode_of, step_of
+from sysid.reporting.linear.step_responses import band, filter_step
 from tests.estimation.linear_systems import steps, trace_of
 
 
@@ -28,7 +29,7 @@ def fitted(noise: float, domain: str) -> FitResult:
 @pytest.mark.parametrize("domain", ["discrete", "continuous"])
 def test_bode_shows_the_response_within_its_band(domain: str) -> None:
     fit = fitted(0.3, domain)
-    above, below = bode_figure(fit.model, fit.uncertainty).axes
+    above, below = bode_figure(bode_of([(fit.model, fit.uncertainty)])).axes
     frequency, gain = above.lines[0].get_data()
     np.testing.assert_allclose(gain, np.abs(fit.model.response(0, np.asarray(frequency))))
     outline = above.collections[0].get_paths()[0].vertices
@@ -55,7 +56,7 @@ def test_noise_widens_the_cloud_of_poles() -> None:
 
 def test_the_step_response_ends_at_the_gain() -> None:
     fit = fitted(0.1, "discrete")
-    figure = step_figure(fit.model, samples=400)
+    figure = step_figure(step_of([(fit.model, None)], samples=400))
     y = figure.axes[0].lines[0].get_ydata()
     assert y[-1] == pytest.approx(fit.model.response(0, np.array([0.0]))[0].real, rel=1e-6)
     assert svg(figure, title="Step", description="Step response", name="step").startswith("<svg")
@@ -65,7 +66,7 @@ def test_it_is_that_of_another_library() -> None:
     fit = fitted(0.1, "discrete")
     (A, B, C, D), n = fit.model.matrices, 60
     _, (exact,) = signal.dstep((A, B[:, :1], C, D[:, :1], fit.model.sample_time), n=n)
-    drawn = step_figure(fit.model, samples=n).axes[0].lines[0].get_ydata()
+    drawn = step_figure(step_of([(fit.model, None)], samples=n)).axes[0].lines[0].get_ydata()
     np.testing.assert_allclose(drawn, exact[:, 0], rtol=1e-12, atol=1e-12)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from sysid.composite.round import JointRound
+from sysid.composite.rounds.round import JointRound
 from sysid.errors import ConfigError
 from sysid.workbench.assembly.stage_config import ActiveLearningConfig
 from sysid.workbench.commands.run import run_request

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid.composite.round import JointRound
+from sysid.composite.rounds.round import JointRound
 from sysid.errors import ConfigError, ParityError
 from sysid.estimation import CascadeFit, Status
 from sysid.export import read_bundle

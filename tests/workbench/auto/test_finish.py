@@ -6,7 +6,7 @@ import pytest
 
 from sysid.field_checks import check
 from sysid.models import ARX
-from sysid.reporting.fit_tables import DRAWN
+from sysid.reporting.sections.fit_tables import DRAWN
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.finish import DRAWING_S, PICTURE_S, SLOWEST_PACE, drawn_in, finish_s, pace, time_told
 

@@ -16,7 +16,7 @@ from sysid.export import read_bundle
 from sysid.field_checks import check
 from sysid.models import model_from_dict
 from sysid.reporting.results import Results, read_results
-from sysid.reporting.training_view import RELATIVE, error_unit, trained_models
+from sysid.reporting.sections.training import RELATIVE, error_unit, trained_models
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import table
 from sysid.workbench.fits.config import Pipeline, parse_pipeline

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from sysid.reporting.fit_tables import DRAWN
+from sysid.reporting.sections.fit_tables import DRAWN
 from sysid.traces import Role
 from sysid.workbench.tracking import fit_values
 from sysid.workbench.tracking.fit_values import MAX_METRICS, batches, drawn

@@ -1,0 +1,110 @@
+"""A fit of several outputs: one fit each, run as one system."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.api.abstract_fit import AbstractFit
+from sysid.api.fits import Fit, check_outputs
+from sysid.errors import ChannelError
+from sysid.ingest.run_records import before_a_run, measured_of
+from sysid.models import Cascade, Start
+from sysid.traces import TraceSet
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class SystemFit(AbstractFit):
+    """Several outputs: one fit each, run as one system.
+
+    Args:
+        fits: By output.
+        model: Their models side by side.
+        traces: The data set.
+        start: How each free run begins where nothing else is said.
+    """
+
+    fits: Dict[str, Fit]
+    model: Cascade
+    traces: TraceSet
+    start: Start
+
+    @classmethod
+    def of(cls, fits: Dict[str, Fit]) -> SystemFit:
+        """Fits of the same data, one an output."""
+        first = next(iter(fits.values()))
+        model = Cascade(models=tuple(fit.model for fit in fits.values()))
+        return cls(fits=fits, model=model, traces=first.traces, start=first.start)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs, in the mapping's order."""
+        return tuple(self.fits)
+
+    def __getitem__(self, output: str) -> Fit:
+        if output not in self.fits:
+            raise ChannelError([output], self.outputs, where="the outputs of a fit")
+        return self.fits[output]
+
+    def simulate(self, u: Any, *, initial: Dict[str, float] | tuple[Any, Any] | None = None) -> NDArray[np.float64]:
+        """Free run of all outputs.
+
+        Args:
+            u: Inputs, as for :meth:`Fit.simulate`, in the order of the first output's mapping.
+            initial: The output that the system has stood at, by name; or a pair ``(u, y)`` of the samples before,
+                oldest first, with a column of ``y`` for each output. The rest values where nothing is said.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``, in the outputs' units.
+        """
+        given = self._begun(initial)
+        return np.column_stack([fit.simulate(u, initial=given.get(name)) for name, fit in self.fits.items()])
+
+    def predict(
+        self, y: Any, u: Any, *, steps: int = 1, initial: Dict[str, float] | tuple[Any, Any] | None = None
+    ) -> NDArray[np.float64]:
+        """Prediction of all outputs from measured ones; see :meth:`Fit.predict`.
+
+        Args:
+            y: Measured outputs: an array of shape ``(n_samples, n_outputs)`` in their order, a frame or dict with
+                columns by name, or a trace.
+            u: Inputs, as for :meth:`Fit.simulate`.
+            steps: How many samples ahead.
+            initial: As for :meth:`simulate`.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``, in the outputs' units.
+        """
+        given, columns = (
+            self._begun(initial),
+            measured_of(y, u, self.outputs, self.model.units, sample_time=self.model.sample_time).T,
+        )
+        runs = zip(self.fits.items(), columns, strict=True)
+        found = [fit.predict(column, u, steps=steps, initial=given.get(name)) for (name, fit), column in runs]
+        return np.column_stack(found)
+
+    def _begun(self, initial: Dict[str, float] | tuple[Any, Any] | None) -> Dict[str, Any]:
+        """What stands before the first sample, output by output."""
+        if not isinstance(initial, tuple):
+            check_outputs(initial or {}, self.outputs)
+            return initial or {}
+        inputs = self[self.outputs[0]].model.mapping.inputs
+        before, output = before_a_run(
+            initial, inputs, self.outputs, self.model.units, sample_time=self.model.sample_time
+        )
+        return {name: (before, column) for name, column in zip(self.outputs, output.T, strict=True)}
+
+    def summary(self) -> str:
+        """The summaries of its fits.
+
+        Returns:
+            Lines of text, those of each fit behind an empty one.
+        """
+        return "\n\n".join(fit.summary() for fit in self.fits.values())
+
+    def __repr__(self) -> str:
+        return f"<SystemFit of {', '.join(self.outputs)}: {', '.join(fit.status.name for fit in self.fits.values())}>"

@@ -1,0 +1,1 @@
+"""Members that are declared and not fitted, and the expressions that they and limits are made of."""

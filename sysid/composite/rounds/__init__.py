@@ -1,0 +1,1 @@
+"""Rounds of training the whole end to end, rehearsed, and how long they take."""

@@ -1,0 +1,1 @@
+"""Neural state spaces: how their weights stand, begin and are trained."""

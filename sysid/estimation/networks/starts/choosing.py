@@ -1,0 +1,86 @@
+"""The choice between the candidates of a multistart: by selection traces or evidence, and only what is stable."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid.estimation.networks.starts.multistart import Candidate, Network
+
+
+def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, float]:
+    """Sorting key, best first; fits that did not improve come last.
+
+    Args:
+        candidate: The candidate.
+        choose_by: ``selection``, where a tolerance is declared by the traces on which it is left first, or
+            ``evidence``; without selection traces the evidence, without evidence the loss. Or
+            ``loss``, which comes after selection traces too, and before the evidence.
+
+    Returns:
+        The key.
+    """
+    if choose_by != "evidence" and np.isfinite(candidate.score):
+        value = candidate.score
+    elif choose_by != "loss" and candidate.solution.evidence is not None:
+        value = -candidate.log_evidence
+    else:
+        value = candidate.loss
+    return not candidate.solution.status.usable, candidate.outside if choose_by == "selection" else 0, value
+
+
+VETTED = 10
+"""Best candidates that are looked at for one whose free run is stable."""
+LOOKS = 2
+"""Of them how many may be looks at the same start: what runs away at one look mostly does at the next."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Choice:
+    """Which candidate was chosen.
+
+    Args:
+        chosen: The candidate.
+        stable: Of each candidate, whether its free run was found stable; ``None`` where it was not looked at.
+        by: As for :func:`rank`.
+    """
+
+    chosen: Candidate
+    stable: tuple[bool | None, ...]
+    by: str
+
+
+def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Network], bool] | None = None) -> Choice:
+    """Choose the best candidate, or the best stable one among the best.
+
+    Args:
+        candidates: At least one.
+        choose_by: As for :func:`rank`.
+        vet: Whether a model's free run is stable; ``None`` takes the best as it is.
+
+    Returns:
+        The choice; the best of all where none that was looked at is stable.
+    """
+    order = sorted(range(len(candidates)), key=lambda i: rank(candidates[i], choose_by))
+    found: dict[int, bool] = {}
+    if vet is not None:
+        for i in _few_of_each(candidates, order)[:VETTED]:
+            found[i] = vet(candidates[i].model)
+            if found[i]:
+                break
+    chosen = next((i for i, stable in found.items() if stable), order[0])
+    return Choice(chosen=candidates[chosen], stable=tuple(found.get(i) for i in range(len(candidates))), by=choose_by)
+
+
+def _few_of_each(candidates: Sequence[Candidate], order: Sequence[int]) -> list[int]:
+    """The candidates in order, of each start the best looks."""
+    seen: Counter[int] = Counter()
+    found = []
+    for i in order:
+        seen[candidates[i].number] += 1
+        if seen[candidates[i].number] <= LOOKS:
+            found.append(i)
+    return found

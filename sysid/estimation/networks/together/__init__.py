@@ -1,0 +1,1 @@
+"""Several models that are trained through each other, as one."""

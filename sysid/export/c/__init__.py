@@ -1,0 +1,1 @@
+"""Surrogates as C, for compilers of C and C++ and for Arduino."""

@@ -1,0 +1,1 @@
+"""Surrogates as FMUs: one archive for FMI 2 or 3."""

@@ -1,0 +1,1 @@
+"""What a surrogate is made of before any language: stages, their state, numbers and operations."""

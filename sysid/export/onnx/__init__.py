@@ -1,0 +1,1 @@
+"""Surrogates as ONNX graphs: one step, or a run over a sequence."""

@@ -1,0 +1,1 @@
+"""Surrogates as PyTorch modules, and the two formats that these are written in."""

@@ -1,0 +1,1 @@
+"""What linear models answer: responses, poles and their intervals."""
