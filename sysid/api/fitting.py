@@ -9,7 +9,6 @@ from typing import Any
 from sysid.api.fits import Fit
 from sysid.api.given import ESTIMATED, TracesLike, check_order, path_of, traces_of
 from sysid.api.system_fit import SystemFit
-from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
 from sysid.ingest import load_dataset
@@ -95,15 +94,7 @@ def fit(
     rest = levels_at_rest(rest_output, mapped.outputs)
     structure = structure.for_outputs(len(mapped.outputs))
     chosen = structure.mappings(mapped)
-    estimation, selection = traces.with_role(Role.ESTIMATION), traces.with_role(Role.SELECTION)
-    if not estimation:
-        raise ConfigError(
-            "no trace is for estimation",
-            where=f"data set {traces.name}",
-            expected="a trace with that role",
-            got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
-            remedy="give one that role",
-        )
+    estimation, selection = traces.estimation, traces.with_role(Role.SELECTION)
     structure.check_records([one.name for one in estimation], traces.names, start)
     fits: list[Fit] = []
     for one in chosen:

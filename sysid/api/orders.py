@@ -284,35 +284,8 @@ def search_orders(
     """
     traces, chosen, start = traces_of(traces, word="search_orders"), Mapping.of(mapping), Start.of(start)
     chosen.check_single("an order search")
-    estimation = traces.with_role(Role.ESTIMATION)
-    if not estimation:
-        raise ConfigError(
-            "no trace is for estimation",
-            where=f"data set {traces.name}",
-            expected="a trace with that role",
-            got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
-            remedy="give one that role",
-        )
-    for name, most_of in (("max_na", max_na), ("max_nb", max_nb), ("max_nk", max_nk)):
-        if most_of is not None and not whole(most_of):
-            raise ConfigError(
-                "not a largest order",
-                where=name,
-                expected="a whole number from 0 to 10,000",
-                got=shortened(most_of),
-                remedy=f"write for example {name}=4",
-            )
-    feedback = feedback_of(estimation, chosen) if chosen.inputs and max_nk != 0 else ""
-    first = int(not isinstance(feedback, str) and feedback.at_once)
-    samples = sum(len(trace) for trace in estimation), max(len(trace) for trace in estimation)
-    grid = _grid(samples, len(chosen.inputs), (max_na, max_nb, max_nk), first)
-    losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
-    late = _as_late(grid, estimation, chosen) if max_nk is None else grid
-    if late != grid:
-        later = order_search.search_orders(estimation, chosen, late, start=start, workers=workers)
-        if _least(later) < _least(losses):
-            grid = replace(late, min_nk=grid.min_nk)
-            losses = order_search.search_orders(estimation, chosen, grid, start=start, workers=workers)
+    estimation = traces.estimation
+    grid, losses = _searched(estimation, chosen, {"max_na": max_na, "max_nb": max_nb, "max_nk": max_nk}, start, workers)
     selection = traces.with_role(Role.SELECTION) if selection is None else tuple(selection)
     found = run_finalists(
         losses, estimation, chosen, selection or estimation, count=FINALISTS, start=start, workers=workers
@@ -333,6 +306,34 @@ def search_orders(
         losses=losses, finalists=found, chosen_by=said, grid=grid, mapping=chosen, traces=traces, start=start,
         others=others, states=states,
     )  # fmt: skip
+
+
+def _searched(
+    estimation: tuple[Trace, ...], mapping: Mapping, asked: Dict[str, int | None], start: Start, workers: int
+) -> tuple[OrderGrid, OrderLosses]:
+    """The losses over the orders that were asked for, and over longer dead times where one plainly explains more."""
+    for name, largest in asked.items():
+        if largest is not None and not whole(largest):
+            raise ConfigError(
+                "not a largest order",
+                where=name,
+                expected="a whole number from 0 to 10,000",
+                got=shortened(largest),
+                remedy=f"write for example {name}=4",
+            )
+    max_na, max_nb, max_nk = asked.values()
+    feedback = feedback_of(estimation, mapping) if mapping.inputs and max_nk != 0 else ""
+    first = int(not isinstance(feedback, str) and feedback.at_once)
+    samples = sum(len(trace) for trace in estimation), max(len(trace) for trace in estimation)
+    grid = _grid(samples, len(mapping.inputs), (max_na, max_nb, max_nk), first)
+    losses = order_search.search_orders(estimation, mapping, grid, start=start, workers=workers)
+    late = _as_late(grid, estimation, mapping) if max_nk is None else grid
+    if late != grid:
+        later = order_search.search_orders(estimation, mapping, late, start=start, workers=workers)
+        if _least(later) < _least(losses):
+            grid = replace(late, min_nk=grid.min_nk)
+            losses = order_search.search_orders(estimation, mapping, grid, start=start, workers=workers)
+    return grid, losses
 
 
 def _grid(

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sysid.errors import TraceError, did_you_mean
+from sysid.errors import ConfigError, TraceError, did_you_mean
 from sysid.traces.channel import Channel
 from sysid.traces.trace import Trace
 
@@ -149,6 +149,21 @@ class TraceSet:
     def with_role(self, *roles: Role) -> tuple[Trace, ...]:
         """The traces that have one of these roles, in order."""
         return tuple(trace for trace in self.traces if self.roles[trace.name] in roles)
+
+    @property
+    def estimation(self) -> tuple[Trace, ...]:
+        """The traces that are fitted; :class:`ConfigError` where there are none."""
+        found = self.with_role(Role.ESTIMATION)
+        if not found:
+            raise ConfigError(
+                "no trace is for estimation",
+                where=f"data set {self.name}",
+                expected="a case with role: estimation",
+                got=", ".join(f"{name}: {role.value}" for name, role in self.roles.items()),
+                remedy="give a case that role in the data set's dataset.yaml, or from Python in the roles of its "
+                f"TraceSet: roles={{{self.names[0]!r}: Role.ESTIMATION}}",
+            )
+        return found
 
 
 def _share_samples(one: Trace, other: Trace) -> bool:

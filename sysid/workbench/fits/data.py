@@ -57,15 +57,7 @@ def data_of(traces: TraceSet, mapping: Mapping) -> Data:
         ChannelError: If a channel of the mapping is missing.
     """
     traces.traces[0].columns((*mapping.inputs, *mapping.outputs))
-    if not traces.with_role(Role.ESTIMATION):
-        raise ConfigError(
-            "no trace is for estimation",
-            where=f"data set {traces.name}",
-            expected="a case with role: estimation",
-            got=", ".join(f"{name}: {role.value}" for name, role in traces.roles.items()),
-            remedy="give a case that role in the data set's dataset.yaml, or from Python in the roles of its TraceSet: "
-            f"roles={{{next(iter(traces.roles))!r}: Role.ESTIMATION}}",
-        )
+    _ = traces.estimation  # refused where there is none
     return Data(traces=traces, selection=traces.with_role(Role.SELECTION))
 
 
