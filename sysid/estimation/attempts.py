@@ -20,7 +20,8 @@ class Attempt:
         selection_mse: Geometric mean over the selection traces; NaN without any.
         log_evidence: Minus infinity where none was computed.
         effective_parameters: Parameters that the data determine; NaN where the evidence was not computed.
-        stable: Whether its free run passed the check over random sequences; ``None`` where nobody asked.
+        stable: Whether its free run passed the check over random sequences, and what else was asked of it; ``None``
+            where nobody asked.
         chosen: Whether it is the result.
         members: Of an ensemble, the starts that it unites, once for each pick.
         without: Inputs that it does without.

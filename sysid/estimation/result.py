@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from sysid.estimation.networks.posterior import Posterior
 
 
+NOT_STABLE = "their free run is not stable"
+"""Why candidates are refused, as a rule."""
+
+
 class Status(enum.Enum):
     """How a fit ended; the value is the sentence that a person reads."""
 

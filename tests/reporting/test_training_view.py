@@ -64,7 +64,7 @@ def test_the_last_look_at_each_start_is_listed_best_first(results):
     table = attempts_table(results.fits[2])
     assert [row[0].text for row in table.rows] == ["3", "2", "1", "4"]
     assert [row[1].value for row in table.rows] == [10, 10, 40, 10]
-    assert [row[6].text for row in table.rows] == ["stable", "not stable", "not checked", "not checked"]
+    assert [row[6].text for row in table.rows] == ["stable", "refused", "not checked", "not checked"]
     assert table.rows[0][0].below == "seed 2, chosen"
     assert table.rows[3][3].text == "none"
 

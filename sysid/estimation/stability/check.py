@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError, shortened
 from sysid.estimation.clock import now
 from sysid.estimation.linear.arx import fit_arx
-from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.result import NOT_STABLE, FitResult, Loop, Status
 from sysid.estimation.stability.beginnings import TWICE, Beginnings
 from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability
@@ -61,6 +61,9 @@ class StabilityOptions(TypedFields):
             many sequences the verdict then rests is said. Infinity for no bound.
         amplitude: How many times as far from the middle of their range as in the estimation traces the inputs of
             excursions go; beyond 1 only whether a run stays bounded is judged.
+        also: What else a start has to pass to be chosen. It is no matter of what was found, and not among the terms:
+            who asks it has it in his keys.
+        unless: Why starts are refused that do not pass that, in words.
 
     Raises:
         ConfigError: If a number cannot be used.
@@ -74,6 +77,8 @@ class StabilityOptions(TypedFields):
     source: str = "Given traces."
     time_share: float = TIME_SHARE
     amplitude: float = 1.0
+    also: Vet | None = None
+    unless: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.sequences, Iterable):
@@ -226,6 +231,8 @@ class FreeRunCheck(AbstractStabilityCheck):
     estimation: tuple[Trace, ...] = ()
     found: dict[int, tuple[AbstractModel, Stability]] = field(default_factory=dict)
     """What was found, by the model's identity; the model is kept so that no other takes its place."""
+    reasons: set[str] = field(default_factory=set)
+    """Why candidates were refused."""
     clock: _Clock = field(default_factory=_Clock)
 
     @classmethod
@@ -256,10 +263,10 @@ class FreeRunCheck(AbstractStabilityCheck):
         Args:
             loop: In which loop it is trained.
         """
-        return self.passes if self.options.choose and loop is Loop.CLOSED else None
+        return self if self.options.choose and loop is Loop.CLOSED else None
 
-    def passes(self, model: AbstractModel) -> bool:
-        """Whether a model's free run is stable.
+    def __call__(self, model: AbstractModel) -> bool:
+        """Whether a model's free run is stable, and passes what else is asked.
 
         Args:
             model: The model.
@@ -267,8 +274,19 @@ class FreeRunCheck(AbstractStabilityCheck):
         Returns:
             The verdict; true where nothing is asked.
         """
+        if self.options.also is not None and not self.options.also(model):
+            self.reasons.add(self.options.unless)
+            return False
         found = self.finding(model)
-        return found is None or found.stable
+        if found is None or found.stable:
+            return True
+        self.reasons.add(NOT_STABLE)
+        return False
+
+    @property
+    def refusal(self) -> str:
+        """Why candidates were refused, in words."""
+        return ", or ".join(sorted(self.reasons)) or NOT_STABLE
 
     def applied(self, fit: FitResult) -> FitResult:
         """A fit with what the sequences found; the sentence is among its notes."""

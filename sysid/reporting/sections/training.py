@@ -206,7 +206,7 @@ def _attempt_row(attempt: AttemptRecord) -> tuple[Cell, ...]:
         origin += f", without {' and '.join(attempt.without)}"
     if attempt.members:
         name, origin = "ensemble", f"of starts {', '.join(map(str, attempt.members))}"
-    words = {None: "not checked", True: "stable", False: "not stable"}[attempt.stable]
+    words = {None: "not checked", True: "stable", False: "refused"}[attempt.stable]
     return (
         Cell(text=name, header=True, below=f"{origin}, chosen" if attempt.chosen else origin, mark=_mark(attempt)),
         Cell(text=str(attempt.iterations), value=attempt.iterations, below=f"{attempt.elapsed_s:.1f} s", mark="number"),

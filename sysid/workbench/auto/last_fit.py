@@ -71,7 +71,7 @@ class LastFit:
         apart = (
             "ensemble" in chosen.values
             or plan.scattered.get(chosen.number, 0.0) > SCATTER
-            or beyond.tells(error(chosen))
+            or beyond.is_lottery(error(chosen))
         )
         if self.parts.trained_on or not row.unites or not apart:
             return {}

@@ -23,8 +23,8 @@ from sysid.names import slug
 from sysid.reporting.sweep_record import FIGURES, SweepRecord
 from sysid.traces import TraceSet
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.found import FOUND, LINEAR
 from sysid.workbench.auto.run import Searched, auto_of, run_auto
-from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.table import told_of_fits

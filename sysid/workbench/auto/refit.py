@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from sysid.estimation import FitResult, Status
+from sysid.estimation.estimators import with_stability
 from sysid.estimation.tolerance import outside, spans_of
+from sysid.models import AbstractModel
 from sysid.traces import Role, Trace
 from sysid.validation import case_results
 from sysid.workbench.fits import steps
@@ -20,18 +22,23 @@ from sysid.workbench.sweep.checks import NEAR
 
 BETTER, KEPT = (
     "Fitted once more, to all of the record, after it was chosen on a part of it.",
-    "The fit that was chosen is kept: its structure fitted once more, to all of the record, is no better.",
+    "The fit that was chosen is kept: its structure fitted once more, to all of the record, {}.",
 )
 GONE_ON, ENOUGH = (
     "Trained on, with all that is fitted, from where its trial had ended.",
-    "The fit that was chosen is kept: trained on from where its trial had ended, it is no better.",
+    "The fit that was chosen is kept: trained on from where its trial had ended, it {}.",
 )
 """What is said where the last fit is taken, and where it is not."""
+NO_BETTER, STRANGE, LOST = "is no better", "stands alone on other commands", "is not stable"
+"""Why it is not, the worse the later."""
+STARTS_ALONE = "their free run stands alone on other commands"
+"""Why starts of it are refused."""
 
 
 def refitted(
     work: Work, fit: FitConfig, config: PipelineConfig, data: Data, *, chosen: FitResult,
     whole: Callable[[], FitResult], further: bool, tolerance: float | None = None,
+    alone: Callable[[AbstractModel], bool] = lambda _: False,
 ) -> FitResult:  # fmt: skip
     """Fit the chosen structure once more: to all estimation traces, or on from where its trial had ended.
 
@@ -46,21 +53,34 @@ def refitted(
             was for the better; else it is fitted anew, and all estimation traces do.
         tolerance: Share of each output's range: who stays within it over more of these traces is better, whatever the
             mean error; ``None`` where the error alone says so.
+        alone: Whether a model stands alone on other commands. No start is chosen that does where another does not.
 
     Returns:
-        The new fit, or the chosen one where that does better.
+        The new fit, or the chosen one where that does better, or is stable and not alone where no start of the new one
+        is.
     """
     watch = work.watch(getattr(fit.training_options(config.seed), "max_time_s", math.inf))
-    again = steps.fit_traces(fit, config, data, chosen if further else None, watch)
+    asked = replace(config.stability.options(data.sequences), also=lambda one: not alone(one), unless=STARTS_ALONE)
+    again = steps.fit_traces(fit, config, data, chosen if further else None, watch, stability=asked)
     judging = (data.selection if further else ()) or data.estimation
     taken, left = (GONE_ON, ENOUGH) if further else (BETTER, KEPT)
     ours, theirs = (_error(one, judging, config, tolerance) for one in (again, chosen))
-    led_back = _strays(chosen) and not _strays(again) and ours[1] <= (1.0 + NEAR) ** 2 * theirs[1]
-    better = again.status.comparable and (ours <= theirs or not np.isfinite(theirs[1]) or led_back)
-    found = again if better else whole()
+    now, before = (_standing(one, alone) for one in (again, chosen))
+    if now > before:  # a trial was checked over fewer sequences
+        before = _standing(with_stability(chosen, data.estimation, asked), alone)
+    led_back = now <= before and _strays(chosen) and not _strays(again) and ours[1] <= (1.0 + NEAR) ** 2 * theirs[1]
+    nearer = ours <= theirs or not np.isfinite(theirs[1]) or led_back
+    better = now <= before and again.status.comparable and nearer
+    why = (NO_BETTER, STRANGE, LOST)[now if now > before else 0]
+    found = again if better else with_stability(whole(), data.estimation, asked)
     # What was interrupted is made again by who goes on later, whichever of both is shown until then.
     status = again.status if again.status is Status.INTERRUPTED else found.status
-    return replace(found, status=status, notes=(*found.notes, taken if better else left))
+    return replace(found, status=status, notes=(*found.notes, taken if better else left.format(why)))
+
+
+def _standing(fit: FitResult, alone: Callable[[AbstractModel], bool]) -> int:
+    """0, or 1 where a fit stands alone, or 2 where it is not stable: its error on the record says little then."""
+    return 2 if fit.status is Status.UNSTABLE else int(alone(fit.model))
 
 
 def _strays(fit: FitResult) -> bool:

@@ -18,11 +18,12 @@ from sysid.models.store import structure_from_dict
 from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord, write_sweep
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.found import FOUND, Found
 from sysid.workbench.auto.look import is_suggested
 from sysid.workbench.auto.parts import FURTHER, LAST
 from sysid.workbench.auto.race import trains_on
 from sysid.workbench.auto.refit import refitted
-from sysid.workbench.auto.search import FOUND, TITLE, Found, Hire, Search, stand_in
+from sysid.workbench.auto.search import TITLE, Hire, Search, stand_in
 from sysid.workbench.auto.table import table_of_front
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.choice import Choice
@@ -188,25 +189,24 @@ def run_auto(
     return carry_out(done, folder, command=command, fresh=fresh, watchers=watchers)
 
 
-def warned(given: GivenFit, warning: str) -> GivenFit:
-    """A fit with a warning of the search that found it, which then stands wherever those of fits do, its card included.
+def warned(given: GivenFit, found: Found) -> GivenFit:
+    """A fit with the warning of the search that found it, which then stands wherever those of fits do, the card too.
 
     Args:
         given: The fit.
-        warning: The sentence; empty for none.
+        found: What came of the search.
 
     Returns:
         The fit.
     """
-    if not warning:
-        return given
 
     def made(fit: FitResult) -> FitResult:
-        return replace(fit, notes=(*fit.notes, warning), warnings=(warning, *fit.warnings))
+        warning = found.warning(fit.model)
+        return replace(fit, notes=(*fit.notes, warning), warnings=(warning, *fit.warnings)) if warning else fit
 
     bare = given.bare
     return GivenFit(
-        key=digest(strict({"fit": given.key, "warning": warning})),
+        key=digest(strict({"fit": given.key, **found.judged_by})),
         make=lambda work: made(given.make(work)),
         bare=None if bare is None else lambda: made(bare()),
     )
@@ -276,8 +276,9 @@ class _AutoSteps:
                 last = (parts.partial or further) and seconds[fit.name] > 0.0
                 if (parts.partial or further) and not last:
                     told.append(NO_TIME.format(fit.name, model.fit.structure.label))
-                fitted = self._again(model, made, loaded.value, further=further) if last else made
-                given[model.fit.name] = warned(fitted, found.warning) if fit.name == FOUND else fitted
+                judge = found if fit.name == FOUND else None
+                fitted = self._again(model, made, loaded.value, further=further, judge=judge) if last else made
+                given[model.fit.name] = fitted if judge is None else warned(fitted, judge)
         choice = Choice(name=FOUND, chosen_by=found.record.chosen_by)
         work = FitSteps(
             pipeline=pipeline, given=given, chosen=choice, page=self.auto.page, before_page=self.auto.before_page,
@@ -358,16 +359,18 @@ class _AutoSteps:
             options["max_time_s"] = round(seconds / len(found.fits[name]), 3)
         return FitConfig.model_validate({"name": name, "structure": dict(structure), "training": options or None})
 
-    def _again(self, model: FitModel, made: GivenFit, data: Data, *, further: bool) -> GivenFit:
+    def _again(self, model: FitModel, made: GivenFit, data: Data, *, further: bool, judge: Found | None) -> GivenFit:
         """A model that was chosen on parts of the record, or after few iterations, fitted once more."""
         how, tolerance = "further" if further else "again", self.config.tolerance
         key = {"chosen": made.key, how: steps.fit_key(model.fit, model.config, data, None), "tolerance": tolerance}
+        judged: dict[str, Any] = {} if judge is None else {"alone": judge.alone}
+        key |= {} if judge is None else judge.judged_by
 
         def make(work: Work) -> FitResult:
             whole = partial(made.make, work)
             return refitted(
                 work, model.fit, model.config, data, chosen=made.bare() if made.bare else whole(), whole=whole,
-                further=further, tolerance=tolerance,
+                further=further, tolerance=tolerance, **judged,
             )  # fmt: skip
 
         return GivenFit(key=digest(strict(key)), make=make)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.estimation.estimators import estimator_of
+from sysid.estimation import Status
 from sysid.models import ARX, AbstractStructure
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import SweepRecord, Trial
@@ -18,19 +16,19 @@ from sysid.workbench.auto.beyond import Beyond, look_beyond
 from sysid.workbench.auto.budget import FINAL, RACE, TRIAL, TRIAL_OF_MANY, Budget
 from sysid.workbench.auto.config import OBJECTIVES, AutoConfig
 from sysid.workbench.auto.finish import finish_s
-from sysid.workbench.auto.last_fit import LAST_FITS, LINEAR_LAST, RIPENING, LastFit, refit_share
+from sysid.workbench.auto.found import FOUND, LINEAR, Found
+from sysid.workbench.auto.last_fit import LastFit, refit_share
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
 from sysid.workbench.auto.plan import AGAIN, Plan
 from sysid.workbench.auto.race import Race, trains_on
 from sysid.workbench.auto.ripe import Ripening, young_told
 from sysid.workbench.auto.trials import Trials
-from sysid.workbench.auto.words import Choice, choose, sentence, shown_in
+from sysid.workbench.auto.words import Choice, choose, sentence
 from sysid.workbench.auto.worth import Rank, error, ranked_by
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
-from sysid.workbench.fits.fit_steps import GivenFit
 from sysid.workbench.runner import events
 from sysid.workbench.runner.run import Run
 from sysid.workbench.sweep.checks import Checks
@@ -39,8 +37,6 @@ from sysid.workbench.sweep.store import TRIALS, Clock, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers
 
-FOUND, LINEAR = "best found", "best linear"
-"""Names of the fits that a search hands to the pipeline."""
 TITLE = "Searching for a model"
 CHECKED = 50
 """Sequences over which a trial's free run is checked, or one for each second of the search where that is more: all of
@@ -58,67 +54,6 @@ def stand_in(config: AutoConfig) -> AbstractStructure:
     """
     m = len(config.mapping.inputs)
     return ARX(na=1, nb=(1,) * m, nk=(1,) * m)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Found:
-    """What the trials came to.
-
-    Args:
-        record: All of them.
-        shown: By the name of the fit: what was chosen, and the best linear model where that is another.
-        fits: Their fits, as they were made, one a model.
-        training: Their options.
-        parts: What was fitted and what chose.
-        kept: Share of the budget that is left to the last fit, at least.
-        ends_s: Seconds by the clock by which the last fit has to be over; infinite where iterations are counted.
-        slowed: Seconds by the clock that a second of training takes.
-        told: What a reader has to know.
-        warning: What the record does not show of what was chosen; empty where it shows enough.
-        hurried: Of that, that there was no search, as the time was up before structures were compared; empty elsewhere.
-        needs_s: Seconds that a search takes at least, where there was no time for one; 0 elsewhere.
-        done_now: Trials that this session has done itself.
-    """
-
-    record: SweepRecord
-    shown: Mapping[str, Trial]
-    fits: Mapping[str, list[GivenFit]]
-    training: Mapping[str, Mapping[str, Any]]
-    parts: Parts
-    kept: float
-    ends_s: float
-    slowed: float
-    told: tuple[str, ...]
-    warning: str
-    hurried: str
-    needs_s: float
-    done_now: int
-
-    def last_fits_s(self, spent_s: float, samples: int) -> dict[str, float]:
-        """How long each of the last fits may take, so that they end in time.
-
-        A linear fit is not cut short everywhere: it is done again only where what its trial took, over all samples,
-        leaves time enough. What was chosen has the rest.
-
-        Args:
-            spent_s: Seconds of the search so far.
-            samples: Of all that is fitted.
-
-        Returns:
-            By name seconds by the clock; 0 for what is kept as its trial has it.
-        """
-        if not math.isfinite(self.ends_s):
-            return dict.fromkeys(self.shown, math.inf)
-        left, found = LAST_FITS * (self.ends_s - spent_s), dict[str, float]()
-        more = samples / sum(len(trace) for trace in self.parts.folds[0].fitted) / len(self.parts.folds)
-        for name, trial in reversed(list(self.shown.items())):  # the linear one first, which is short
-            need = self.slowed * trial.cpu_s * more
-            share = left if name == FOUND else LINEAR_LAST * left
-            linear = estimator_of(structure_from_dict(trial.structure)).linear
-            enough = need <= share if linear else not share <= RIPENING * trial.iteration_s * more * self.slowed
-            found[name] = max(share, 0.0) if enough else 0.0
-            left -= min(need, found[name]) if linear else 0.0
-        return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -267,7 +202,10 @@ class Search:
         return Found(
             record=self._record(plan, choice, beyond, clock.total, raced, united=bool(united)),
             shown=shown,
-            fits={name: checks.given(trial) for name, trial in shown.items()},
+            fits={
+                name: (self._nearest(checks, trials, trial, beyond) if name == FOUND else checks).given(trial)
+                for name, trial in shown.items()
+            },
             training={
                 name: {**first.last[trial.number].training, **(united if name == FOUND else {})}
                 for name, trial in shown.items()
@@ -284,7 +222,8 @@ class Search:
                 *told.left_out(plan),
                 *(f"Look at the data: {one}" for one in self.looked.cautions),
             ),
-            warning=beyond.sentence(error(choice.chosen), partial(shown_in, self._unit)),
+            beyond=beyond,
+            unit=self._unit,
             hurried=hurried,
             needs_s=needs_s,
             done_now=trials.done_now,
@@ -319,6 +258,22 @@ class Search:
             plan.candidates, error, lambda one: [m for n in plan.starts_of(one) for m in trials.fitted(n)],
             self.data.estimation, sizes, seed=self.config.seed,
         )  # fmt: skip
+
+    def _nearest(self, checks: Checks, trials: Trials, trial: Trial, beyond: Beyond) -> Checks:
+        """Of the parts that a trial was fitted to, the stable one nearest to the middle of all on other commands.
+
+        Its fit is what is kept where no start of the last one is stable, or all of them stand alone.
+        """
+        if beyond.middle is None:
+            return checks
+        others = [
+            replace(checks, driver=trials.drivers[k], bench=self.bench.fold(k), found={})
+            for k in trials.folds_of(trial.number)
+            if k
+        ]
+        away = {one: beyond.middle.away([fit.model for fit in one.checked(trial)]) for one in (checks, *others)}
+        stable = [one for one in away if all(fit.status is not Status.UNSTABLE for fit in one.checked(trial))]
+        return min(stable, key=lambda one: away[one], default=checks)
 
     @property
     def _unit(self) -> str:

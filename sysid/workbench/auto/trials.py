@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from sysid.estimation import FitResult
 from sysid.models import AbstractModel
@@ -60,13 +61,21 @@ class Trials:
         Returns:
             For each fold on which it can be used its models: one of all outputs, or one an output.
         """
-        jobs = [(driver, driver.last[number]) for driver in self.drivers if number in driver.last]
-        stored = [driver.store.read(job.key) for driver, job in jobs]
+        stored = [_usable(number, driver) for driver in self.drivers]
         return [
-            [FitResult.from_dict(one["fit"]).model for one in stored_models(outcome)]
-            for outcome in stored
-            if outcome is not None and outcome["usable"]
+            [FitResult.from_dict(one["fit"]).model for one in stored_models(outcome)] for outcome in stored if outcome
         ]
+
+    def folds_of(self, number: int) -> list[int]:
+        """On which folds a point can be used.
+
+        Args:
+            number: Of the point.
+
+        Returns:
+            Their numbers, from 0 on.
+        """
+        return [k for k, driver in enumerate(self.drivers) if _usable(number, driver)]
 
     def run(self, points: Sequence[Point]) -> list[Trial]:
         """Try some points on every fold; what is far behind the best on the same folds is dropped on the way.
@@ -103,6 +112,12 @@ class Trials:
         error, told = by * _mean(done), f"scored on {len(done)} of {of} parts, against the best on the same"
         one = together(done, of=len(done))
         return one.model_copy(update={"selection_free_run_mse": error, "reason": f"{told}: the time was up"})
+
+
+def _usable(number: int, driver: Driver) -> Mapping[str, Any] | None:
+    """What came of a point on a fold; ``None`` where it was not tried, or cannot be used."""
+    outcome = driver.store.read(driver.last[number].key) if number in driver.last else None
+    return outcome if outcome is not None and outcome["usable"] else None
 
 
 def _mean(trials: Iterable[Trial]) -> float:

@@ -21,6 +21,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.grey_box.by_case import for_case
+from sysid.estimation.stability import StabilityOptions
 from sysid.estimation.tolerance import spans_of
 from sysid.export.exporters import wanted_formats
 from sysid.models import AbstractStructure, Cascade
@@ -132,6 +133,8 @@ def fit_traces(
     data: Data,
     initial: FitResult | None,
     on_progress: Callable[[FitProgress], None],
+    *,
+    stability: StabilityOptions | None = None,
 ) -> FitResult:
     """Fit one structure.
 
@@ -141,6 +144,7 @@ def fit_traces(
         data: The traces.
         initial: The fit that it starts from.
         on_progress: Called after every iteration, from the threads that train.
+        stability: How its free run is checked; as the pipeline says by default.
 
     Returns:
         The fit.
@@ -158,7 +162,7 @@ def fit_traces(
         rest_output=config.rest_output,
         selection=data.selection,
         initial=initial,
-        stability=config.stability.options(data.sequences),
+        stability=stability or config.stability.options(data.sequences),
         on_progress=on_progress,
     )
 

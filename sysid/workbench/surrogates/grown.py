@@ -15,8 +15,8 @@ from sysid.references.config import ReferenceConfig
 from sysid.reporting.growth import FILE
 from sysid.reporting.records import write_record
 from sysid.reporting.results import Results
+from sysid.workbench.auto.found import FOUND
 from sysid.workbench.auto.run import Searched
-from sysid.workbench.auto.search import FOUND
 from sysid.workbench.experiments.config import ExperimentConfig, GrowConfig
 from sysid.workbench.experiments.run import Experimented, write_dataset
 from sysid.workbench.fits.choice import Choice

@@ -64,7 +64,7 @@ class Checks:
             asks = self.bench.stability.choose and self._stored(trial)[0].loop is Loop.CLOSED
             if not asks:
                 return trial, refused
-            if all(fit.status is not Status.UNSTABLE for fit in self._checked(trial)):
+            if all(fit.status is not Status.UNSTABLE for fit in self.checked(trial)):
                 return self._that_forgets(ranked[refused:VETTED]), refused
         return ranked[0], 0
 
@@ -75,7 +75,7 @@ class Checks:
         for trial in ranked:
             if not (trial.selection_free_run_mse or math.inf) <= limit:
                 continue
-            fits = self._checked(trial)
+            fits = self.checked(trial)
             if all(fit.status is not Status.UNSTABLE and not (fit.stability or {}).get("apart") for fit in fits):
                 return trial
         return first
@@ -94,11 +94,11 @@ class Checks:
         count = len(self._stored(trial))
 
         def make(number: int, _: Work) -> FitResult:
-            fit = self._whole(trial, self._checked(trial), number)
+            fit = self._whole(trial, self.checked(trial), number)
             return replace(fit, train_time_s=float(trial.seconds) / count)
 
         def bare(number: int) -> FitResult:
-            return replace(self._checked(trial)[number], train_time_s=float(trial.seconds) / count)
+            return replace(self.checked(trial)[number], train_time_s=float(trial.seconds) / count)
 
         keys = [digest(strict(terms if count == 1 else {**terms, "model": number})) for number in range(count)]
         return [
@@ -119,8 +119,15 @@ class Checks:
             )
         return outcome
 
-    def _checked(self, trial: Trial) -> list[FitResult]:
-        """The trial's fits with what their check found, from the disk where it was made before."""
+    def checked(self, trial: Trial) -> list[FitResult]:
+        """The trial's fits with what their check found, from the disk where it was made before.
+
+        Args:
+            trial: The trial.
+
+        Returns:
+            One fit, or one an output.
+        """
         if trial.number not in self.found:
             store = TrialStore(path=self.driver.store.path / FOLDER)
             terms = {

@@ -9,6 +9,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
+from sysid.estimation.result import NOT_STABLE
 from sysid.estimation.stability import FreeRunCheck, PoleCheck, StabilityOptions, check_stability
 from sysid.estimation.stability.sequences import InputSequence
 from sysid.models import ARX, ARXModel, Mapping
@@ -74,15 +75,27 @@ def test_an_interrupted_fit_stays_interrupted_so_that_it_is_done_again():
 def test_each_model_is_run_once():
     one = check()
     first, again = model(), model(1.05)
-    assert (one.passes(first), one.passes(first), one.passes(again)) == (True, True, False)
+    assert (one(first), one(first), one(again)) == (True, True, False)
     assert len(one.found) == 2
     assert one.applied(fit(again)).status is Status.UNSTABLE
     assert len(one.found) == 2
 
 
+def test_candidates_are_asked_what_else_is_wanted_of_them_and_the_fit_is_not_called_unstable_for_it():
+    slow = model(0.95)
+    one = check(also=lambda candidate: candidate is not slow, unless="they are slow")
+    assert one.refusal == NOT_STABLE
+    assert (one(model()), one(slow)) == (True, False)
+    assert one.refusal == "they are slow"
+    assert not one(model(1.05))
+    assert one.refusal == f"their free run is not stable, or {one.options.unless}"
+    assert one.applied(fit(slow)).status is Status.CONVERGED
+    assert "also" not in one.options.terms
+
+
 def test_a_count_of_zero_asks_nothing():
     nothing = FreeRunCheck.of(StabilityOptions(count=0), MAPPING, [trace()])
-    assert nothing.passes(model(1.05))
+    assert nothing(model(1.05))
     assert nothing.applied(fit(model(1.05))).stability is None
 
 
@@ -197,8 +210,8 @@ def runaway(sequence: InputSequence) -> np.ndarray:
 def test_a_run_can_be_asked_for_more_than_was_recorded():
     further = check(amplitude=1.5)
     assert check().finding(runaway).unbounded == 0
-    assert not further.passes(runaway)
-    assert further.passes(model())
+    assert not further(runaway)
+    assert further(model())
     assert "inputs 1.5 times as far from their middle" in further.finding(model()).source
     with pytest.raises(ConfigError, match="amplitude"):
         StabilityOptions(amplitude=0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,6 +97,50 @@ def test_a_run_that_is_lost_is_far_away_and_bounded() -> None:
     only = looked({1: ALIKE, 2: [1.5] * 3}, TRIALS)
     assert math.isfinite(only.of(TRIALS[1]))
     assert only.of(TRIALS[1]) > 1.0
+
+
+def test_a_model_that_is_fitted_later_stands_alone_where_those_before_do_not_go() -> None:
+    found = looked({1: [0.79, 0.8, 0.81], 2: [0.78, 0.8, 0.82]}, TRIALS)
+    least = found.spread
+    assert not found.alone(model(0.8), least)
+    assert not found.alone(model(0.79), least)
+    assert found.alone(model(0.99), least)
+    assert not found.alone(model(0.99), 10.0)  # within what its error lets expect
+    assert not Beyond().alone(model(0.99), 0.0)
+
+
+def test_one_that_stands_alone_is_told_though_all_others_are_near_each_other() -> None:
+    found = looked({1: [0.79, 0.8, 0.81], 2: [0.78, 0.8, 0.82]}, TRIALS)
+    assert not found.tells(found.spread)
+    assert found.sentence_of(model(0.8), found.spread, str) == ""
+    assert found.middle is not None
+    own = math.sqrt(found.middle.away([model(0.99)]))
+    said = found.sentence_of(model(0.99), found.spread, lambda value: shown_in("V", value))
+    assert said.startswith("Not shown by the record: on other commands")
+    assert f"this one is {shown_in('V', own)} (root mean square) from the middle of 6 models" in said
+    # what is told of all of them is not told twice
+    assert found.sentence_of(model(0.99), 0.0, str) == found.sentence(0.0, str) != ""
+
+
+def test_models_of_one_output_each_are_compared_with_their_own_column() -> None:
+    u = RECORD["u"]
+    channels = (*CHANNELS, Channel(name="z", unit="V"))
+    record = Trace(name="steps", sample_time=1.0, channels=channels, values=np.column_stack([u, u, u]))
+
+    def both(pole: float, other: float) -> list[ARXModel]:
+        return [model(pole), replace(model(other), mapping=Mapping.parse("u -> z"))]
+
+    poles = [(0.79, 0.2), (0.8, 0.3), (0.81, 0.4)]
+    found = look_beyond(TRIALS, error, lambda _: [both(*one) for one in poles], [record], [1.0, 1.0], seed=0)
+    first, second = both(0.3, 0.3)
+    assert found.alone(first, 0.0)
+    assert not found.alone(second, 0.0)
+
+
+def test_what_a_verdict_depends_on_is_in_its_digest() -> None:
+    one, same, other = (looked({1: [0.7, 0.8, last], 2: [0.9] * 3}, TRIALS) for last in (0.81, 0.81, 0.85))
+    assert one.digest == same.digest != other.digest
+    assert Beyond().digest == ""
 
 
 @pytest.mark.parametrize("count", [1, FEWEST // 2 - 1])

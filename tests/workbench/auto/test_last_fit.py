@@ -11,7 +11,7 @@ import pytest
 
 from sysid.models import NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.beyond import TOLD, Beyond
+from sysid.workbench.auto.beyond import LOTTERY, Beyond
 from sysid.workbench.auto.budget import REFIT, price
 from sysid.workbench.auto.last_fit import LEAST_LAST, SCATTER, SURE, LastFit
 from sysid.workbench.auto.parts import ENSEMBLE, UNITED
@@ -46,8 +46,8 @@ def test_what_is_apart_on_other_commands_is_united_too() -> None:
     """Starts that meet the parts of a record alike may still differ where it shows nothing."""
     last, plan, one = seen(iteration_s=0.03, ends_s=1e9)
     plan.scattered = {7: 0.0}
-    assert last.united(plan, one, 100.0, Beyond(models=8, spread=0.9 * TOLD**2)) == {}
-    assert last.united(plan, one, 100.0, Beyond(models=8, spread=1.1 * TOLD**2)) == UNITED
+    assert last.united(plan, one, 100.0, Beyond(models=8, spread=0.9 * LOTTERY**2)) == {}
+    assert last.united(plan, one, 100.0, Beyond(models=8, spread=1.1 * LOTTERY**2)) == UNITED
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import signal
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,9 @@ from sysid.traces import Role
 from sysid.workbench.auto import run
 from sysid.workbench.auto.budget import Budget
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.refit import ENOUGH, GONE_ON, _error
+from sysid.workbench.auto.found import FOUND, LINEAR
+from sysid.workbench.auto.refit import ENOUGH, GONE_ON, NO_BETTER, _error
 from sysid.workbench.auto.run import Searched, auto_of, hire, run_auto, warned
-from sysid.workbench.auto.search import FOUND, LINEAR
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
@@ -127,7 +128,7 @@ def test_where_selection_traces_chose_it_is_trained_on_and_they_say_whether_for_
     found = searched(tmp_path, known, iterations=200)
     best, tried_with = found.results.fits[0], found.record.winning
     assert tried_with is not None
-    assert any(note in {GONE_ON, ENOUGH} for note in best.notes)
+    assert any(note in {GONE_ON, ENOUGH.format(NO_BETTER)} for note in best.notes)
     assert best.cases["b"].free_run.mse <= tried_with.selection_free_run_mse
     # The two networks were trained on side by side first; what that came to is found like any trial.
     assert "the 2 best networks trained on side by side" in found.record.chosen_by
@@ -337,13 +338,14 @@ def test_the_last_fits_end_in_time(
         looks[0] += 1
         return a_look * looks[0]
 
-    def fitted(fit: FitConfig, *given: Any) -> Any:
+    def fitted(fit: FitConfig, *given: Any, **named: Any) -> Any:
         limits[fit.name] = getattr(fit.training_options(0), "max_time_s", 0.0)  # ARX has none: it is computed at once
-        return whole(fit, *given)
+        return whole(fit, *given, **named)
 
     whole = steps.fit_traces
     monkeypatch.setattr(Clock, "session", property(session))
     monkeypatch.setattr(Budget, "_busy", 1.0)  # what this machine does meanwhile has no place by such a clock
+    monkeypatch.setattr("sysid.workbench.auto.finish.pace", lambda: 1.0)
     monkeypatch.setattr(steps, "fit_traces", fitted)
     found = searched(tmp_path, known, iterations=None, minutes=1.0)
     spent = TrialStore(path=tmp_path / "trials").seconds
@@ -357,10 +359,12 @@ def test_what_a_search_warns_of_stands_with_the_fit_however_it_is_given() -> Non
     """Its notes go into the model card, its warnings into the verdict of the report."""
     fit = sysid.fit(traces(record("one", 100)), "u -> y", sysid.ARX(na=1, nb=[1], nk=[1]))
     given = GivenFit(key="one", make=lambda _: fit, bare=lambda: fit)
-    assert warned(given, "") is given
-    found = warned(given, "Look here.")
+    searched_for: Any = SimpleNamespace(warning=lambda _: "Look here.", judged_by={"beyond": "models"})
+    nothing: Any = SimpleNamespace(warning=lambda _: "", judged_by={})
+    assert warned(given, nothing).make(lambda _: None) == fit
+    found = warned(given, searched_for)
     assert found.key != given.key
     assert found.bare is not None
     for one in (found.make(lambda _: None), found.bare()):
         assert (one.notes[-1], one.warnings[0]) == ("Look here.", "Look here.")
-    assert warned(replace(given, bare=None), "Look here.").bare is None
+    assert warned(replace(given, bare=None), searched_for).bare is None

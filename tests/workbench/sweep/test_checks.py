@@ -21,7 +21,7 @@ def checks(monkeypatch: pytest.MonkeyPatch, found: list[tuple[Status, int]]) -> 
         for status, apart in found
     ]
     monkeypatch.setattr(Checks, "_stored", lambda _, trial: [fits[trial.number]])
-    monkeypatch.setattr(Checks, "_checked", lambda _, trial: [fits[trial.number]])
+    monkeypatch.setattr(Checks, "checked", lambda _, trial: [fits[trial.number]])
     return one
 
 
@@ -73,7 +73,7 @@ def test_a_trial_that_saw_pieces_is_checked_over_the_whole_record(
     driver: Any = SimpleNamespace(last={1: SimpleNamespace(key="k")}, store=SimpleNamespace(path=tmp_path))
     one: Any = SimpleNamespace(number=1)
     record: Any = SimpleNamespace(digest="d")
-    Checks(driver=driver, bench=bench)._checked(one)
+    Checks(driver=driver, bench=bench).checked(one)
     assert asked == []  # as the trial was
-    Checks(driver=driver, bench=bench, whole=[record])._checked(one)
+    Checks(driver=driver, bench=bench, whole=[record]).checked(one)
     assert asked == [[record]]

@@ -38,7 +38,7 @@ from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.posterior import Posterior, laplace
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.advancing import judged
-from sysid.estimation.networks.starts.choosing import Choice, choose, rank
+from sysid.estimation.networks.starts.choosing import Choice, choose, rank, refusal
 from sysid.models import NeuralEnsemble, NeuralStateSpaceModel, VectorNeuralStateSpaceModel, beginning
 from sysid.models.neural_sizes import Sizes
 from sysid.traces import Trace
@@ -87,7 +87,7 @@ class United:
         candidate: It.
         members: Whom it unites, the first pick first.
         left_out: Starts that stand alone, or far behind.
-        unstable: Starts whose own free run is not stable.
+        unstable: Starts that were refused, as a rule as their own free run is not stable.
         elected: Whether selection traces found it, and tell what it is worth; it is asked for, and taken, elsewhere.
     """
 
@@ -117,7 +117,8 @@ class United:
         if stable is False:
             found = choose(candidates, by, vet)
             return replace(found, stable=(*found.stable, False))
-        return Choice(chosen=self.candidate, stable=(*(None for _ in candidates), stable), by=by)
+        looked = (*(None for _ in candidates), stable)
+        return Choice(chosen=self.candidate, stable=looked, by=by, refusal=refusal(vet))
 
     def notes(self, choice: Choice) -> tuple[str, ...]:
         """What is said of it.
@@ -130,11 +131,13 @@ class United:
         """
         n = len(self.members)
         if choice.chosen is not self.candidate:
-            why = "its free run is not stable" if choice.stable[-1] is False else "a single start does as well"
+            why = (
+                choice.refusal.replace("their", "its") if choice.stable[-1] is False else "a single start does as well"
+            )
             return (f"The ensemble of {n} starts was not taken: {why}.",)
         price = f"it has {n} times the states and parameters of one"
         left = _left_out("they stand alone or far behind", self.left_out)
-        left += _left_out("their own free run is not stable", self.unstable)
+        left += _left_out(choice.refusal.replace("their", "their own"), self.unstable)
         return (f"An ensemble: the mean of {n} free runs as one model; {price}.{left}",)
 
     def posterior(self, runs: Sequence[Experiment], unread: NDArray[np.int64]) -> Posterior | None:

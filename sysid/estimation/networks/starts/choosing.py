@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid.estimation.networks.starts.multistart import Candidate, Network
+from sysid.estimation.result import NOT_STABLE
 
 
 def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, float]:
@@ -38,6 +39,18 @@ LOOKS = 2
 """Of them how many may be looks at the same start: what runs away at one look mostly does at the next."""
 
 
+def refusal(vet: Callable[[Network], bool] | None) -> str:
+    """Why candidates were refused, in words.
+
+    Args:
+        vet: Who asked; a check of the free run has it in its ``refusal``.
+
+    Returns:
+        To follow "as" or a colon.
+    """
+    return str(getattr(vet, "refusal", NOT_STABLE))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Choice:
     """Which candidate was chosen.
@@ -46,11 +59,13 @@ class Choice:
         chosen: The candidate.
         stable: Of each candidate, whether its free run was found stable; ``None`` where it was not looked at.
         by: As for :func:`rank`.
+        refusal: Why some were refused, in words.
     """
 
     chosen: Candidate
     stable: tuple[bool | None, ...]
     by: str
+    refusal: str = NOT_STABLE
 
 
 def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Network], bool] | None = None) -> Choice:
@@ -72,7 +87,8 @@ def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Netwo
             if found[i]:
                 break
     chosen = next((i for i, stable in found.items() if stable), order[0])
-    return Choice(chosen=candidates[chosen], stable=tuple(found.get(i) for i in range(len(candidates))), by=choose_by)
+    stable = tuple(found.get(i) for i in range(len(candidates)))
+    return Choice(chosen=candidates[chosen], stable=stable, by=choose_by, refusal=refusal(vet))
 
 
 def _few_of_each(candidates: Sequence[Candidate], order: Sequence[int]) -> list[int]:

@@ -184,5 +184,5 @@ def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Tra
         )
     refused = sum(stable is False for stable in choice.stable)
     if refused and any(choice.stable):
-        notes.append(f"{refused} that ranked higher were passed over: their free run is not stable.")
+        notes.append(f"{refused} that ranked higher were passed over: {choice.refusal}.")
     return tuple(notes)
