@@ -102,7 +102,8 @@ def description(ready: FitReady, run: RunStarted, links: Mapping[str, str]) -> s
     leads = [f"[{markdown_inline(words)}]({address})" for words, address in links.items()]
     name, pipeline = markdown_inline(ready.config.name.strip()), markdown_code(run.pipeline)
     lines = [" · ".join([f"**{name}** of the pipeline {pipeline}", *leads]), ""]
-    lines += [ready.fit.status.value, "", *(f"* {markdown_inline(note)}" for note in ready.fit.notes)]
+    told = dict.fromkeys((*ready.fit.warnings, *ready.fit.notes))  # a warning is a note, too, and stands first
+    lines += [ready.fit.status.value, "", *(f"* {markdown_inline(note)}" for note in told)]
     return "\n".join([*lines, "", f"Made by {markdown_code(run.command)}."])
 
 

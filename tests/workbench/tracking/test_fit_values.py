@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import pytest
 
+from sysid.estimation import Status
 from sysid.reporting.sections.fit_tables import DRAWN
 from sysid.traces import Role
 from sysid.workbench.tracking import fit_values
@@ -38,3 +39,15 @@ def test_pictures_are_tracked_of_as_many_cases_as_the_report_draws_those_that_te
     monkeypatch.setattr(fit_values, "_picture", lambda _, case: case.role)
     pictures = dict(fit_values.pictures(cast("Any", many_cases(3))))
     assert pictures == dict.fromkeys([f"target and output/{name}" for name in tests[:3]], Role.TEST)
+
+
+def test_what_is_warned_of_stands_first_and_once_in_what_a_run_says() -> None:
+    """MLflow shows the first few lines and hides the rest."""
+    fit = SimpleNamespace(
+        status=Status.CONVERGED, notes=("Chosen by evidence.", "Not shown by the record."),
+        warnings=("Not shown by the record.",),
+    )  # fmt: skip
+    ready: Any = SimpleNamespace(fit=fit, config=SimpleNamespace(name="best found"))
+    run: Any = SimpleNamespace(pipeline="search", command="sysid auto rig.csv")
+    told = [line for line in fit_values.description(ready, run, {}).splitlines() if line.startswith("* ")]
+    assert told == ["* Not shown by the record.", "* Chosen by evidence."]
