@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,6 +78,10 @@ class Evidence:
         """Sum over the groups."""
         return float(sum(self.effective_parameters.values()))
 
+    def to_dict(self) -> dict[str, Any]:
+        """The evidence as JSON values."""
+        return asdict(self)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FitResult:
@@ -117,7 +121,6 @@ class FitResult:
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON values, without the posterior."""
-        evidence = self.evidence
         return {
             "model": self.model.to_dict(),
             "status": self.status.name,
@@ -125,16 +128,7 @@ class FitResult:
             "history": {name: np.asarray(column).tolist() for name, column in self.history.items()},
             "train_time_s": self.train_time_s,
             "seed": self.seed,
-            "evidence": None
-            if evidence is None
-            else {
-                "log_evidence": evidence.log_evidence,
-                "beta": evidence.beta,
-                "alphas": dict(evidence.alphas),
-                "effective_parameters": dict(evidence.effective_parameters),
-                "parameters": dict(evidence.parameters),
-                "correlation_time": evidence.correlation_time,
-            },
+            "evidence": None if self.evidence is None else self.evidence.to_dict(),
             "uncertainty": None if self.uncertainty is None else self.uncertainty.to_dict(),
             "attempts": [attempt.to_dict() for attempt in self.attempts],
             "stability": None if self.stability is None else dict(self.stability),
@@ -154,15 +148,29 @@ class FitResult:
         """
         return cls(
             model=model_from_dict(fields["model"]),
-            status=Status[fields["status"]],
             loop=Loop(fields["loop"]),
-            history={name: np.asarray(column, dtype=np.float64) for name, column in fields["history"].items()},
-            train_time_s=fields["train_time_s"],
-            seed=fields["seed"],
-            evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
-            uncertainty=None if fields.get("uncertainty") is None else Uncertainty.from_dict(fields["uncertainty"]),
-            attempts=tuple(Attempt.from_dict(attempt) for attempt in fields.get("attempts", ())),
             stability=fields.get("stability"),
-            notes=tuple(fields["notes"]),
-            warnings=tuple(fields.get("warnings", ())),
+            **common_fields(fields),
         )
+
+
+def common_fields(fields: Dict[str, Any]) -> dict[str, Any]:
+    """What results of one model and of several have in common, as their ``to_dict`` wrote it.
+
+    Args:
+        fields: What it wrote.
+
+    Returns:
+        The fields of the result.
+    """
+    return {
+        "status": Status[fields["status"]],
+        "history": {name: np.asarray(column, dtype=np.float64) for name, column in fields["history"].items()},
+        "train_time_s": fields["train_time_s"],
+        "seed": fields["seed"],
+        "evidence": None if fields["evidence"] is None else Evidence(**fields["evidence"]),
+        "uncertainty": None if fields.get("uncertainty") is None else Uncertainty.from_dict(fields["uncertainty"]),
+        "attempts": tuple(Attempt.from_dict(attempt) for attempt in fields.get("attempts", ())),
+        "notes": tuple(fields["notes"]),
+        "warnings": tuple(fields.get("warnings", ())),
+    }

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.attempts import Attempt
 from sysid.estimation.least_squares.levenberg_marquardt import Solution
-from sysid.estimation.result import Evidence, Status
+from sysid.estimation.result import Evidence, Status, common_fields
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import Cascade, cascade_from_dict
 
@@ -65,9 +65,7 @@ class CascadeFit:
             "history": {name: column.tolist() for name, column in self.history.items()},
             "train_time_s": self.train_time_s,
             "seed": self.seed,
-            "evidence": None
-            if self.evidence is None
-            else {name: getattr(self.evidence, name) for name in Evidence.__dataclass_fields__},
+            "evidence": None if self.evidence is None else self.evidence.to_dict(),
             "notes": list(self.notes),
             "attempts": [attempt.to_dict() for attempt in self.attempts],
             **({} if self.uncertainty is None else {"uncertainty": self.uncertainty.to_dict()}),
@@ -84,16 +82,5 @@ class CascadeFit:
         Returns:
             The result.
         """
-        return cls(
-            model=cascade_from_dict(fields["model"]),
-            status=Status[fields["status"]],
-            errors=dict(fields["errors"]),
-            history={name: np.asarray(column, dtype=np.float64) for name, column in fields["history"].items()},
-            train_time_s=fields["train_time_s"],
-            seed=fields["seed"],
-            evidence=None if fields["evidence"] is None else Evidence(**fields["evidence"]),
-            notes=tuple(fields["notes"]),
-            attempts=tuple(Attempt.from_dict(attempt) for attempt in fields.get("attempts", ())),
-            uncertainty=Uncertainty.from_dict(fields["uncertainty"]) if "uncertainty" in fields else None,
-            warnings=tuple(fields.get("warnings", ())),
-        )
+        model, errors = cascade_from_dict(fields["model"]), dict(fields["errors"])
+        return cls(model=model, errors=errors, **common_fields(fields))
