@@ -81,6 +81,7 @@ RECORDS = [
 ]  # fmt: skip
 
 FILES = [
+    Bad(id="a folder", command="ingest datasets/rig --propose datasets/new.yaml", says=("datasets/rig", "a folder is no record", "name one of its files")),
     Bad(id="a file that is not there", command="ingest no.csv", says=("no.csv", "there is no such file", "check the path")),
     Bad(id="a folder instead of a file", command="ingest datasets", says=("datasets", "a folder", "remedy")),
     Bad(id="an ending without a reader", command="ingest a.docx", files={"a.docx": "x"}, says=("a.docx", ".csv", "remedy")),

@@ -39,6 +39,9 @@ def bode_figure(found: Bode) -> Figure:
         axes = figure.subplots(2, len(found.names), sharex=True, squeeze=False)
         for j, (name, (y, u)) in enumerate(zip(found.names, found.units, strict=True)):
             above, below = axes[0, j], axes[1, j]
+            if not gain[:, j].any():  # no logarithm has it
+                above.text(0.5, 0.5, f"{name}: no effect in the model", ha="center", transform=above.transAxes)
+                continue
             if np.isfinite(found.gain_low[:, j]).any():
                 above.fill_between(w, found.gain_low[:, j], found.gain_high[:, j], color=BAND_COLOUR, label="95 %")
                 below.fill_between(w, found.phase_low[:, j], found.phase_high[:, j], color=BAND_COLOUR)

@@ -100,6 +100,8 @@ def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, w
     look = {"color": PALETTE[number % len(PALETTE)], "linestyle": DASHES[number % len(DASHES)]}
     for view in views:
         response = view.responses(w)[0]
+        if not response.any():  # an input that does nothing in the model
+            continue
         above.loglog(w, np.abs(response), label=fit.model.label, **look)
         phase = np.degrees(np.unwrap(np.angle(response)))
         measured = np.degrees(found.phase[np.isfinite(found.phase[:, 0]), 0]) if len(found.phase) else phase

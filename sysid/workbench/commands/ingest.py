@@ -81,6 +81,15 @@ def _is_name(path: Path) -> bool:
 
 def _no_such(path: Path) -> ConfigError:
     folder = path.parent
+    if path.is_dir():
+        files = sorted(one.name for one in path.iterdir() if one.is_file()) or ["no file"]
+        return ConfigError(
+            "a folder is no record",
+            where=path,
+            expected="a file with traces, the name of a data set, or its dataset.yaml",
+            got=f"a folder with {', '.join(files[:3])}{' ...' * (len(files) > 3)}",
+            remedy="name one of its files; the others are further cases of the dataset.yaml that --propose writes",
+        )
     near = nearest_file(path, _PATHS)
     return ConfigError(
         "there is no such file",

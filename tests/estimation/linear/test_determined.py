@@ -58,6 +58,7 @@ def test_an_input_that_says_nothing_has_no_effect_and_no_interval(kind: str, how
     assert not found.values[:, 1].any() and np.isnan(found.low[:, 1]).all() and np.isnan(found.gain_low[1])
     assert "v: no effect" in str(found)
     assert np.isnan(both.bode().gain_low[:, 1]).all()
+    assert both.bode().plot() and found.plot() and both.poles().plot()  # a warning of the picture's is an error here
 
 
 @pytest.mark.parametrize("kind", ONE)
