@@ -77,9 +77,12 @@ class Fit(FitResult, AbstractFit):
         history = self._history(inputs, initial)
         run = self.model.simulate(inputs, history)
         if history is not None and len(history.output) == 1 and not isinstance(initial, History):
-            rests = History.at_rest(inputs=history.inputs[0], output=self.model.resting)
-            other = not np.array_equal(history.output[0], self.model.resting)
-            if other and np.array_equal(run, self.model.simulate(inputs, rests)):
+            level, resting = history.output[0], self.model.resting
+            # What the model rests at is no other level: whether it heeds one, one that is shows.
+            same = np.array_equal(level, resting)
+            other = History.at_rest(inputs=history.inputs[0], output=level + 1.0 if same else resting)
+            begun = same and np.allclose(run[0], level)
+            if not begun and np.array_equal(run, self.model.simulate(inputs, other)):
                 raise unheeded(shortened(initial), model=self.model.label)
         return run
 

@@ -320,9 +320,12 @@ class Surrogate:
         declared = self.chosen(self.rest(inputs[0])[np.newaxis])[0]
         moved = np.array([initial.get(name, level) for name, level in zip(names, declared, strict=True)])
         run = self.compute(inputs, self.rest(inputs[0], moved))
-        for at in np.flatnonzero(moved != declared):
-            kept = np.where(np.arange(len(names)) == at, declared, moved)
-            if np.array_equal(self.compute(inputs, self.rest(inputs[0], kept)), run):
+        for at in [names.index(name) for name in initial]:
+            # The declared level is no other one: whether the models heed one, one that is shows.
+            same = bool(moved[at] == declared[at])
+            kept = np.where(np.arange(len(names)) == at, declared + same, moved)
+            begun = same and np.isclose(self.chosen(run)[0, at], moved[at])
+            if not begun and np.array_equal(self.compute(inputs, self.rest(inputs[0], kept)), run):
                 raise unheeded(f"{names[at]} = {moved[at]:g}", model=self.label)
         return run
 

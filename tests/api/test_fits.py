@@ -355,3 +355,20 @@ def test_orders_and_lengths_are_whole_numbers(fit: sysid.Fit) -> None:
             sysid.search_orders(fit.traces, "u -> y", max_na=given)
     with pytest.raises(ConfigError, match="not a length"):
         sysid.impulse_response(fit.traces, "u -> y", lags="5")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("first", [0.0, 1.0])
+def test_a_level_that_a_model_happens_to_rest_at_is_no_level_to_begin_at(first: float, tmp_path: Path) -> None:
+    """A transfer function begins where its inputs hold it: the output of the record's first sample did nothing."""
+    u = U + 0.5
+    traces = sysid.data((u, lag(u, first)), sample_time=0.1)
+    found = sysid.fit(traces, "u -> y", sysid.OE(nb=1, nf=1, nk=1))
+    assert found.model.resting == first
+    bundle = found.save(tmp_path, formats=("c",))
+    for one in (found, bundle):
+        with pytest.raises(ConfigError, match="says nothing"):
+            one.simulate(u, initial=first)
+        held = np.full(len(u), first)
+        assert_allclose(one.simulate(held, initial=first), held, atol=1e-6)
+    arx = sysid.fit(traces, "u -> y", ORDERS)
+    assert_allclose(arx.simulate(u, initial=first)[0], 0.8 * first + 0.1, atol=1e-9)
