@@ -3,7 +3,8 @@
 Run with ``python -m tests.benchmarks surrogates --minutes=5 --only=thermal,cylinder --workers=2``. References are slow
 models of the tests (a stiff thermal network of 200 states, a hydraulic cylinder with friction and end stops, a motor on
 a spindle between stops, a basin that runs over and runs dry, a block that sticks and slips behind a spring, a tank
-whose valve sticks), which can be compiled
+whose valve sticks, and those of ``tests/references/loop_models.py``: gears with backlash, heaters whose controllers are
+at their limits, hidden thermostats), which can be compiled
 (``--compiled=yes``), to the same numbers and so fast that the proof has 1,000 experiments in any time, while the
 surrogate's speed is held against two runs of the model as it is written; and, where the folder of the environment
 variable ``REFERENCE_FMUS`` holds them, the Modelica Association's VanDerPol, Dahlquist and BouncingBall
@@ -16,6 +17,7 @@ mean square of the free run), and 100 times the reference's speed on the thermal
 
 from __future__ import annotations
 
+import importlib
 import os
 import sys
 import tempfile
@@ -36,6 +38,8 @@ from sysid.workbench.surrogates.plan import written
 from sysid.yaml_files import read_yaml
 
 MODELS = Path(__file__).parents[1] / "references"
+sys.path.insert(0, str(MODELS))
+loop_models = importlib.import_module("loop_models")  # as the processes that run a reference know it
 MINUTES = 5.0
 RUNS = {"estimation": 12, "selection": 4, "test": 4}
 MORE = {"estimation": 24, "selection": 8, "test": 4}
@@ -98,6 +102,13 @@ PYTHON: dict[str, dict[str, Any]] = {
         "experiment": {"duration": 300.0, "runs": MORE},
     },
 }
+PYTHON |= {
+    name: {
+        "reference": {"python": f"loop_models:{name}", **fields},
+        "experiment": {"duration": loop_models.DURATIONS[name.split("_")[0]], "runs": MORE},
+    }
+    for name, fields in loop_models.REFERENCES.items()
+}
 FMUS = {
     "VanDerPol": {"mu": (0.5, 2.0)},
     "Dahlquist": {"k": (0.5, 2.0)},
@@ -125,9 +136,9 @@ def pipeline(name: str, folder: Path, *, minutes: float, workers: int, compiled:
         )[0]
     content: dict[str, Any] = {**PYTHON[name], "reference": {"folder": str(MODELS), **PYTHON[name]["reference"]}}
     if compiled:
-        files = [str(MODELS / file) for file in ("slow_models.py", "compiled_thermal.py")]
+        files = [str(MODELS / file) for file in ("slow_models.py", "loop_models.py", "compiled_thermal.py")]
         content["reference"] |= {"python": f"compiled_models:{name}", "files": files}
-    whole = {"kind": "experiment", "name": name, "workers": workers, **content}
+    whole = {"kind": "experiment", "name": name.replace("_", "-"), "workers": workers, **content}
     return _written(whole, folder / f"{name}.yaml", seed)
 
 
@@ -150,7 +161,7 @@ def main() -> None:
     """Make each, and print a row."""
     given = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
     minutes, only, workers = float(given.get("minutes", MINUTES)), given.get("only", ""), int(given.get("workers", 2))
-    names = only.split(",") if only else [*PYTHON, *([*FMUS, BALL] if "REFERENCE_FMUS" in os.environ else ())]
+    names = only.split(",") if only else [*(name for name in PYTHON if "_" not in name), *([*FMUS, BALL] if "REFERENCE_FMUS" in os.environ else ())]
     seed, proof_of = int(given.get("seed", 0)), int(given["proof"]) if "proof" in given else None
     print(f"{'reference':<14}{'new':>6}{'rms':>9}{'everywhere':>12}{'diverged':>10}{'faster':>10}{'FMU off':>10}")
     for name in names:

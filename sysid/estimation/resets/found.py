@@ -19,6 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from sysid.estimation.majority_map import majority_map
 from sysid.estimation.resets.quotients import ratios_of
 from sysid.estimation.resets.reset_map import Armed, Array, Guard, ResetMap, Rest, features, quantity, with_ratios
 
@@ -33,8 +34,6 @@ MOST_GUARDS, FEWEST = 3, 8
 """Events of different kinds, and samples of each at least."""
 STANDS: Final = 1e-9
 """Share of the range within which an output stands."""
-DRAWS, LOOKED = 400, 4000
-"""Times that samples are drawn at random to find what most of them follow, and samples on which that is seen."""
 MOST_BEGINS: Final = 8
 """Records whose beginning is tried for that of all."""
 SAMPLES: Final = 40_000
@@ -188,30 +187,12 @@ def _within(off: Array, span: Array, near: float) -> NDArray[np.bool_]:
 def _common(
     terms: Array, values: Array, span: Array, near: float, *, rng: np.random.Generator, among: NDArray[np.bool_]
 ) -> Array | None:
-    """The linear map that most of some samples follow: of maps through a few of them that which passes nearest to most.
-
-    As in RANSAC (Fischler and Bolles 1981).
-    """
-    places, n = np.flatnonzero(among), terms.shape[1]
-    if len(places) < 2 * n:
+    """The linear map that most of some samples follow, of the fewest terms."""
+    found = majority_map(terms, values, span, near, rng=rng, among=among)
+    if found is None:
         return None
-    size = np.maximum(np.abs(terms[places]).max(axis=0), 1e-300)
-    looked = rng.choice(places, min(len(places), LOOKED), replace=False)
-    best = np.zeros(len(looked), dtype=bool)
-    for _ in range(DRAWS):
-        few = rng.choice(looked, n + 1, replace=False)
-        some = np.linalg.lstsq(terms[few] / size, values[few], rcond=None)[0]
-        follow = _within(terms[looked] / size @ some - values[looked], span, near)
-        best = follow if follow.sum() > best.sum() else best
-        if best.mean() > 0.95:
-            break
-    if best.sum() < 2 * n:
-        return None
-    chosen = looked[best]
-    for _ in range(3):
-        found = np.linalg.lstsq(terms[chosen] / size, values[chosen], rcond=None)[0] / size[:, np.newaxis]
-        chosen = places[_within(terms[places] @ found - values[places], span, near)]
-    return _plain(found, terms[chosen], values[chosen], span, near) if len(chosen) >= n else None
+    some, chosen = found
+    return _plain(some, terms[chosen], values[chosen], span, near)
 
 
 def _plain(found: Array, terms: Array, values: Array, span: Array, near: float) -> Array:

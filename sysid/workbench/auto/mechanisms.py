@@ -1,11 +1,12 @@
-"""What holds a motion, or an input, where records show it: equations that are tried before networks."""
+"""What holds a motion or an input, or closes a loop, where records show it: equations that are tried before networks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
-from sysid.estimation import friction, play
+from sysid.estimation import friction, loops, play
 from sysid.models import Mapping, VectorGreyBox
 from sysid.traces import Trace
 
@@ -19,6 +20,11 @@ PLAYS = (
     "first (docs/how/friction.md)"
 )
 """What is said of an input with play."""
+CLOSED = (
+    "Most samples follow one linear law, and the others another: equations of {states} linear states that are closed "
+    "by {element} come to {left:.2g} % of the outputs' ranges, and are tried first (docs/how/loops.md)"
+)
+"""What is said of a linear loop with one element that is not linear."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +41,7 @@ class Mechanism:
 
 
 def mechanism_of(traces: Sequence[Trace], mapping: Mapping) -> Mechanism | None:
-    """Find what holds an output, or what an input moves.
+    """Find what holds an output, or what an input moves, or what closes a loop.
 
     Args:
         traces: Records that begin at rest, at one place.
@@ -44,6 +50,12 @@ def mechanism_of(traces: Sequence[Trace], mapping: Mapping) -> Mechanism | None:
     Returns:
         It; ``None`` where nothing is found.
     """
+    return _found(tuple(traces), mapping)
+
+
+@lru_cache(maxsize=2)
+def _found(traces: tuple[Trace, ...], mapping: Mapping) -> Mechanism | None:
+    """The same, once for who tells of it and for who searches."""
     if any(trace.usable is not None for trace in traces):
         return None
     records = [(trace.columns(mapping.inputs), trace.columns(mapping.outputs)) for trace in traces]
@@ -51,6 +63,10 @@ def mechanism_of(traces: Sequence[Trace], mapping: Mapping) -> Mechanism | None:
     if rubs is not None:
         told = RUBS.format(output=mapping.outputs[rubs.output])
         return Mechanism(structures=tuple(friction.grey_boxes_of(rubs, mapping)), told=told)
+    closed = loops.found_loop(records)
+    if closed is not None:
+        told = CLOSED.format(states=closed.loop.states, element=closed.loop.element, left=100.0 * closed.left)
+        return Mechanism(structures=(loops.grey_box_of(closed, mapping),), told=told)
     plays = play.found_play(records)
     if plays is None:
         return None

@@ -1,0 +1,105 @@
+"""Whether records are of something that is linear most of the time, and at times another linear thing.
+
+What goes through a dead zone, limits or a relay follows one linear law exactly as long as the element stays on one of
+its pieces. What is smooth and not linear follows none for more than a moment, and what is linear always the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.estimation.majority_map import majority_map
+
+Array = NDArray[np.float64]
+
+ORDERS, NEAR = (1, 2, 3, 4), 1e-7
+"""Past samples of a law, and share of the output's range that a sample may be off which follows it."""
+SOME, ALL = 0.25, 0.98
+"""Shares of the samples that move which follow one law: more than the first, and fewer than the second."""
+ALIKE = 0.97
+"""Part of the share of the law that most follow from which on a shorter law is taken for it."""
+MOVES = 1e-7
+"""Share of its range by which an output moves at least."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Law:
+    """The linear law that most samples of an output follow, of its changes and those of the inputs.
+
+    Args:
+        order: Past samples.
+        past: Factors of past changes of the output, the last first, shape ``(order,)``.
+        drives: Factors of changes of the inputs, the last first, shape ``(n_inputs, order)``.
+        share: Of the samples that move, those that follow it.
+    """
+
+    order: int
+    past: Array
+    drives: Array
+    share: float
+
+    @property
+    def rates(self) -> list[float]:
+        """Rates a sample at which its modes die away; empty where they swing."""
+        poles = np.roots([1.0, *-self.past])
+        if np.iscomplex(poles).any() or (poles.real <= 0.0).any():
+            return []
+        return sorted((-np.log(poles.real)).tolist())
+
+
+def law_of(records: Sequence[tuple[Array, Array]], *, order: int, seed: int = 0) -> Law | None:
+    """The law of some order that most samples follow.
+
+    Changes have it without constants, in which pieces of a law differ whose slopes are one.
+
+    Args:
+        records: Inputs, shape ``(n_samples, n_inputs)``, and one output, shape ``(n_samples,)``, in shares of its range.
+        order: Past samples.
+        seed: Of what is drawn at random.
+
+    Returns:
+        The law; ``None`` where hardly any samples have one in common.
+    """
+    terms, values = [], []
+    for u, y in records:
+        moved, driven = np.diff(y), np.diff(u, axis=0)
+        t = np.arange(order, len(moved))
+        past = [moved[t - k] for k in range(1, order + 1)]
+        drives = [driven[t - k, j] for j in range(u.shape[1]) for k in range(order)]
+        terms.append(np.column_stack([*past, *drives]))
+        values.append(moved[t])
+    all_terms, all_values = np.vstack(terms), np.concatenate(values)[:, np.newaxis]
+    moves = np.abs(all_values[:, 0]) > MOVES
+    found = majority_map(all_terms, all_values, np.ones(1), NEAR, rng=np.random.default_rng(seed), among=moves)
+    if found is None:
+        return None
+    row, follow = found[0][:, 0], found[1]
+    inputs = records[0][0].shape[1]
+    return Law(
+        order=order, past=row[:order], drives=row[order:].reshape(inputs, order), share=len(follow) / int(moves.sum())
+    )
+
+
+def pieces(records: Sequence[tuple[Array, Array]]) -> dict[int, Law]:
+    """Laws that some samples follow and others do not, by the number of the output.
+
+    Args:
+        records: Inputs and outputs, in shares of their ranges.
+
+    Returns:
+        Of each output the law that most follow; empty where one output has none, or all samples of all follow one.
+    """
+    found = {}
+    for k in range(records[0][1].shape[1]):
+        own = [(u, y[:, k]) for u, y in records if len(y) > 2 * max(ORDERS)]
+        laws = [law for order in ORDERS if own and (law := law_of(own, order=order)) is not None]
+        most = max((law.share for law in laws), default=0.0)
+        if most < SOME:
+            return {}
+        # A longer law says the same with poles that are of nothing.
+        found[k] = next(law for law in laws if law.share >= ALIKE * most)
+    return {} if all(law.share > ALL for law in found.values()) else found
