@@ -27,9 +27,9 @@ def loop_states(
         steps: From sample to sample.
         n: States.
         sizes: What each state is fed with in a sample, shape ``(n,)``.
-        theta: Rates a sample, ``n``; factors of the inputs for each state, ``n*m``; of states, ``n``, and inputs, ``m``,
-            in what the element sees; states before the first sample, ``n``; two limits; then of a dead zone how much
-            of what it passes acts as its rate, in samples; of an integral that waits factors of states, ``n``, and
+        theta: Rates a sample, ``n``; factors of the inputs for each state, ``n*m``; of states, ``n``, and inputs,
+            ``m``, in what the element sees; states before the first sample, ``n``; two limits; then of a dead zone how
+            much of what it passes acts as its rate, in samples; of an integral that waits factors of states, ``n``, and
             inputs, ``m``, and a constant; of a relay whether it is on before the first sample.
         inputs: Shape ``(n_samples, m)``.
         begins: Where a record begins, shape ``(n_samples,)``.

@@ -161,7 +161,11 @@ def main() -> None:
     """Make each, and print a row."""
     given = dict(word.removeprefix("--").split("=", 1) for word in sys.argv[1:])
     minutes, only, workers = float(given.get("minutes", MINUTES)), given.get("only", ""), int(given.get("workers", 2))
-    names = only.split(",") if only else [*(name for name in PYTHON if "_" not in name), *([*FMUS, BALL] if "REFERENCE_FMUS" in os.environ else ())]
+    names = (
+        only.split(",")
+        if only
+        else [*(name for name in PYTHON if "_" not in name), *([*FMUS, BALL] if "REFERENCE_FMUS" in os.environ else ())]
+    )
     seed, proof_of = int(given.get("seed", 0)), int(given["proof"]) if "proof" in given else None
     print(f"{'reference':<14}{'new':>6}{'rms':>9}{'everywhere':>12}{'diverged':>10}{'faster':>10}{'FMU off':>10}")
     for name in names:

@@ -50,44 +50,44 @@ _gear, _heater, _thermostat = map(njit, (loop_models.gear_run, loop_models.heate
 
 def gear(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:gear``."""
-    return _gear(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.GEARS[0])[:, :1]
+    return _gear(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.GEARS[0])[:, :1]
 
 
 def gear_place(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:gear_place``."""
-    return _gear(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.GEARS[1])[:, 1:]
+    return _gear(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.GEARS[1])[:, 1:]
 
 
 def gear_kept(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:gear_kept``."""
-    return _gear(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.GEARS[2])[:, :2]
+    return _gear(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.GEARS[2])[:, :2]
 
 
 def heater(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:heater``."""
-    return _heater(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.HEATERS[0])
+    return _heater(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.HEATERS[0])
 
 
 def heater_waits(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:heater_waits``."""
-    return _heater(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.HEATERS[1])
+    return _heater(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.HEATERS[1])
 
 
 def heater_kept(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:heater_kept``."""
-    return _heater(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.HEATERS[2])
+    return _heater(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.HEATERS[2])
 
 
 def thermostat(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:thermostat``."""
-    return _thermostat(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.THERMOSTATS[0])
+    return _thermostat(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.THERMOSTATS[0])
 
 
 def thermostat_wall(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:thermostat_wall``."""
-    return _thermostat(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.THERMOSTATS[1])
+    return _thermostat(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.THERMOSTATS[1])
 
 
 def thermostat_kept(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """As ``loop_models:thermostat_kept``."""
-    return _thermostat(time[1] - time[0], np.ascontiguousarray(inputs), *loop_models.THERMOSTATS[2])
+    return _thermostat(time[1] - time[0], np.ascontiguousarray(inputs), loop_models.THERMOSTATS[2])

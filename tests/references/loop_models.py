@@ -1,5 +1,6 @@
-"""Slow models with something in their loop that is not linear: a gear with backlash, a heater whose controller is at its
-limits, a thermostat that nobody sees.
+"""Slow models with something in their loop that is not linear.
+
+They are a gear with backlash, a heater whose controller is at its limits, and a thermostat that nobody sees.
 
 Each is named in a configuration as ``loop_models:gear`` and so on; ``compiled_models`` has the same, compiled.
 """
@@ -17,17 +18,17 @@ Array = NDArray[np.float64]
 
 def gear(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A motor that moves a load through a gear with backlash; torque in Nm, output the load's speed in rad/s."""
-    return gear_run(float(time[1] - time[0]), inputs, *GEARS[0])[:, :1]
+    return gear_run(float(time[1] - time[0]), inputs, GEARS[0])[:, :1]
 
 
 def gear_place(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """Another, of which the load's angle in rad is seen, and the motor's speed."""
-    return gear_run(float(time[1] - time[0]), inputs, *GEARS[1])[:, 1:]
+    return gear_run(float(time[1] - time[0]), inputs, GEARS[1])[:, 1:]
 
 
 def gear_kept(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A third, of which the load's speed and angle are seen."""
-    return gear_run(float(time[1] - time[0]), inputs, *GEARS[2])[:, :2]
+    return gear_run(float(time[1] - time[0]), inputs, GEARS[2])[:, :2]
 
 
 GEARS = (
@@ -39,11 +40,9 @@ GEARS = (
 Nm s, and half the backlash in rad."""
 
 
-def gear_run(
-    h: float, inputs: Array, motor: float, load: float, rubs: float, drags: float, stiff: float, damps: float,
-    half: float,
-) -> Array:  # fmt: skip
+def gear_run(h: float, inputs: Array, numbers: tuple[float, ...]) -> Array:
     """Load's speed and angle, and motor's speed, of numbers alone."""
+    motor, load, rubs, drags, stiff, damps, half = numbers
     steps, found = max(1, round(h / 1e-4)), np.empty((len(inputs), 3))
     dt, fast, slow, twist, angle = h / steps, 0.0, 0.0, 0.0, 0.0
     for k, torque in enumerate(inputs[:, 0]):
@@ -63,17 +62,17 @@ def heater(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array
 
     Inputs: setpoint and air outside in degC. Output: the room's temperature in degC.
     """
-    return heater_run(float(time[1] - time[0]), inputs, *HEATERS[0])
+    return heater_run(float(time[1] - time[0]), inputs, HEATERS[0])
 
 
 def heater_waits(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """Another, whose integral waits while the power is at a limit."""
-    return heater_run(float(time[1] - time[0]), inputs, *HEATERS[1])
+    return heater_run(float(time[1] - time[0]), inputs, HEATERS[1])
 
 
 def heater_kept(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A third, of one mass and a sensor that lags; its integral is taken back."""
-    return heater_run(float(time[1] - time[0]), inputs, *HEATERS[2])
+    return heater_run(float(time[1] - time[0]), inputs, HEATERS[2])
 
 
 HEATERS = (
@@ -86,11 +85,9 @@ power in W, gain in W/K, integral time in s, time in which it is taken back in s
 look of the controller to the next."""
 
 
-def heater_run(
-    h: float, inputs: Array, body: float, room: float, gives: float, loses: float, most: float, gain: float,
-    integral: float, back: float, looks: float,
-) -> Array:  # fmt: skip
+def heater_run(h: float, inputs: Array, numbers: tuple[float, ...]) -> Array:
     """The same of numbers alone; they begin where nothing moves at the first inputs, or as near as the power allows."""
+    body, room, gives, loses, most, gain, integral, back, looks = numbers
     asked, air = inputs[0, 0], inputs[0, 1]
     power = min(max((asked - air) * loses, 0.0), most)
     inside = air + power / loses
@@ -121,17 +118,17 @@ def thermostat(time: Array, inputs: Array, parameters: Mapping[str, float]) -> A
 
     Inputs: the floor's setpoint and the air outside in degC. Output: the room's temperature in degC.
     """
-    return thermostat_run(float(time[1] - time[0]), inputs, *THERMOSTATS[0])
+    return thermostat_run(float(time[1] - time[0]), inputs, THERMOSTATS[0])
 
 
 def thermostat_wall(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """Another, whose heat goes into the room, and whose sensor lags behind it."""
-    return thermostat_run(float(time[1] - time[0]), inputs, *THERMOSTATS[1])
+    return thermostat_run(float(time[1] - time[0]), inputs, THERMOSTATS[1])
 
 
 def thermostat_kept(time: Array, inputs: Array, parameters: Mapping[str, float]) -> Array:
     """A third: by the floor's temperature, and other numbers."""
-    return thermostat_run(float(time[1] - time[0]), inputs, *THERMOSTATS[2])
+    return thermostat_run(float(time[1] - time[0]), inputs, THERMOSTATS[2])
 
 
 THERMOSTATS = (
@@ -139,15 +136,13 @@ THERMOSTATS = (
     (3e4, 4e5, 25.0, 90.0, 3000.0, 0.5, 1.0, 0.0),
     (1e5, 5e5, 120.0, 60.0, 2500.0, 1.5, 0.0, 1.0),
 )
-"""Heat capacity of floor (or sensor) and room in J/K, what conducts between both and from the room to the air outside in
-W/K, power in W, half the width of the relay in K, and shares of the power that go into the room and into the floor."""
+"""Heat capacity of floor (or sensor) and room in J/K, what conducts between both and from the room to the air outside
+in W/K, power in W, half the width of the relay in K, and shares of the power that go into room and floor."""
 
 
-def thermostat_run(
-    h: float, inputs: Array, body: float, room: float, gives: float, loses: float, power: float, half: float,
-    into_room: float, into_body: float,
-) -> Array:  # fmt: skip
+def thermostat_run(h: float, inputs: Array, numbers: tuple[float, ...]) -> Array:
     """The same of numbers alone, looked at every second."""
+    body, room, gives, loses, power, half, into_room, into_body = numbers
     inside, hidden, on, found, dt = 18.0, 18.0, 0.0, np.empty((len(inputs), 1)), 1.0
     for k in range(len(inputs)):
         asked, air = inputs[k, 0], inputs[k, 1]
@@ -187,8 +182,7 @@ REFERENCES: dict[str, dict[str, Any]] = {
     "heater_waits": _HEATER,
     "heater_kept": _HEATER,
     "thermostat": _THERMOSTAT,
-    "thermostat_wall": _THERMOSTAT
-    | {"inputs": {"setpoint": {"unit": "degC", "range": [15, 25], "start": 20}, **_AIR}},
+    "thermostat_wall": _THERMOSTAT | {"inputs": {"setpoint": {"unit": "degC", "range": [15, 25], "start": 20}, **_AIR}},
     "thermostat_kept": _THERMOSTAT,
 }
 """Fields of the reference of each in a pipeline of experiments."""

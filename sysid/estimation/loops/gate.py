@@ -57,7 +57,7 @@ def law_of(records: Sequence[tuple[Array, Array]], *, order: int, seed: int = 0)
     Changes have it without constants, in which pieces of a law differ whose slopes are one.
 
     Args:
-        records: Inputs, shape ``(n_samples, n_inputs)``, and one output, shape ``(n_samples,)``, in shares of its range.
+        records: Inputs, shape ``(n_samples, n_inputs)``, and an output, shape ``(n_samples,)``, in shares of its range.
         order: Past samples.
         seed: Of what is drawn at random.
 

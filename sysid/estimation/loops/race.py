@@ -18,8 +18,10 @@ from sysid.estimation.loops.loop import Array, Found, Loop, Records, Scaled
 from sysid.estimation.loops.relays import relay_begun
 from sysid.kernels.loop import DEAD_ZONE, SATURATION, WAITS
 
+ELEMENTS = ((SATURATION, 2, 20), (DEAD_ZONE, 4, 20), (WAITS, 2, 40))
+"""Elements, steps from sample to sample at first, and samples of each record that are looked at first."""
 STARTS, SHORT = 48, 20
-"""Beginnings of each element and order, and samples of each record that are looked at first."""
+"""Beginnings of each element and order; of fewer samples a record says nothing."""
 FIRST, ROUNDS = 8, ((16, 12), (8, 30))
 """Iterations of every beginning over the first part; then how many go on, with how many iterations each."""
 KEPT, ITERATIONS, LAST = (6, 4, 3, 2), 30, 100
@@ -27,8 +29,9 @@ KEPT, ITERATIONS, LAST = (6, 4, 3, 2), 30, 100
 LOST, ENOUGH, NEAR = 0.03, 3e-3, 5e-4
 """Shares of the outputs' ranges: of more that is left of some part nothing comes; as much may be left of all; and of so
 little no other element is tried."""
-FINER, GAINS, MOST_STEPS = 2, 0.7, 16
-"""By how much steps become shorter at the end, as long as that leaves so much less; and how many there are at most."""
+FINER, GAINS, MOST_STEPS, FINE = 2, 0.7, 16, 1e-4
+"""By how much steps become shorter at the end, as long as that leaves so much less; how many there are at most; and of
+how little that is left they are short enough."""
 FOURTH = 3
 """The number of the state of two masses that nothing depends on."""
 SAME = 1e-6
@@ -74,17 +77,17 @@ def _scaled(records: Records) -> Scaled | None:
 def _raced(scaled: Scaled, laws: Mapping[int, Law], rng: np.random.Generator) -> Raced | None:
     """The best of the first element and order that comes near enough, or else of all."""
     best: Raced | None = None
-    for begun in _begun(scaled, laws, rng):
-        found = _followed(scaled, begun)
+    for short, begun in _begun(scaled, laws, rng):
+        found = _followed(scaled, begun, short)
         best = found if best is None or (found is not None and found[0] < best[0]) else best
         if best is not None and best[0] <= NEAR:
             break
     return best
 
 
-def _followed(scaled: Scaled, begun: Sequence[Loop]) -> Raced | None:
+def _followed(scaled: Scaled, begun: Sequence[Loop], samples: int) -> Raced | None:
     """The best of some beginnings over growing parts; ``None`` where all are lost on the way."""
-    part, samples, kept = scaled.first(SHORT), SHORT, iter(KEPT)
+    part, kept = scaled.first(samples), iter(KEPT)
     pool = [fitted(one, part, FIRST) for one in begun]
     for most, iterations in ROUNDS:
         pool = [fitted(one, part, iterations) for _, one in _best(pool, most)]
@@ -102,18 +105,20 @@ def _best(pool: Sequence[Raced], most: int) -> list[Raced]:
     return sorted((one for one in pool if np.isfinite(one[0])), key=lambda one: one[0])[:most]
 
 
-def _begun(scaled: Scaled, laws: Mapping[int, Law], rng: np.random.Generator) -> Iterator[list[Loop]]:
-    """Where the races begin: half of each at the rates of the law that most samples follow, where that has some."""
+def _begun(scaled: Scaled, laws: Mapping[int, Law], rng: np.random.Generator) -> Iterator[tuple[int, list[Loop]]]:
+    """Where races begin, after how many samples: half at the rates of the law that most samples follow, if any."""
     known = max((law.rates for law in laws.values()), key=len)
     orders = (3,) if len(scaled.span) == 1 else (3, 4)
     relays = (relay_begun(scaled, law, output) for output, law in laws.items())
-    yield from ([one] for one in relays if one is not None)
-    for kind, steps in ((SATURATION, 2), (DEAD_ZONE, 4), (WAITS, 2)):
+    yield from ((SHORT, [one]) for one in relays if one is not None)
+    for kind, steps, short in ELEMENTS:
         for states in orders:
-            yield [_drawn(scaled, kind, states, steps, known if n % 2 else [], rng) for n in range(STARTS)]
+            yield short, [_drawn(scaled, (kind, states, steps), known if n % 2 else [], rng) for n in range(STARTS)]
 
 
-def _drawn(scaled: Scaled, kind: int, states: int, steps: int, known: Sequence[float], rng: np.random.Generator) -> Loop:
+def _drawn(scaled: Scaled, form: tuple[int, int, int], known: Sequence[float], rng: np.random.Generator) -> Loop:
+    """A loop of some element, order and steps, its numbers at random."""
+    kind, states, steps = form
     m, long = len(scaled.reach), scaled.longest
     rates = np.exp(rng.uniform(np.log(0.5 / long), 0.0, states))
     rates[: len(known)] = known[:states]
@@ -152,7 +157,7 @@ def _free(kind: int, n: int, m: int, numbers: int) -> NDArray[np.bool_]:
 
 
 def _two_masses(m: int, states: int, long: int, rng: np.random.Generator) -> tuple[Array, Array, Array, Array]:
-    """Two masses that meet through a dead zone, the inputs act on the first of them: rates, drives, what is seen, limits.
+    """Two masses that meet through a dead zone, the first of which inputs act on: rates, drives, what is seen, limits.
 
     Their speeds and how far one is from the other are the states; a fourth is how far the second has gone.
     """
@@ -176,7 +181,7 @@ def _two_masses(m: int, states: int, long: int, rng: np.random.Generator) -> tup
 def _finer(scaled: Scaled, error: float, loop: Loop) -> Raced:
     """The same with shorter steps, as long as that gains."""
     part = scaled.first(scaled.longest)
-    while FINER * loop.steps <= MOST_STEPS:
+    while error > FINE and FINER * loop.steps <= MOST_STEPS:
         finer = fitted(replace(loop, steps=FINER * loop.steps), part, LAST)
         if not finer[0] < GAINS * error:
             break

@@ -111,7 +111,9 @@ def _weights(shares: Sequence[Array], order: int) -> Array | None:
     whole[order] = 1.0
     for i in range(1, order):
         for _ in range(3):
-            line = np.linalg.lstsq(np.column_stack([rows[known, 0], np.ones(known.sum())]), rows[known, i], rcond=None)[0]
+            line = np.linalg.lstsq(np.column_stack([rows[known, 0], np.ones(known.sum())]), rows[known, i], rcond=None)[
+                0
+            ]
             whole[i] = line[1]
             off = np.abs(rows[:, i] - line[0] * rows[:, 0] - line[1])
             known = off <= max(5.0 * float(np.median(off)), 1e-6)
@@ -163,9 +165,7 @@ def _assembled(
     theta = np.concatenate([rates, drives.ravel(), sees, begins, limits, [float(begins_on[0])]])
     free = np.ones(len(theta), dtype=bool)
     free[-1] = False
-    return Loop(
-        kind=RELAY, states=n, steps=STEPS, sizes=np.ones(n), theta=theta, free=free, read=np.zeros((0, 0))
-    )
+    return Loop(kind=RELAY, states=n, steps=STEPS, sizes=np.ones(n), theta=theta, free=free, read=np.zeros((0, 0)))
 
 
 def _fed(rates: Array, time: float) -> Array:

@@ -144,11 +144,10 @@ class _Written:
         for i in self._n:
             yield f"{moved[i]} = {self._moved(now[i], i, on)}"
         yield f"{reach} = {self._sees(moved)}"
-        off = f"where({on} > 0.5 and {reach} > {high}, -min(({reach} - {high})/max({reach} - {before}, {tiny}), 1), 0)"
-        yield (
-            f"{late} = where({on} < 0.5 and {reach} < {low}, min(({low} - {reach})/max({before} - {reach}, {tiny}), 1), "
-            f"{off})"
-        )
+        goes_off = f"min(({reach} - {high})/max({reach} - {before}, {tiny}), 1)"
+        goes_on = f"min(({low} - {reach})/max({before} - {reach}, {tiny}), 1)"
+        off = f"where({on} > 0.5 and {reach} > {high}, -{goes_off}, 0)"
+        yield f"{late} = where({on} < 0.5 and {reach} < {low}, {goes_on}, {off})"
         yield f"{own(f'on_{step + 1}')} = where({late} > 0, 1, where({late} < 0, 0, {on}))"
         for i in self._n:
             yield f"{after[i]} = {moved[i]} + {own(f'fed{i}')}*{late}"

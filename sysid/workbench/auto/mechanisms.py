@@ -1,4 +1,4 @@
-"""What holds a motion or an input, or closes a loop, where records show it: equations that are tried before networks."""
+"""What holds a motion or an input, or closes a loop, where records show it: equations that are tried first."""
 
 from __future__ import annotations
 
