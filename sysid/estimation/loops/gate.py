@@ -20,9 +20,11 @@ ORDERS, NEAR = (1, 2, 3, 4), 1e-7
 """Past samples of a law, and share of the output's range that a sample may be off which follows it."""
 SOME, ALL = 0.25, 0.98
 """Shares of the samples that move which follow one law: more than the first, and fewer than the second."""
+NEARER, EXACT = 0.03, 0.8
+"""Part of how near samples have to be within which most of those are that follow a law exactly; and that share."""
 ALIKE = 0.97
 """Part of the share of the law that most follow from which on a shorter law is taken for it."""
-MOVES = 1e-7
+MOVES = 1e-4
 """Share of its range by which an output moves at least."""
 
 
@@ -78,6 +80,10 @@ def law_of(records: Sequence[tuple[Array, Array]], *, order: int, seed: int = 0)
     if found is None:
         return None
     row, follow = found[0][:, 0], found[1]
+    # What is smooth comes near a law in passing, and nearer in fewer samples.
+    off = np.abs(all_terms[follow] @ row - all_values[follow, 0])
+    if np.mean(off <= NEARER * NEAR) < EXACT:
+        return None
     inputs = records[0][0].shape[1]
     return Law(
         order=order, past=row[:order], drives=row[order:].reshape(inputs, order), share=len(follow) / int(moves.sum())

@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.signal import lfilter
+import scipy
 
 from sysid.estimation.loops.gate import NEAR, Law
 from sysid.estimation.loops.loop import Array, Loop, Scaled
 from sysid.kernels.loop import RELAY
 
-CLOSE, OFTEN = 30.0 * NEAR, 0.05
+CLOSE, OFTEN = 30.0 * NEAR, 0.02
 """How near a sample is to one of the two constants, and the share of the samples that has to be near each."""
 WHOLE = 0.03
 """Part of a sample at either end of it at which a switch is at that end."""
@@ -186,7 +185,7 @@ def _modes(u: Array, rates: Array, on: bool, switches: Sequence[Switch]) -> Arra
     found = np.empty((len(u), len(rates), u.shape[1] + 2))
     for i, rate in enumerate(rates):
         driven = np.column_stack([u * _fed(rates, 1.0)[i], relay[:, i]])
-        found[:, i, :-1] = lfilter([1.0], [1.0, -np.exp(-rate)], driven, axis=0)
+        found[:, i, :-1] = scipy.signal.lfilter([1.0], [1.0, -np.exp(-rate)], driven, axis=0)
         found[:, i, -1] = np.exp(-rate * np.arange(1, len(u) + 1))
     return found
 
@@ -209,9 +208,9 @@ def _seen(
     if len(rows) < FEWEST:
         return None
     terms, wanted = np.array(rows), np.array(values)
-    weights: NDArray[np.float64] = np.ones(len(wanted))
-    row = np.zeros(terms.shape[1])
+    weights: Array = np.ones(len(wanted))
+    row: Array = np.zeros(terms.shape[1])
     for _ in range(ROBUST):
-        row = np.linalg.lstsq(terms * weights[:, np.newaxis], wanted * weights, rcond=None)[0]
+        row = np.asarray(np.linalg.lstsq(terms * weights[:, np.newaxis], wanted * weights, rcond=None)[0])
         weights = 1.0 / np.sqrt(np.maximum(np.abs(terms @ row - wanted), 1e-3))
     return row

@@ -55,6 +55,11 @@ class _Written:
         return range(self.loop.states)
 
     @property
+    def _modes(self) -> range:
+        """States that the element drives: all but an integral that waits."""
+        return range(self.loop.states - (self.loop.kind == WAITS))
+
+    @property
     def _m(self) -> range:
         return range(len(self.mapping.inputs))
 
@@ -63,8 +68,8 @@ class _Written:
         loop, m = self.loop, len(self.mapping.inputs)
         keeps, fed = loop.moves()
         drives, low_high = self._part("drives"), self._part("limits")
-        numbers = {f"keeps{i}": keeps[i] for i in self._n} | {f"fed{i}": fed[i] for i in self._n}
-        numbers |= {f"drives{i}_{j}": drives[i * m + j] for i in self._n for j in self._m}
+        numbers = {f"keeps{i}": keeps[i] for i in self._modes} | {f"fed{i}": fed[i] for i in self._modes}
+        numbers |= {f"drives{i}_{j}": drives[i * m + j] for i in self._modes for j in self._m}
         numbers |= {f"sees{i}": value for i, value in enumerate(self._part("sees"))}
         numbers |= {f"sees_u{j}": value for j, value in enumerate(self._part("sees_inputs"))}
         numbers |= {"low": low_high[0], "high": low_high[1]}
@@ -84,7 +89,7 @@ class _Written:
         for j, name in enumerate(self.mapping.inputs):
             yield f"{own(f'u{j}')} = ({written_name(name)} - {_n(scaled.begin[j])})/{_n(scaled.reach[j])}"
         inputs = [own(f"u{j}") for j in self._m]
-        for i in self._n:
+        for i in self._modes:
             yield f"{own(f'drive{i}')} = {_sum([own(f'drives{i}_{j}') for j in self._m], inputs)}"
         yield f"{own('seen')} = {_sum([own(f'sees_u{j}') for j in self._m], inputs)}"
         if self.loop.kind == WAITS:
@@ -120,20 +125,20 @@ class _Written:
         z, first, ahead, acts = (own(f"{name}_{step}") for name in ("z", "first", "ahead", "acts"))
         yield f"{z} = {self._sees(now)}"
         yield f"{first} = {element}({z}, {low}, {high})"
-        moving, fixed = list(self._n), ""
+        fixed = ""
         if self.loop.kind == WAITS:
-            gain, last = own(f"gain_{step}"), moving.pop()
+            gain, last = own(f"gain_{step}"), self.loop.states - 1
             yield f"{gain} = {own('winding')} + {_sum([own(f'winds{i}') for i in self._n], now)}"
             beyond = f"{z} > {high} and {gain} > 0 or {z} < {low} and {gain} < 0"
             yield f"{after[last]} = {now[last]} + where({beyond}, 0, {gain})"
             fixed = f" + {own(f'sees{last}')}*{after[last]}"
-        terms = [f"{own(f'sees{i}')}*({self._moved(now[i], i, first)})" for i in moving]
+        terms = [f"{own(f'sees{i}')}*({self._moved(now[i], i, first)})" for i in self._modes]
         yield f"{ahead} = {own('seen')}{fixed} + {' + '.join(terms)}"
         leads = ""
         if self.loop.kind == DEAD_ZONE:
             leads = f" + {own('leads')}*({element}({ahead}, {low}, {high}) - {first})"
         yield f"{acts} = {element}(0.5*({z} + {ahead}), {low}, {high}){leads}"
-        for i in moving:
+        for i in self._modes:
             yield f"{after[i]} = {self._moved(now[i], i, acts)}"
 
     def _relay(self, now: Sequence[str], after: Sequence[str], step: int) -> Iterator[str]:

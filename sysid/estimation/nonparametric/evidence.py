@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.linalg.blas import dtrmm
 
+NOTHING = 1e-200
+"""Least square that is said to be left of a target: of one that is 0 throughout, evidence stays a number."""
 CHUNK = 2048
 """Rows that are taken into the factor at a time: memory does not grow with the record."""
 
@@ -72,7 +74,7 @@ class Triangle:
     @property
     def least(self) -> float:
         """What rounding leaves of the target, squared: of noise-free data it must not become an infinite reward."""
-        return max(self.floor, float(np.finfo(np.float64).eps ** 2 * max(self.gram[2], np.finfo(np.float64).tiny)))
+        return max(self.floor, float(np.finfo(np.float64).eps ** 2) * self.gram[2], NOTHING)
 
     def beside(self, others: NDArray[np.bool_], L: NDArray[np.float64]) -> tuple[Triangle, float]:
         """What is left for some columns once others and their prior have had their part.

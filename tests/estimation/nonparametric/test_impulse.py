@@ -286,3 +286,13 @@ def test_what_a_simulation_leaves_is_rounding_and_has_no_colour() -> None:
     assert exact.noise_ar == ()
     np.testing.assert_allclose(exact.values[0, :3], [0.0, 2.0, 0.0], atol=1e-9)
     assert [one.acts for one in exact.dead_times] == [True, False]
+
+
+def test_the_evidence_of_an_output_that_stands_is_a_number() -> None:
+    """Of a target that is 0 throughout nothing is left, and no share of it."""
+    data = Triangle(R=np.eye(4), z=np.zeros(4), samples=400)
+    for prior in (np.eye(4), 1e6 * np.eye(4)):
+        whole = factored(data, prior)
+        assert whole.rest > 0.0
+        assert np.isfinite(whole.log_evidence)
+        assert np.isfinite(data.samples / whole.rest)

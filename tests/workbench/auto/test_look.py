@@ -91,6 +91,29 @@ def test_what_dry_friction_holds_is_known_with_its_equations() -> None:
     assert mechanism_of([masked, *runs[1:]], MAPPING) is None
 
 
+def test_what_closes_a_linear_loop_is_known_with_its_equations() -> None:
+    """A relay that switches by its own wall's temperature; nothing of its equations is left to estimate."""
+    runs = []
+    for seed in range(8):
+        air, wall, on, y = 0.0, 0.0, 0.0, []
+        rng = np.random.default_rng(seed)
+        u = np.append([0.5, 0.5], rng.uniform(-0.5, 1.5, 12)).repeat(15)[:200]
+        for asked in u:
+            for _ in range(8):
+                on = 1.0 if wall < asked - 0.1 else 0.0 if wall > asked + 0.1 else on
+                wall, air = wall + 0.02 * (air - wall), air + 0.006 * (2.0 * on - air) + 0.002 * (wall - air)
+            y.append(air)
+        runs.append(replace(record("a", 200), name=f"r{seed}", values=np.column_stack([u, y])))
+    held = mechanism_of(runs, MAPPING)
+    assert held is not None
+    assert held.told.startswith("Most samples follow one linear law, and the others another: equations of 2 linear")
+    assert "closed by a relay" in held.told
+    assert look(data(*runs), MAPPING, Start(kind=StartKind.REST)).mechanism == held.structures
+    assert all(one.fixed for one in held.structures[0].parameters)
+    masked = replace(runs[0], usable=np.arange(200) > 3)
+    assert mechanism_of([masked, *runs[1:]], MAPPING) is None
+
+
 def test_what_asks_to_be_looked_at_is_told_in_words(looked: Looked) -> None:
     assert any("linear" in one for one in looked.cautions)
 
