@@ -40,8 +40,8 @@ each other: to count every distance like an error chose no better on ten records
 TOLD, LOTTERY = 2.0, 1.0
 """Times the error of the chosen model from which on that is told, and from which on the start that is fitted in the end
 matters more than its structure."""
-FEWEST = 6
-"""Models that have a middle."""
+FEWEST = 4
+"""Models that have a middle: those of one trial, from each of the parts. A short search may have no more."""
 MOST_TRIALS, COMMANDS = 8, 20
 """Trials that are looked at, and commands over which their models run."""
 MOST_BYTES = 64_000_000

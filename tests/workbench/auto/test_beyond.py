@@ -143,7 +143,16 @@ def test_what_a_verdict_depends_on_is_in_its_digest() -> None:
     assert Beyond().digest == ""
 
 
-@pytest.mark.parametrize("count", [1, FEWEST // 2 - 1])
+def test_the_models_of_one_trial_have_a_middle() -> None:
+    """On a busy machine a search of a minute has no others: nothing was compared, and nothing said."""
+    found = looked({1: [0.5, 0.9, 0.99, 0.8]}, TRIALS[:1])
+    assert found.models == 4
+    assert found.tells(0.0)
+    assert found.of(TRIALS[0]) == 0.0
+    assert found.alone(model(0.999), 0.0)
+
+
+@pytest.mark.parametrize("count", [0, FEWEST // 2 - 1])
 def test_a_few_models_have_no_middle(count: int) -> None:
     found = looked({1: [0.8] * count, 2: [0.9] * count}, TRIALS)
     assert found == Beyond()
