@@ -20,6 +20,7 @@ from sysid.estimation.linear.delay_search import check_max_delay, without_dead_t
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.segments import delayed_inputs, scaling_of
+from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_search import AbstractProblem
@@ -189,6 +190,15 @@ class _Problem(AbstractProblem):
             seed=self.training.seed,
             instruments=alone,
         )
+
+    def part(self) -> _Problem | None:
+        """Stretches of long records; see the base class."""
+        few = stretches(self.experiments)
+        return None if few is None else replace(self, experiments=few)
+
+    def about_part(self) -> str:
+        """How many samples it has; see the base class."""
+        return told_of(self.experiments)
 
     def delay_range(self) -> tuple[int, int]:
         """Up to a third of the longest record where nothing else is said; see the base class."""

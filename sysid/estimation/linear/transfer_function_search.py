@@ -26,7 +26,8 @@ from sysid.estimation.linear.transfer_function_runs import EXACT, Candidate, End
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.transfer_function_uncertainty import transfer_function_uncertainty
 from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_speed, of_stability, of_starts
-from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
+from sysid.estimation.linear.variable_projection import PoleParameters, Sections, SeparableProvider
+from sysid.estimation.nonparametric.dead_time import descend
 from sysid.estimation.result import FitResult, Loop
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel, intersample
@@ -38,8 +39,10 @@ COMPARED = 2
 """Starts, the best as they are, from which a dead time is tried."""
 SLOWEST = 5.0
 """Longest time constant of a stable pole, in lengths of the longest record."""
-SAME = 1e-9
-"""Relative difference of two losses that is none."""
+SAME, NEAR = 1e-9, 1e-6
+"""Relative difference of two losses that is none; and of one that was not run to its end."""
+QUICK = 4
+"""Steps over all samples by which a dead time is compared with its neighbours."""
 
 Score = Callable[[AbstractModel], float] | None
 
@@ -121,6 +124,14 @@ class AbstractProblem(ABC):
         """
         return ()
 
+    def part(self) -> Self | None:
+        """The same problem on some samples of long records; ``None`` where all are looked at throughout."""
+        return None
+
+    def about_part(self) -> str:
+        """What is told of a fit whose starts were compared on this part."""
+        return ""
+
     def with_orders(self, orders: TransferFunction) -> Self:
         """The same data for another structure.
 
@@ -179,8 +190,14 @@ class AbstractProblem(ABC):
         Raises:
             FitDivergedError: If no start gives a finite free run.
         """
-        delays, told = (self.orders.delays, ()) if self.orders.delays is not None else self._searched_delays()
-        reached = self._reached(delays, Watch(began=began, on_iteration=on_iteration), score, {})
+        watch = Watch(began=began, on_iteration=on_iteration)
+        part = self.part() if self.training.max_iterations else None
+        from_part = None if part is None else self._from_part(part, watch, score)
+        if from_part is None:
+            delays, told = self._delays()
+            reached = self._reached(delays, watch, score, {})
+        else:
+            reached, told = from_part
         if reached is None:
             raise FitDivergedError("no start gives a finite free run", remedy="lower the number of poles")
         end, unit = reached.end, self.scaling.output_scale**2
@@ -209,6 +226,50 @@ class AbstractProblem(ABC):
             ),
             warnings=(*fast, *(one for one in told if one == READ_BACKWARDS)),
         )
+
+    def _delays(self) -> tuple[tuple[int, ...], tuple[str, ...]]:
+        """Those of the structure, or those of least error, and what is to be said of them."""
+        return (self.orders.delays, ()) if self.orders.delays is not None else self._searched_delays()
+
+    def _from_part(self, part: AbstractProblem, watch: Watch, score: Score) -> tuple[Reached, tuple[str, ...]] | None:
+        """The minimum over all samples next to that of a part of them, and what is to be said of its dead times.
+
+        Returns:
+            Both; ``None`` where the part misleads: poles or dead times stand at its edge, or a start that was found
+            over all samples leads further down.
+        """
+        delays, told = part._delays()
+        if self.orders.delays is None and max(delays) + FEW >= part.delay_range()[1]:
+            return None
+        found = part._reached(delays, watch.unseen(), score, {})
+        if found is None or found.problem is not part or AT_EDGE in found.end.notes:
+            return None
+        sections = found.end.sections
+        if self.orders.delays is None:
+            delays = self._delays_near(delays, sections)
+        provider = self.provider(delays)
+        begun = tried(PoleStart(name="stretches", sections=sections), delays, provider)
+        end = long_run(begun, self.training, watch)
+        rivals = [tried(start, delays, provider) for start in self.starts(provider, few=True)]
+        rival = short_run(min(rivals, key=lambda one: one.loss).start, delays, provider, self.training)
+        if not end.loss * provider.n_samples * (1.0 - NEAR) <= rival.loss:
+            return None
+        problem, end = self._free_poles(end, delays, watch, score)
+        end = end if problem.training.stable is self.training.stable else problem._snapped(end, np.inf)
+        return Reached(problem=problem, end=end, notes=(*found.notes, part.about_part())), told
+
+    def _delays_near(self, delays: tuple[int, ...], sections: Sections) -> tuple[int, ...]:
+        """Dead times of least error over all samples, by descent from those of a part of them and its poles."""
+        least, most = self.delay_range()
+        reach, quick = min(most, max(delays) + FEW), replace(self.training, short_iterations=QUICK)
+        start, known = PoleStart(name="stretches", sections=sections), dict[tuple[int, ...], float]()
+
+        def loss(of: tuple[int, ...]) -> float:
+            if of not in known:
+                known[of] = short_run(start, of, self.provider(of, unknown=reach), quick).loss
+            return known[of]
+
+        return descend(delays, least, reach, loss)
 
     def _reached(
         self, delays: tuple[int, ...], watch: Watch, score: Score, known: dict[TransferFunction, Reached | None]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +21,13 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
+from sysid.estimation.linear.polynomial.contained import has_common, next_smaller, parts_of, with_root
 from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start, state_space_start
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.state_space.refinement import flat_prior
+from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.result import FitResult, Loop, Status
 from sysid.estimation.uncertainty import Uncertainty
 from sysid.models import Mapping, Start
@@ -43,6 +43,8 @@ Array = NDArray[np.float64]
 
 SHORT, TRIED = 6, 5
 """Steps from the best starts, before the best end goes on; and how many of these there are."""
+NEAR = 1e-6
+"""Relative difference of two losses that is none where one was not run to its end."""
 NESTED, CANCELLED = 200_000, (0.0, 0.5, 0.9)
 """Samples times squared poles up to which models with fewer are fitted first; and poles that are cancelled in them."""
 
@@ -112,9 +114,11 @@ def fit_polynomial(
         own = determined.mapping(mapping), determined.narrowed(orders)
         fit = fit_polynomial(traces, *own, training, start=start, rest_output=rest)
         return determined.polynomials(fit, orders, mapping, scaling, units)
-    segments = segments_of(experiments, scaling)
+    segments, part = segments_of(experiments, scaling), stretches(experiments)
+    until = began + training.max_time_s
     with one_blas_thread():  # threads that wake for such small matrices cost more than they give
-        errors, solution = _search(segments, orders, training, began + training.max_time_s)
+        from_part = part and _from_part(segments_of(part, scaling), segments, orders, training, until)
+        errors, solution = from_part or _search(segments, orders, training, until)
         at = errors.linearise(solution.theta)
         system = errors.chart.system(solution.theta)
         variance = float(errors.covariance(system)[0, 0])
@@ -144,6 +148,7 @@ def fit_polynomial(
         notes=(
             *slow_poles.notes(model.pole_radius, lengths, told),
             *(torn(errors.segments, system.n_state) if orders.noise else ()),
+            *((told_of(part),) if part and from_part else ()),
             slow_poles.stability(model.pole_radius),
         ),
     )
@@ -159,20 +164,14 @@ def _search(
 ) -> tuple[PredictionErrors, Solution]:
     """Short runs from every start, and a long one from the best; what it contains first, all by the same clock."""
     pieces = [piece for segment in segments for piece in segment.pieces()]
-    stable = not orders.noise if training.stable is None else training.stable
-    errors = PredictionErrors(
-        chart=PolynomialChart(orders=orders),
-        segments=tuple(pieces) if orders.noise else tuple(segments),
-        whitening=np.eye(1),
-        stable=stable and not orders.drifts,
-    )
+    errors = _errors(segments, orders, training)
     looked = _looked_at(pieces, orders)
     longs = _longs(looked, orders)
     starts = [*_starts(looked, orders, longs), np.zeros(orders.n_parameters)]  # the last is finite whatever the record
     known = {} if known is None else known
     straight = _straight(errors, starts, longs[0], training, until) if orders.noise else None
     # With denominators of their own there are as many smaller structures as products of theirs: too many to ask for.
-    if straight is not None and not _common(orders):
+    if straight is not None and not has_common(orders):
         return errors, straight
     fewer = _of_fewer(segments, orders, training, until, known)
     if straight is not None and straight.at.loss <= min(map(errors.loss, fewer), default=np.inf):
@@ -194,6 +193,45 @@ def _search(
         scale=float(np.mean([np.mean(segment.outputs**2) for segment in segments])),
     )
     return (errors, beyond) if better else (bounded, inside)
+
+
+def _errors(segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining) -> PredictionErrors:
+    """The least-squares problem over some records."""
+    pieces = [piece for segment in segments for piece in segment.pieces()]
+    stable = not orders.noise if training.stable is None else training.stable
+    return PredictionErrors(
+        chart=PolynomialChart(orders=orders),
+        segments=tuple(pieces) if orders.noise else tuple(segments),
+        whitening=np.eye(1),
+        stable=stable and not orders.drifts,
+    )
+
+
+def _from_part(
+    part: Sequence[Segment],
+    segments: Sequence[Segment],
+    orders: AbstractPolynomial,
+    training: PolynomialTraining,
+    until: float,
+) -> tuple[PredictionErrors, Solution] | None:
+    """The minimum over all samples next to that of a part of them.
+
+    Returns:
+        It; ``None`` where the part misleads: a pole is too slow for it, or a start by all samples leads further down.
+    """
+    begun, found = _search(part, orders, training, until)
+    lengths = [len(segment) for segment in begun.segments]
+    if slow_poles.unseen(begun.chart.system(found.theta).radius, lengths):
+        return None
+    errors = _errors(segments, orders, training)
+    if errors.stable and training.stable is None:
+        errors = replace(errors, largest=slow_poles.largest_pole([len(segment) for segment in errors.segments]))
+    solution = _run(errors, found.theta, _within(training, until))
+    looked = _looked_at([piece for segment in segments for piece in segment.pieces()], orders)
+    rivals = [(errors.loss(theta), theta) for theta in _starts(looked, orders, _longs(looked, orders)[:1])]
+    short = replace(_within(training, until), max_iterations=min(SHORT, training.max_iterations))
+    rival = _run(errors, min(rivals, key=lambda one: one[0])[1], short)
+    return None if rival.at.loss < solution.at.loss * (1.0 - NEAR) else (errors, solution)
 
 
 def _straight(
@@ -279,7 +317,7 @@ def _longs(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[LongAR
 
 def _starts(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequence[LongARX]) -> list[Array]:
     """Coefficients from long ARX models."""
-    if _common(orders):
+    if has_common(orders):
         return [armax_start(looked, orders, long) for long in longs]
     kinds = [(long, whitened) for long in longs for whitened in (False, True)]
     return [box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
@@ -287,18 +325,13 @@ def _starts(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequen
 
 def _of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
     """Coefficients from a state space of the same order."""
-    same = None if _common(orders) else LongARX.of_state_space(looked, orders)
+    same = None if has_common(orders) else LongARX.of_state_space(looked, orders)
     if same is None:
         return []
     begun = [box_jenkins_start(looked, orders, same, whitened=False)]
     # What is fitted to the state space keeps its poles inside the unit circle: its own are an integrator's, too.
     itself = state_space_start(looked, orders, same)
     return begun if itself is None else [*begun, itself]
-
-
-def _common(orders: AbstractPolynomial) -> bool:
-    """Whether inputs and noise, or noise alone, have one denominator."""
-    return bool(orders.order("na")) or not orders.nb
 
 
 def _of_fewer(
@@ -323,7 +356,7 @@ def _of_fewer(
     if sum(map(len, segments)) * sum((*orders.denominators, orders.order("na"), orders.order("nd"))) ** 2 > NESTED:
         return []
     found = []
-    for smaller, widened in _fewer(orders):
+    for smaller, widened in next_smaller(orders):
         if smaller not in known:
             try:
                 known[smaller] = _search(segments, smaller, training, until, known)[1].theta
@@ -332,45 +365,16 @@ def _of_fewer(
         theta = known[smaller]
         if theta is None:
             continue
-        parts = np.split(theta, np.cumsum([size for _, size in _parts(smaller)]))
+        parts = np.split(theta, np.cumsum([size for _, size in parts_of(smaller)]))
         # The same root again and again would be a multiple one, which rounding tears apart.
         apart = (0.6 * np.cos(2.4 * max(orders.order("nc"), 1)),)
         for pole in CANCELLED if "F" in widened else apart:
             wider = [
-                _with_root(part, pole, monic=name != "B") if name in widened else part
-                for (name, _), part in zip(_parts(smaller), parts, strict=False)
+                with_root(part, pole, monic=name != "B") if name in widened else part
+                for (name, _), part in zip(parts_of(smaller), parts, strict=False)
             ]
             found.append(np.concatenate([*wider, parts[-1]]))
     return found
-
-
-def _fewer(orders: AbstractPolynomial) -> list[tuple[AbstractPolynomial, str]]:
-    """Structures that this one contains, and the polynomials that each lacks a root of."""
-    na, nc, nd, nb, nf = orders.order("na"), orders.order("nc"), orders.order("nd"), orders.nb, orders.denominators
-    change: Any = partial(replace, cast("Any", orders))
-    found = []
-    if na:
-        if na > 1 and nc > 1 and all(n > 1 for n in nb):
-            found.append((change(na=na - 1, nc=nc - 1, nb=tuple(n - 1 for n in nb)), "BAC"))
-    elif nb:
-        if min(nf) > 1 and min(nb) > 1:
-            found.append((change(nb=tuple(n - 1 for n in nb), nf=tuple(n - 1 for n in nf)), "BF"))
-        if nc > 1 and nd > 1:
-            found.append((change(nc=nc - 1, nd=nd - 1), "CD"))
-    return found
-
-
-def _parts(orders: AbstractPolynomial) -> list[tuple[str, int]]:
-    """The polynomials of the flat vector, in its order, and how many coefficients each has."""
-    common = [("A", orders.order("na"))] if _common(orders) else [("F", n) for n in orders.denominators]
-    noise = [(letter, orders.order(f"n{letter.lower()}")) for letter in ("C" if _common(orders) else "CD")]
-    return [*(("B", n) for n in orders.nb), *common, *noise]
-
-
-def _with_root(part: Array, root: float, *, monic: bool) -> Array:
-    """The coefficients of a polynomial times another root; a leading 1 is not among those of a monic one."""
-    whole = np.concatenate([[1.0], part]) if monic else part
-    return np.asarray(np.convolve(whole, [1.0, -root])[int(monic) :])
 
 
 def _differenced(piece: Segment) -> Segment:
