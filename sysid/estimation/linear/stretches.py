@@ -95,14 +95,15 @@ def _pieces(experiment: Experiment, length: int) -> list[Experiment]:
 
 def _piece(e: Experiment, first: int, last: int) -> Experiment:
     at = slice(first, last)
-    begun = (
-        {}
-        if first == 0
-        else {
-            "history": History(inputs=e.inputs[first - 1 : first], output=e.output[first - 1 : first]),
-            "past": np.zeros(1, dtype=np.bool_),
-            "n_first": 0,
-        }
+    cut = replace(
+        e,
+        inputs=e.inputs[at],
+        output=e.output[at],
+        weights=None if e.weights is None else e.weights[at],
+        usable=None if e.usable is None else e.usable[at],
+        each=None if e.each is None else e.each[at],
     )
-    own = {name: None if (v := getattr(e, name)) is None else v[at] for name in ("weights", "usable", "each")}
-    return replace(e, inputs=e.inputs[at], output=e.output[at], **own, **begun)
+    if first == 0:
+        return cut
+    before = History(inputs=e.inputs[first - 1 : first], output=e.output[first - 1 : first])
+    return replace(cut, history=before, past=np.zeros(1, dtype=np.bool_), n_first=0)

@@ -35,7 +35,9 @@ many on a smaller one is tried before it."""
 BLOCK_STATES = 6
 """Of a block at most; a linear model has more."""
 MANY_STATES = 4
-"""Of a linear model, from which on two blocks are tried before networks."""
+"""Of a linear model, from which on two blocks are tried before networks, if more are shown or needed."""
+LEAST_BLOCK, LARGEST_BLOCK = 3, 4
+"""States of two blocks that are tried first where they lead, by how many the record shows."""
 BLOCK_LATE = 3
 """Samples of dead time that a filter of few states may look like."""
 CORNERS = (4, 8, 12)
@@ -134,8 +136,8 @@ def _neural(looked: Looked) -> list[Try]:
         Try(structure=NeuralStateSpace(states=n, neurons=k), training={} if r is None else {"regularisation": r})
         for n, k, r in sizes
     ]
-    if looked.states > MOST_STATES:
-        found.insert(0, Try(structure=NeuralStateSpace(states=looked.states, neurons=8)))
+    if looked.needed > MOST_STATES:
+        found.insert(0, Try(structure=NeuralStateSpace(states=looked.needed, neurons=8)))
     if looked.never_negative:
         signless = NeuralStateSpace(states=3, neurons=4, output="absolute")
         found.append(Try(structure=signless, training={"regularisation": 1e-2}))
@@ -250,7 +252,8 @@ def _around_blocks(one: Try, _: Looked) -> list[Try]:
 
 def _two_blocks(looked: Looked) -> list[Try]:
     """A curve between two blocks; what looks like a dead time of few samples is left to the first of them."""
-    delays, sizes = max(looked.delay - BLOCK_LATE, 0), (3,) if _has_many_states(looked) else (2, 3)
+    delays, each = max(looked.delay - BLOCK_LATE, 0), min(max(-(-looked.shown // 2), LEAST_BLOCK), LARGEST_BLOCK)
+    sizes = (each,) if _has_many_states(looked) else (2, 3)
     return [
         Try(structure=WienerHammerstein(first=n, second=n, curve=f"rounded {CORNERS[0]}", delays=delays))
         for n in sizes
@@ -260,7 +263,7 @@ def _two_blocks(looked: Looked) -> list[Try]:
 
 def _has_many_states(looked: Looked) -> bool:
     """Whether a linear model has more states than small networks: these then say little, and blocks have them."""
-    return looked.states > MANY_STATES
+    return looked.states >= MANY_STATES and looked.needed > MANY_STATES
 
 
 def _around_two_blocks(one: Try, _: Looked) -> list[Try]:

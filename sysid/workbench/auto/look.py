@@ -11,6 +11,7 @@ from sysid.advice import Advice, Verdict, advise, looked_at
 from sysid.advice.dynamics import INTEGRATES
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
+from sysid.estimation.linear.state_space.orders import state_orders
 from sysid.estimation.output_ends import found_ends
 from sysid.estimation.resets import derived_from, found_resets, grey_box_of, switches
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind, VectorGreyBox
@@ -28,6 +29,8 @@ ARX_TRIED = 3
 """Of the shortlist of an order search."""
 ORDER_SEARCH = 0.2
 """Of what a look at an output takes, what a search for its orders does."""
+MOST_SHOWN = 12
+"""States that are looked for in the canonical correlations."""
 MOVED = 0.01
 """Share of an output's range by which it may move while the inputs have yet to, and still be said to begin at rest."""
 
@@ -50,6 +53,7 @@ class Looked:
         in_motion: Whether outputs move before any input does though each run begins as if they had stood: then what
             remembers one sample, or learns where it begins, is tried first.
         states: Of the best linear state space, once linear models were tried; 0 before.
+        shown: States that stand out of what the past says of the future; 0 where that cannot be told.
         resets: Where outputs jump and are linear between, the equations of that: then it is tried before all else.
         mechanism: Where friction holds an output, or play an input, equations of that, the likeliest first: they are
             tried next.
@@ -67,6 +71,7 @@ class Looked:
     all_end: bool = False
     integrators: int = 0
     states: int = 0
+    shown: int = 0
     seen_from: int | None = None
     resets: VectorGreyBox | None = None
     mechanism: tuple[VectorGreyBox, ...] = ()
@@ -75,6 +80,15 @@ class Looked:
     def lags(self) -> int:
         """Past samples that a network of lags looks at first, from 2 to 6."""
         return min(max(self.orders[0].na, 2), 6) if self.orders else 2
+
+    @property
+    def needed(self) -> int:
+        """States that the plant may have, by the best linear model of it.
+
+        Where a curve bends what comes between two filters, errors of a free run hide all but the slowest few of their
+        states, and those that the past shows count; but noise of many colours shows many too: twice as many at most.
+        """
+        return max(self.states, min(self.shown, 2 * self.states))
 
     @property
     def delay(self) -> int:
@@ -106,6 +120,7 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         n_inputs=len(mapping.inputs),
         n_outputs=len(mapping.outputs),
         orders=_orders(data, mapping, start),
+        shown=_shown(data.estimation, mapping),
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(suggestion.structure for one in advice for suggestion in one.suggestions),
         cautions=(*_cautions(advice), *_not_looked_at(mapping)),
@@ -220,6 +235,16 @@ def _orders(data: Data, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
     most = max(map(len, found), default=0)
     together = [_together([some[min(k, len(some) - 1)] for some in found]) for k in range(most)]
     return tuple(dict.fromkeys(together))
+
+
+def _shown(traces: Sequence[Trace], mapping: Mapping) -> int:
+    """States by the canonical correlations of past and future, without a fit."""
+    if not mapping.inputs:
+        return 0
+    try:
+        return state_orders(traces, mapping, most=MOST_SHOWN).chosen
+    except (UserError, np.linalg.LinAlgError, ValueError):  # too short, or a channel that never moves
+        return 0
 
 
 def _orders_of(traces: TraceSet, mapping: Mapping, start: Start) -> tuple[ARX, ...]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 
+from sysid.models import LinearStateSpace
 from sysid.reporting.sweep_record import Trial
+from sysid.workbench.auto.families import LINEAR_ORDERS
 from sysid.workbench.auto.finish import MOST_KEPT, span
 from sysid.workbench.auto.last_fit import SCATTER
 from sysid.workbench.auto.plan import Plan
 
+SPACES = LinearStateSpace.kind
 BUSY = 1.5
 """Seconds by the clock that a second of training takes from which on it is said."""
 LEAST_SHARE = 0.1
@@ -96,13 +99,20 @@ def busy(plan: Plan) -> list[str]:
 
 
 def left_out(plan: Plan) -> list[str]:
-    """What was not tried for want of time.
+    """What was not tried, for want of time or as the search ends there.
 
     Args:
         plan: What was tried.
 
     Returns:
-        A sentence, or none.
+        A sentence or two, or none.
     """
     some = ", ".join(plan.left_out)
-    return [f"Linear models that would have taken the time of nonlinear ones were left out: {some}."] if some else []
+    found = [f"Linear models that would have taken the time of nonlinear ones were left out: {some}."] if some else []
+    largest = max((int(t.structure["states"]) for t in plan.trials if t.structure["kind"] == SPACES), default=0)
+    if largest > LINEAR_ORDERS[-1] and plan.looked.states == largest:
+        found.append(
+            f"The best linear state space, of {largest} states, is the largest that was tried: one of more may be "
+            "better."
+        )
+    return found

@@ -11,7 +11,7 @@ from sysid.advice import Advice
 from sysid.models import ARX, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.auto.families import FAMILIES
-from sysid.workbench.auto.look import Looked, at_ends, in_motion, look
+from sysid.workbench.auto.look import MOST_SHOWN, Looked, at_ends, in_motion, look
 from sysid.workbench.auto.mechanisms import mechanism_of
 from tests.workbench.auto.conftest import data, record
 
@@ -33,6 +33,12 @@ def test_orders_dead_time_and_lags_are_found(looked: Looked) -> None:
     assert looked.delay >= 0
     assert 2 <= looked.lags <= 6
     assert looked.suggested
+    assert 1 <= looked.shown <= MOST_SHOWN
+
+
+def test_states_that_the_past_shows_are_believed_up_to_twice_those_of_a_free_run() -> None:
+    one = Looked(n_inputs=1, n_outputs=1)
+    assert [replace(one, states=n, shown=k).needed for n, k in ((2, 12), (4, 7), (5, 3))] == [4, 7, 5]
 
 
 def test_outputs_that_move_before_any_input_does_are_known() -> None:

@@ -453,6 +453,25 @@ def test_linear_models_get_more_states_as_long_as_these_gain() -> None:
     assert max(t.structure["states"] for t in searched(lambda _: 1.0)[0].trials if t.structure["kind"] == "SS") == 4
 
 
+@pytest.mark.parametrize(
+    ("shown", "block", "states"), [(6, "WH 3/3", None), (7, "WH 4/4", 7), (9, "WH 4/4", 8), (3, None, None)]
+)
+def test_states_that_a_curve_hides_from_free_runs_count_where_the_past_shows_them(
+    shown: int, block: str | None, states: int | None
+) -> None:
+    """Beyond four states linear models gain next to nothing; twice as many as they have are believed at most."""
+
+    def worth(point: Point) -> float:
+        one = point.structure
+        return 1.4 - 0.1 * min(one.states, 4) if isinstance(one, LinearStateSpace) else 1.0
+
+    plan, rounds = searched(worth, looked=replace(LOOKED, shown=shown))
+    assert plan.looked.states == 4
+    nonlinear = [point.structure.label for one in rounds for point in one if not linear(point)]
+    assert nonlinear[0].startswith(block or "NSS")
+    assert states is None or any(label.startswith(f"NSS {states}/8") for label in nonlinear)
+
+
 def test_what_answers_within_the_sample_has_linear_models_that_do() -> None:
     _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, orders=(ARX(na=2, nb=(2,), nk=(0,)),)))
     assert all(p.structure.feedthrough for one in rounds for p in one if isinstance(p.structure, LinearStateSpace))

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from sysid.models import NeuralStateSpace
+from sysid.models import LinearStateSpace, NeuralStateSpace
 from sysid.workbench.auto import told
 from sysid.workbench.auto.last_fit import SCATTER
 from sysid.workbench.sweep.search_space import Point
@@ -17,9 +17,8 @@ ONE = trial(Point(number=7, structure=NeuralStateSpace(states=2, neurons=3), tra
 
 
 def plan(*, wall_s: float | None = 60.0, slowed: float = 1.0, hurried: bool = True, **more: Any) -> Any:
-    return SimpleNamespace(
-        hurried=hurried, budget=SimpleNamespace(wall_s=wall_s, slowed=slowed, refit=0.2), left_out=[], **more
-    )
+    rest = {"left_out": [], "trials": [], "looked": SimpleNamespace(states=0), **more}
+    return SimpleNamespace(hurried=hurried, budget=SimpleNamespace(wall_s=wall_s, slowed=slowed, refit=0.2), **rest)
 
 
 def test_a_mean_of_starts_says_why() -> None:
@@ -41,3 +40,11 @@ def test_what_went_well_is_not_told() -> None:
     assert told.hurried(plan(hurried=False), ONE, 5.0, 0.0) == ""
     assert told.busy(plan()) == told.busy(plan(wall_s=None, slowed=9.0)) == told.left_out(plan()) == []
     assert "took 2.0 s" in told.busy(plan(slowed=2.0))[0]
+
+
+@pytest.mark.parametrize(("needed", "at_edge"), [(20, True), (18, False)])
+def test_a_linear_search_that_ends_at_its_edge_says_so(needed: int, at_edge: bool) -> None:
+    sizes = (4, 18, 20)
+    points = [Point(number=n, structure=LinearStateSpace(states=n, noise=False), training={}, values={}) for n in sizes]
+    said = told.left_out(plan(trials=[trial(one, 1.0) for one in points], looked=SimpleNamespace(states=needed)))
+    assert any("of 20 states, is the largest that was tried" in one for one in said) is at_edge
