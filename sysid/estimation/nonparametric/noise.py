@@ -107,6 +107,9 @@ def persistence(residuals: Sequence[NDArray[np.float64]]) -> float:
 def power(a: NDArray[np.float64]) -> float:
     """Variance of what an autoregression makes of white noise of variance 1.
 
+    By its reflection coefficients, from the last one back (Levinson 1947): errors so smooth that roots are at the edge
+    of the unit circle leave a Lyapunov equation nothing to be solved by.
+
     Args:
         a: Coefficients ``1, a1, ...``, its roots inside the unit circle.
 
@@ -117,9 +120,9 @@ def power(a: NDArray[np.float64]) -> float:
         >>> round(power(np.array([1.0, -0.8])), 3)
         2.778
     """
-    order = len(a) - 1
-    if order == 0:
-        return 1.0
-    driven = np.zeros((order, order))
-    driven[0, 0] = 1.0
-    return float(linalg.solve_discrete_lyapunov(linalg.companion(a), driven)[0, 0])
+    left = 1.0
+    while len(a) > 1:
+        reflection = float(a[-1] / a[0])
+        share = max(1.0 - reflection**2, np.finfo(np.float64).eps)
+        a, left = (a - reflection * a[::-1])[:-1] / share, left * share
+    return 1.0 / left
