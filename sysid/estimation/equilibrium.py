@@ -49,7 +49,11 @@ def equilibrium_notes(model: AbstractModel, traces: Sequence[Trace], start: Star
 
 
 def _plain_models(traces: Sequence[Trace], model: AbstractModel) -> list[AbstractModel]:
-    """An ARX model of the records, where they are long enough for one and it is stable."""
+    """An ARX model of the records, where they are long enough for one and none of its poles is slower than they are.
+
+    Such a one may be an integrator, which rests anywhere: its equilibrium is where no plant ever was.
+    """
+    edge = 1.0 - 1.0 / max(len(trace) for trace in traces)
     m = len(model.mapping.inputs)
     lags = max(1, min(LAGS, min(len(trace) for trace in traces) // (4 * (1 + m))))
     orders = ARX(na=min(2, lags), nb=(lags,) * m, nk=(0,) * m)
@@ -59,7 +63,7 @@ def _plain_models(traces: Sequence[Trace], model: AbstractModel) -> list[Abstrac
             found = fit_arx(traces, mapping, orders, start=ESTIMATED).model
         except TraceError:
             continue
-        if np.abs(cast("ARXModel", found).poles).max(initial=0.0) < 1.0:
+        if np.abs(cast("ARXModel", found).poles).max(initial=0.0) < edge:
             models.append(found)
     return models
 

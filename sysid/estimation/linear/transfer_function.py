@@ -23,7 +23,7 @@ from sysid.estimation.linear.segments import delayed_inputs, scaling_of
 from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.transfer_function_runs import End
-from sysid.estimation.linear.transfer_function_search import AbstractProblem
+from sysid.estimation.linear.transfer_function_search import AbstractProblem, Score
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
@@ -89,6 +89,16 @@ def fit_transfer_function(
     check_max_delay(training.max_delay, searched=orders.delays is None, field="delays")
     determined = Determined.of(whole)
     experiments, own = tuple(determined.only(e) for e in whole), determined.narrowed(orders)
+    scaling = scaling_of(whole, constant=orders.intercept)
+
+    def of_all_inputs(model: AbstractModel) -> AbstractModel:
+        if own is orders:
+            return model
+        return determined.widened(cast("TransferFunctionModel", model), orders, mapping, scaling)
+
+    def error_over(some: Sequence[Trace]) -> Callable[[AbstractModel], float]:
+        return lambda model: _mean_mse(of_all_inputs(model), some, start)
+
     problem = _Problem(
         experiments=experiments,
         scaling=scaling_of(experiments, constant=orders.intercept),
@@ -101,21 +111,12 @@ def fit_transfer_function(
             output_unit=traces[0].channel(mapping.output).unit,
             rest_output=rest,
         ),
+        as_scored=None if all(e.free for e in whole) else error_over(traces),
     )
-    scaling = scaling_of(whole, constant=orders.intercept)
-
-    def of_all_inputs(model: AbstractModel) -> AbstractModel:
-        if own is orders:
-            return model
-        return determined.widened(cast("TransferFunctionModel", model), orders, mapping, scaling)
-
-    def score(model: AbstractModel) -> float:
-        return _mean_mse(of_all_inputs(model), selection, start)
-
     # BLAS threads that wake for matrices of some ten columns cost more than they give: beside one other process on two
     # cores a fit took four times as long with them.
     with one_blas_thread():
-        fit = problem.solve(began, on_iteration, score if selection else None)
+        fit = problem.solve(began, on_iteration, error_over(selection) if selection else None)
     return replace(fit, model=of_all_inputs(fit.model))
 
 
@@ -166,6 +167,7 @@ class _Problem(AbstractProblem):
     orders: TransferFunction
     training: TransferFunctionTraining
     terms: Terms
+    as_scored: Score = None
 
     def provider(self, delays: tuple[int, ...], *, unknown: int | None = None) -> SeparableProvider:
         """The least-squares problem with these dead times; see the base class."""

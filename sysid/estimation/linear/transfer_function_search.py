@@ -69,6 +69,8 @@ class AbstractProblem(ABC):
     training: TransferFunctionTraining
     scaling: Scaling
     terms: Terms
+    as_scored: Score = None
+    """Of a model its error over the records from the start that was declared, where one was."""
 
     @abstractmethod
     def provider(self, delays: tuple[int, ...], *, unknown: int | None = None) -> SeparableProvider:
@@ -329,12 +331,17 @@ class AbstractProblem(ABC):
 
     def _snapped(self, end: End, ceiling: float) -> End:
         """The end with poles at 1 that are no further from there than the records can tell."""
-        edge = 1.0 / max(len(record.target) for record in end.provider.records)
-        moved = at_one(end.sections, self.orders.domain, self.terms.sample_time, 5.0 * edge)
-        snapped = replace(end, theta=end.provider.poles.theta(moved))
+        snapped = self._at_one(end)
         above = snapped.loss > ceiling * (1.0 + SAME) + EXACT * end.power
         if above or snapped.worse_than(end):
             return end
+        return snapped
+
+    def _at_one(self, end: End) -> End:
+        """The end with all poles at 1 that records of this length do not tell from there."""
+        near = 5.0 / max(len(record.target) for record in end.provider.records)
+        moved = at_one(end.sections, self.orders.domain, self.terms.sample_time, near)
+        snapped = replace(end, theta=end.provider.poles.theta(moved))
         return replace(snapped, curve=(*end.curve[:-1], replace(end.curve[-1], mse=2.0 * snapped.loss)))
 
     def _free_poles(self, end: End, delays: tuple[int, ...], watch: Watch, score: Score) -> tuple[AbstractProblem, End]:
@@ -368,8 +375,13 @@ class AbstractProblem(ABC):
         # chance, the gain must be one that as many parameters as there are, fitted to it, could not have.
         if not at_end.worse_than(found, free=sum(self.orders.poles) + provider.n_taps):
             return self, at_end
-        if score is not None and not score(free._model(found)[0]) < score(self._model(end)[0]):
-            return self, at_end
+        # Free poles are fitted from a free state. What begins where a start says has to follow from there as well: a
+        # pole that is off 1 by little has an equilibrium where no plant ever was.
+        judge = score or self.as_scored
+        if judge is not None:
+            found = min((found, free._at_one(found)), key=lambda one: judge(free._model(one)[0]))
+            if not judge(free._model(found)[0]) < judge(self._model(end)[0]):
+                return self, at_end
         return free, found
 
     def _chosen(self, candidates: list[Candidate], score: Callable[[AbstractModel], float], watch: Watch) -> End:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.transfer_function_runs import Candidate
@@ -48,11 +49,14 @@ def of_stability(model: TransferFunctionModel) -> str:
     Returns:
         The sentence.
     """
-    poles = np.concatenate([model.poles(j) for j in range(len(model.sections))])
-    discrete = model.orders.domain is Domain.DISCRETE
-    away = np.abs(poles) - 1.0 if discrete else poles.real
+    each = [model.poles(j) for j in range(len(model.sections))]
+    poles, discrete = np.concatenate(each), model.orders.domain is Domain.DISCRETE
     edge = slow_poles.INTEGRATES * (1.0 if discrete else 1.0 / model.sample_time)
-    at_edge = int(np.count_nonzero(np.abs(away) <= edge))
+
+    def beyond(some: NDArray[np.complex128]) -> NDArray[np.float64]:
+        return np.asarray(np.abs(some) - 1.0 if discrete else some.real)
+
+    away, at_edge = beyond(poles), max(int(np.count_nonzero(np.abs(beyond(some)) <= edge)) for some in each)
     if at_edge and float(away.max()) <= edge:
         word = {1: "an integrator", 2: "a double integrator"}.get(at_edge, f"{at_edge} poles at the edge")
         return f"The transfer function is not stable: {word}; an error of its input adds up for ever."

@@ -1,0 +1,39 @@
+"""Plants that integrate, in records that are declared to begin at rest: fitted as they are scored."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sysid
+
+REST = sysid.Start(kind="rest")
+
+
+def summed(n: int, offset: float, seed: int) -> sysid.TraceSet:
+    """What adds up two inputs, of which the second stands far from zero."""
+    rng = np.random.default_rng(seed)
+    u = np.column_stack([rng.standard_normal(n), offset + rng.standard_normal(n)])
+    y = np.concatenate([[0.0], np.cumsum(u.sum(axis=1))[:-1]])
+    return sysid.data((u, y), sample_time=0.1)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("offset", [10.0, 1e5])
+def test_a_dead_time_that_is_wrong_costs_a_sample_and_no_runaway(offset: float, seed: int) -> None:
+    """Free poles were fitted from a free state, ended a little off 1, and had an equilibrium far beyond the record."""
+    traces = summed(87, offset, seed)
+    orders = sysid.TransferFunction(poles=(1, 1), zeros=(0, 0), delays=(1, 0))
+    fit = sysid.fit(traces, "u1+u2 -> y", orders, start=REST)
+    assert fit.status.usable
+    assert [fit.model.poles(j).tolist() for j in (0, 1)] == [[1.0], [1.0]]
+    (case,) = next(iter(sysid.compare(traces, fit, start=REST).evaluations.values())).cases.values()
+    assert case.free_run.mse**0.5 < 2.0  # the inputs' noise over a sample
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_each_input_has_its_own_integrator_and_neither_record_nor_plant_is_called_more(seed: int) -> None:
+    orders = sysid.TransferFunction(poles=(1, 1), zeros=(0, 0), delays=(1, 1))
+    fit = sysid.fit(summed(400, 10.0, seed), "u1+u2 -> y", orders, start=REST)
+    assert any("not stable: an integrator" in note for note in fit.notes)
+    assert not any("does not begin in equilibrium" in note for note in fit.notes)
