@@ -81,7 +81,12 @@ class Determined:
         return replace(experiment, inputs=experiment.inputs[:, own], history=history)
 
     def widened(
-        self, model: TransferFunctionModel, orders: TransferFunction, mapping: Mapping, scaling: Scaling
+        self,
+        model: TransferFunctionModel,
+        orders: TransferFunction,
+        mapping: Mapping,
+        scaling: Scaling,
+        units: tuple[str, ...],
     ) -> TransferFunctionModel:
         """The model over all inputs: the others have no effect.
 
@@ -90,6 +95,7 @@ class Determined:
             orders: Of all inputs.
             mapping: With all inputs.
             scaling: Of all inputs.
+            units: Of all inputs.
 
         Returns:
             The model.
@@ -118,6 +124,7 @@ class Determined:
             taps=tuple(taps),
             scaling=replace(model.scaling, input_offset=tuple(offsets), input_scale=tuple(scales)),
             mapping=mapping,
+            input_units=units,
         )
 
     def polynomials(

@@ -90,14 +90,15 @@ def fit_transfer_function(
     determined = Determined.of(whole)
     experiments, own = tuple(determined.only(e) for e in whole), determined.narrowed(orders)
     scaling = scaling_of(whole, constant=orders.intercept)
+    units = tuple(traces[0].channel(name).unit for name in mapping.inputs)
 
     def of_all_inputs(model: AbstractModel) -> AbstractModel:
         if own is orders:
             return model
-        return determined.widened(cast("TransferFunctionModel", model), orders, mapping, scaling)
+        return determined.widened(cast("TransferFunctionModel", model), orders, mapping, scaling, units)
 
-    def error_over(some: Sequence[Trace]) -> Callable[[AbstractModel], float]:
-        return lambda model: _mean_mse(of_all_inputs(model), some, start)
+    def score(model: AbstractModel) -> float:
+        return _mean_mse(of_all_inputs(model), selection, start)
 
     problem = _Problem(
         experiments=experiments,
@@ -105,18 +106,18 @@ def fit_transfer_function(
         orders=own,
         training=training,
         terms=Terms(
-            mapping=replace(mapping, inputs=tuple(mapping.inputs[j] for j in determined.kept)),
+            mapping=determined.mapping(mapping),
             sample_time=traces[0].sample_time,
-            input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
+            input_units=tuple(units[j] for j in determined.kept),
             output_unit=traces[0].channel(mapping.output).unit,
             rest_output=rest,
         ),
-        as_scored=None if all(e.free for e in whole) else error_over(traces),
+        as_scored=None if all(e.free for e in whole) else lambda model: _mean_mse(model, traces, start),
     )
     # BLAS threads that wake for matrices of some ten columns cost more than they give: beside one other process on two
     # cores a fit took four times as long with them.
     with one_blas_thread():
-        fit = problem.solve(began, on_iteration, error_over(selection) if selection else None)
+        fit = problem.solve(began, on_iteration, score if selection else None)
     return replace(fit, model=of_all_inputs(fit.model))
 
 

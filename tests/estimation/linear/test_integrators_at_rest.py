@@ -37,3 +37,15 @@ def test_each_input_has_its_own_integrator_and_neither_record_nor_plant_is_calle
     fit = sysid.fit(summed(400, 10.0, seed), "u1+u2 -> y", orders, start=REST)
     assert any("not stable: an integrator" in note for note in fit.notes)
     assert not any("does not begin in equilibrium" in note for note in fit.notes)
+
+
+def test_inputs_that_say_nothing_are_left_out_of_smaller_structures_too() -> None:
+    """Fewer samples than dead times and past inputs have: of two inputs one is not determined."""
+    u = np.random.default_rng(0).standard_normal((6, 2))
+    y = np.array([0.0, 1.43, 1.96, 1.50, 0.04, -1.12])
+    copied = np.column_stack([u[:, 0], 2.0 * u[:, 0]])
+    orders = sysid.TransferFunction(poles=(1, 1), zeros=(0, 1))
+    training = sysid.TransferFunctionTraining(max_iterations=5, max_delay=3)
+    for inputs in (u, copied):
+        fit = sysid.fit(sysid.data((inputs, y), sample_time=0.1), "u1+u2 -> y", orders, training, start=REST)
+        assert np.isfinite(fit.simulate(inputs)).all()
