@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.informative import SAME, by_chance, informative, unit, with_past
+from sysid.estimation.informative import SAME, by_chance, by_chance_of_signs, informative, unit, with_past
 from sysid.estimation.least_squares.correlation import products
 from sysid.models import AbstractModel, GreyBox, TransferFunction
 from sysid.models.intersample import MOVING
@@ -22,6 +22,8 @@ LEAST_ERROR = 1e-2
 """Part of the output's standard deviation that the error must have to be worth an explanation."""
 SHARE, SURE = 0.2, 1e-6
 """Part of the error that an input of the same sample must explain, and how improbable that is by chance."""
+SURE_OF_SIGNS = 0.1
+"""How probable it may be at one lag where only the signs of moves count: five alike are enough, one jump is not."""
 ELSEWHERE, FIRST = 0.05, 0.25
 """Part that an input of another sample must explain; and part of the most from which it is said to begin."""
 NEARLY_ALL = 0.9
@@ -209,6 +211,8 @@ def _lag(
     # Levels that are held go back and forth: a change goes with the one before, and stands for it so long before.
     peak = int(shares.argmax())
     moved = np.concatenate([np.zeros(peak), new[: len(new) - peak]])
+    if by_chance_of_signs(left * moved) >= SURE_OF_SIGNS:
+        return 0, 0.0
     rest = _shares(left - moved * (moved @ left) / max(moved @ moved, SAME), new, peak)
     rest[but] = 0.0
     before = np.flatnonzero(rest >= FIRST * share)
@@ -240,8 +244,10 @@ def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usab
     if free < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(inputs[whole, j]):
         return 0.0
     # Of length 1 first: the square of a free run that grows without bound is no number.
-    share = float(_direction(left) @ _direction(new)) ** 2
-    return share if share > SHARE and by_chance(share, 1, free) < SURE else 0.0
+    together = _direction(left) * _direction(new)
+    share = float(together.sum()) ** 2
+    sure = by_chance(share, 1, free) < SURE and by_chance_of_signs(together) < SURE_OF_SIGNS
+    return share if share > SHARE and sure else 0.0
 
 
 def _direction(x: NDArray[np.float64]) -> NDArray[np.float64]:

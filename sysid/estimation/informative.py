@@ -89,6 +89,25 @@ def by_chance(share: float, used: int, free: int) -> float:
     return float(scipy.special.fdtrc(used, free, share / used * free / left))
 
 
+def by_chance_of_signs(products: NDArray[np.float64]) -> float:
+    """How probable it is at most that moves go together so much, were their signs by chance (Hoeffding 1963).
+
+    The F test takes noise to be alike at every sample. Where a few jumps are all that is new in two signals, one that
+    falls on another explains as much as many do; here it counts as one.
+
+    Args:
+        products: Of what is new in both, sample by sample.
+
+    Returns:
+        The probability's bound.
+    """
+    largest = float(np.abs(products).max(initial=0.0))
+    if largest == 0.0:
+        return 1.0
+    scaled = products / largest  # squares of what is small are no number
+    return float(np.exp(-0.5 * scaled.sum() ** 2 / (scaled @ scaled)))
+
+
 def beyond_chance(share: float, before: int, after: int) -> float:
     """The part of squares that columns explain, less what they would of noise.
 

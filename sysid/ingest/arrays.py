@@ -104,7 +104,7 @@ def data(
         columns = columns_of(one, wanted_inputs, wanted_outputs, where=label)
         channels = [*(wanted_inputs or ()), *(wanted_outputs or ())]
         marks.append(_taken_out(columns, split, channels, where=label))
-        table = table_of(columns, name=label)
+        table = table_of(columns, name=label, channels=channels, timed=step is None)
         check_lengths(table, channels)
         if table.time is None:
             check_rows(one[0] if isinstance(one, tuple) else one, where=label)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.ingest.columns import array_column
+from sysid.ingest.columns import RawColumn, array_column
 from sysid.ingest.frames import INDEX, check_distinct, not_numbers
 from sysid.ingest.headers import parse_header, unit_in_name
 from sysid.ingest.meaning import with_clock
@@ -20,12 +20,16 @@ from sysid.ingest.table import RawTable, by_length
 from sysid.ingest.time_columns import is_time_unit, recognise_time
 
 
-def table_of(columns: Mapping[str, NDArray[Any]], *, name: str) -> RawTable:
+def table_of(
+    columns: Mapping[str, NDArray[Any]], *, name: str, channels: Collection[str] = (), timed: bool = True
+) -> RawTable:
     """The columns as a reader would give them.
 
     Args:
         columns: Arrays of shape ``(n_samples,)`` by name, as :func:`sysid.ingest.frames.columns_by_name` finds them.
         name: Of the record, for errors.
+        channels: Names of columns that are wanted as channels: one is time only where no other column is.
+        timed: Whether one of these may be time at all; not where the sample time is given.
 
     Returns:
         The table, with its time where a column or an index is one.
@@ -60,13 +64,19 @@ def table_of(columns: Mapping[str, NDArray[Any]], *, name: str) -> RawTable:
         reader="memory",
         columns=equal,
         others=others,
-        time=INDEX if INDEX in columns else recognise_time(equal),
+        time=INDEX if INDEX in columns else _time(equal, channels, timed=timed),
         origin=f"given from memory (SHA-256 {_digest(columns)})",
     )
     # Time is in seconds in every function of ours, unless its name or the size of its numbers says otherwise.
     table = with_clock(table)
-    timed = [replace(c, unit=_clock_unit(c.name)) if c.name == table.time and not c.unit else c for c in table.columns]
-    return replace(table, columns=tuple(timed))
+    united = [replace(c, unit=_clock_unit(c.name)) if c.name == table.time and not c.unit else c for c in table.columns]
+    return replace(table, columns=tuple(united))
+
+
+def _time(columns: Sequence[RawColumn], channels: Collection[str], *, timed: bool) -> str | None:
+    named = {parse_header(one).name for one in channels}
+    others = recognise_time([column for column in columns if column.name not in named])
+    return recognise_time(columns) if others is None and timed else others
 
 
 def _clock_unit(name: str) -> str:

@@ -104,7 +104,7 @@ def _of_columns(
     *,
     where: str,
 ) -> NDArray[np.float64]:
-    table = table_of(named, name=where)
+    table = table_of(named, name=where, channels=names)
     check_lengths(table, names)
     if table.time is None:
         check_rows(values, where=where)

@@ -9,7 +9,7 @@ import numpy as np
 
 from sysid.errors import UnitError
 from sysid.ingest.columns import RawColumn
-from sysid.units import USUAL_UNITS, convert, plain_unit
+from sysid.units import USUAL_UNITS, check_unit, convert, plain_unit
 
 _TIME_NAMES = {
     "t", "time", "zeit", "tijd", "temps", "tiempo", "tempo", "tid", "timestamp", "timestamps", "time stamp",
@@ -20,8 +20,15 @@ _TIME_NAMES = {
 _TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
 
 
+GOES_BACK = 0.25
+"""Part of the steps that lead back, from which on a column moves as a signal does; stamps that do are out of order."""
+
+
 def recognise_time(columns: Sequence[RawColumn]) -> str | None:
     """The column that holds time, by its name, else by its unit.
+
+    A signal may be called ``t``, too, as a temperature is: what goes back and forth gives way to what does not, and
+    with a unit of something else it is no time at all.
 
     Args:
         columns: The columns of a file.
@@ -32,11 +39,30 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
     named = [column for column in columns if is_called_time(column.name)]
     # A capital T may be a temperature: only where nothing else is called time, and it rises.
     plain = [column for column in named if re.split(r"[/.]", column.name.strip())[-1] != "T"]
-    found = next(iter(plain), None) or next((column for column in named if _may_be_clock(column)), None)
-    if found is not None:
-        return found.name
-    timed = [column.name for column in columns if column.unit is not None and time_unit(column.unit) in _TIME_UNITS]
-    return timed[0] if timed else None
+    clocks = [column for column in named if _may_be_clock(column)]
+    timed = [column for column in columns if column.unit is not None and time_unit(column.unit) in _TIME_UNITS]
+    likely = [*plain, *clocks, *timed]
+    back = {column.name for column in likely if _goes_back(column)}
+    found = next((column for column in likely if column.name not in back), None) or next(
+        (column for column in likely if not _has_other_unit(column)), None
+    )
+    return None if found is None else found.name
+
+
+def _goes_back(column: RawColumn) -> bool:
+    steps = np.diff(column.values)
+    return bool(len(steps)) and float(np.mean(steps < 0.0)) > GOES_BACK
+
+
+def _has_other_unit(column: RawColumn) -> bool:
+    """Whether a unit is known, and is none of time."""
+    if column.unit is None or is_time_unit(column.unit):
+        return False
+    try:
+        check_unit(column.unit)
+    except UnitError:
+        return False
+    return True
 
 
 def _may_be_clock(column: RawColumn) -> bool:

@@ -101,10 +101,11 @@ def terrain(
             handling = f"no power until half the train is past; gain at most {3.6 * SPEED_GAINS[one.severity]:.0f} km/h"
         else:
             handling = f"hold {sag_acceleration(line, shape, one.apex):+.3f} m/s2"
+        pulls = f"{'draft' if force.force >= 0.0 else 'buff'} {abs(force.force) / 1000.0:.0f} kN"
         typer.echo(
             f"{one.kind:<6} {one.severity.value:<7} {one.start:8.0f} to {one.end:8.0f} m, strongest at {one.apex:8.0f} "
-            f"m ({1000.0 * one.correlation:+.1f} per mille): {handling}; coupler {force.coupler} "
-            f"{'draft' if force.force >= 0.0 else 'buff'} {abs(force.force) / 1000.0:.0f} kN"
+            f"m ({1000.0 * one.correlation:+.1f} per mille): {handling}"
+            + (f"; coupler {force.coupler} {pulls}" if force.coupler else "")
         )
         if line.curvatures.any():
             ratios = lateral_ratio(line, consist, one.apex)
@@ -233,6 +234,12 @@ def eot(
         held = ", ".join(f"{place} {values[-1, node - 1]:.1f}" for place, node in places.items())
         braked = f"at nine tenths after {took:5.1f} s" if np.isfinite(took) else "have no pressure"
         typer.echo(f"{name:<9} cylinders {braked}; at the end {held} psi")
+    if any(found.rising):
+        opened = ", the valve is open" if found.still_open else ""
+        typer.echo(
+            f"note: at {seconds:g} s cylinders still rise{opened}; nine tenths are of what they have by then: look "
+            "longer (--seconds)"
+        )
     if out is not None:
         columns = {"time_s": found.time} | {
             f"{place}_{ends}_psi": values[:, node - 1]
@@ -251,7 +258,8 @@ def stops(
     grade: Annotated[float, typer.Option(help="Rise over run.")] = 0.0,
     count: Annotated[int, typer.Option(help="How many stops.")] = 5,
     trace: Annotated[
-        Path | None, typer.Option(help="Slow application of the real plant, with P [mA] and A [m/s^2]; else nominal.")
+        Path | None,
+        typer.Option(help=r"Slow application of the real plant, with P \[mA] and A \[m/s^2]; else nominal."),
     ] = None,
     record: Annotated[
         Path | None, typer.Option(help="Write such a trace of the vehicle with this friction (CSV).")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.models import AbstractModel, Start, StartKind, beginning
 from sysid.traces import Trace
-from sysid.validation.metrics import figures, percent
+from sysid.validation.metrics import Figures, figures, percent
 from sysid.validation.resolution import parts_of, tied
 
 REMEMBERED = 0.1
@@ -68,11 +68,18 @@ def _told(model: AbstractModel, trace: Trace, start: Start) -> str:
         if not np.isfinite(errors).all() or not np.mean(errors[0] ** 2) > COSTS * np.mean(errors[1] ** 2):
             continue
         if not tied(parts_of(errors[1]), parts_of(errors[0])):
-            fits = [percent(figures(aims[:, k], run[:, k], "1", counted).nrmse_fit) for run in runs]
+            seen = [figures(aims[:, k], run[:, k], model.ends.units[output], counted) for run in runs]
+            what, (short, long) = _figure(seen)
             return (
                 f"{trace.name}: {model.structure.label} does not forget how a run begins (its slowest pole is "
-                f"{model.pole_radius:.5g}). With the first state estimated on {first} samples the fit of {output} is "
-                f"{fits[0]} %, on {longer} samples {fits[1]} %, over the same samples: write start: "
-                f"{{estimated: {longer}}}."
+                f"{model.pole_radius:.5g}). With the first state estimated on {first} samples the {what} of {output} "
+                f"is {short}, on {longer} samples {long}, over the same samples: write start: {{estimated: {longer}}}."
             )
     return ""
+
+
+def _figure(seen: Sequence[Figures]) -> tuple[str, list[str]]:
+    """What is told of runs, and its values: the fit, and of an output that never changes, which has none, the error."""
+    if np.isnan(seen[0].nrmse_fit):
+        return "rms error", [f"{np.sqrt(one.mse):.3g} {one.unit}" for one in seen]
+    return "fit", [f"{percent(one.nrmse_fit)} %" for one in seen]

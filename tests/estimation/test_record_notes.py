@@ -250,6 +250,19 @@ def test_no_dead_time_is_told_where_something_else_is_wrong(plant: str) -> None:
         assert not [note for note in sysid.fit(traces, "u -> y", structure).warnings if "dead time is too" in note]
 
 
+@pytest.mark.parametrize("jumps", [(200,), (100, 260)])
+@pytest.mark.parametrize("shift", [0, 3])
+def test_no_dead_time_is_read_from_a_few_jumps_of_another_cause(jumps: tuple[int, ...], shift: int) -> None:
+    """Of held levels one falls on the jump at some lag, and is then all that is new in both."""
+    u = np.repeat(np.random.default_rng(8).uniform(-1, 1, 50), 8)
+    y = np.zeros(len(u))
+    for jump in jumps:
+        y[jump + shift :] += 1.0
+    for structure in (sysid.ARX(na=1, nb=1, nk=1), sysid.OE(nb=1, nf=1, nk=1)):
+        told = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", structure).warnings
+        assert not [note for note in told if "dead time" in note or "of the same sample" in note]
+
+
 def test_a_free_run_that_grows_without_bound_is_told_and_ends_nothing() -> None:
     """``y = 2 u`` at once, by an equation without that lag: its squares were too large to be numbers."""
     u = np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 126), 8)[:1_000]

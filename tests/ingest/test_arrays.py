@@ -235,3 +235,17 @@ def test_units_may_be_those_of_a_library() -> None:
         assert [channel.unit for channel in data((U, Y), sample_time=1, units=units).channels] == ["volt", "1"]
     with pytest.raises(UnitError):
         data((U, Y), sample_time=1, units={"u": 5})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize("name", ["t", "Time", "seconds", "date", "T", "zeit"])
+def test_a_channel_that_is_called_as_time_is_a_channel_where_it_is_asked_for(name: str) -> None:
+    rng = np.random.default_rng(0)
+    u, level = rng.uniform(-1, 1, 50), rng.uniform(18, 22, 50)
+    for frame in ({"u": u, name: level}, {"clock [s]": 0.5 * np.arange(50), "u": u, name: level}):
+        step = None if "clock [s]" in frame else 0.5
+        (trace,) = data(frame, inputs="u", outputs=name, sample_time=step, units={name: "degC"})
+        assert trace.sample_time == 0.5
+        assert_array_equal(trace[name], level)
+    stamps = {"u": u, name: 0.5 * np.arange(50)}  # one that is both, as a ramp is
+    (trace,) = data(stamps, inputs=name, outputs="u")
+    assert trace.sample_time == 0.5

@@ -10,6 +10,7 @@ import pytest
 
 import sysid
 from sysid.errors import ChannelError, ConfigError, ReaderError, TraceError, UnitError
+from sysid.ingest.undescribed import GuessedWarning
 
 N = 120
 U, Y = np.arange(N) % 7.0, np.arange(N) % 5.0
@@ -99,3 +100,23 @@ def test_the_numbers_that_are_proposed_for_words_are_no_way_round(tmp_path: Path
         sysid.load(tmp_path / "rig.csv")
     zero = "one" if "one" in words else words[1]
     assert f"'{zero}': 0" in str(refused.value.remedy) or f"{zero}: 0" in str(refused.value.remedy)
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "step"),
+    [
+        ("u [V],t [degC]", lambda k, y: f"{U[k]},{y}", None),  # a temperature, and no stamps
+        ("stamp [s],u,t", lambda k, y: f"{0.5 * k},{U[k]},{y}", 0.5),  # by name t would be time
+        ("T [s],u,time", lambda k, y: f"{0.5 * k},{U[k]},{y}", 0.5),
+    ],
+)
+def test_a_signal_that_is_called_as_time_is_not_the_clock(
+    tmp_path: Path, header: str, rows: object, step: object
+) -> None:
+    level = np.random.default_rng(0).uniform(18.0, 22.0, N)
+    lines = [rows(k, f"{level[k]:.6f}") for k in range(N)]  # type: ignore[operator]
+    (tmp_path / "rig.csv").write_text("\n".join([header, *lines]))
+    with pytest.warns(GuessedWarning):
+        trace = sysid.load(tmp_path / "rig.csv").traces[0]
+    assert trace.sample_time == (step or 1.0)
+    assert np.allclose(trace[trace.channel_names[-1]], level, atol=1e-6)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from sysid.errors import SysidError
@@ -163,3 +164,32 @@ def test_the_command_line_finds_what_a_field_brings(
     monkeypatch.setattr(cli.app, "registered_groups", list(cli.app.registered_groups))
     assert cli.run_cli(["rail", "terrain", CREST, TRAIN, "--dry-run"]) == 0
     assert "nothing is done" in capsys.readouterr().out
+
+
+def test_every_help_text_is_printed_as_it_is_written() -> None:
+    """What stands in brackets is taken for markup and left out, where it is not escaped."""
+    parameters = get_command(app).commands["stops"].params  # type: ignore[attr-defined]
+    written = next(one.help for one in parameters if one.name == "trace")
+    for command in ("terrain", "drive", "eot", "stops"):
+        printed = " ".join(CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "400"}).output.split())
+        for one in get_command(app).commands[command].params:  # type: ignore[attr-defined]
+            assert one.help.replace("\\[", "[") in printed
+    assert "[mA]" in written
+
+
+def test_a_single_vehicle_has_no_coupler_and_is_driven_all_the_same(tmp_path: Path) -> None:
+    engine = tmp_path / "light.yaml"
+    engine.write_text(
+        "name: light engine\nvehicles: [{name: locomotive, mass: 100000, length: 20, axles: 4, power: {}}]\n"
+    )
+    told = run(["terrain", CREST, str(engine), "--step", "5"])
+    assert "crest " in told
+    assert "coupler" not in told
+    assert "is at" in run(["drive", DRIVE[1], str(engine), *DRIVE[3:], "--longest", "5"])
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(12, True), (40, False)])
+def test_cylinders_that_still_rise_at_the_end_are_told(seconds: int, told: bool) -> None:
+    """Nine tenths of what they have by then is a time that means nothing."""
+    said = run(["eot", "--pairs", "5", "--handle", "0", "--seconds", str(seconds)])
+    assert (f"at {seconds} s cylinders still rise, the valve is open" in said) is told

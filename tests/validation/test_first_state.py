@@ -27,3 +27,17 @@ def test_what_a_slow_pole_does_with_a_poor_first_state_is_told(pole: float, told
         assert f"on 400 samples {score.to_frame()['fit'][1]:.2f} %" in note
         assert not [note for note in score.notes if "does not forget" in note]
         assert not [note for note in sysid.compare(traces, fit, start="rest").notes if "does not forget" in note]
+
+
+def test_of_an_output_that_never_changes_the_error_is_told_and_no_percent() -> None:
+    """A single jump of an output lies in the first part: over the second it is at rest, and a fit there is none."""
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.uniform(-1, 1, 50), 8)
+    y = 7.0 * (np.arange(400) > 200)
+    traces = sysid.data((u, y), sample_time=0.1, split=0.7, units={"y": "kPa"})
+    fit = sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=1, nk=1))
+    (told,) = [note for note in sysid.compare(traces, fit).notes if "does not forget how a run begins" in note]
+    scored = sysid.compare(traces, fit, start={"estimated": 40}).to_frame()
+    rms = np.sqrt(scored["mse"].iloc[1])
+    assert "% " not in told
+    assert f"on 40 samples {rms:.3g} kPa" in told

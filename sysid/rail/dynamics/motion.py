@@ -63,7 +63,7 @@ class Peak:
 
     Args:
         force: In N, positive in draft.
-        coupler: Number from 1: the one behind vehicle ``coupler``.
+        coupler: Number from 1: the one behind vehicle ``coupler``; 0 where a single vehicle has none.
         time: In s.
     """
 
@@ -190,6 +190,8 @@ class MovingTrain:
             The peak; its force is 0 if there was none.
         """
         forces = self.state.peak[:, 0 if draft else 2]
+        if not len(forces):
+            return Peak(force=0.0, coupler=0, time=0.0)
         at = int(np.argmax(forces) if draft else np.argmin(forces))
         return Peak(force=float(forces[at]), coupler=at + 1, time=float(self.state.peak[at, 1 if draft else 3]))
 

@@ -20,6 +20,8 @@ from sysid.units import PSI_IN_PA
 
 AFTER = 5.0
 """When the handle moves, in s."""
+SETTLING, GROWS = 5.0, 0.02
+"""Seconds at the end in which no cylinder grows by more than this share, if it has come to its pressure (ours)."""
 
 
 @dataclass(kw_only=True)
@@ -105,6 +107,8 @@ class BothEnds:
         one: The same from the head alone.
         braked: Seconds from the command until every cylinder has nine tenths of its pressure, both ends and one; NaN
             where none has any.
+        rising: Whether a cylinder still rises at the end, so that this pressure is not its last, both ends and one.
+        still_open: Whether the valve is open at the end.
     """
 
     time: NDArray[np.float64]
@@ -114,6 +118,8 @@ class BothEnds:
     both: NDArray[np.float64]
     one: NDArray[np.float64]
     braked: tuple[float, float]
+    rising: tuple[bool, bool]
+    still_open: bool
 
 
 def check_application(consist: Consist, handle: float, *, seconds: float, after: float = AFTER) -> None:
@@ -169,9 +175,17 @@ def from_both_ends(consist: Consist, handle: float, *, seconds: float = 150.0, a
         both=both / PSI_IN_PA,
         one=one / PSI_IN_PA,
         braked=(_braked(both, step, moved), _braked(one, step, moved)),
+        rising=(_rising(both, step), _rising(one, step)),
+        still_open=len(vents) > 0 and int(vents[-1]) == len(watched.vents) - 1,
     )
 
 
 def _braked(cylinders: NDArray[np.float64], step: float, moved: int) -> float:
     times = full_braking_times(cylinders, step, from_sample=moved)
     return float(np.nanmax(times)) if np.isfinite(times).any() else float("nan")
+
+
+def _rising(cylinders: NDArray[np.float64], step: float) -> bool:
+    """Whether one grows so fast that :data:`SETTLING` more would add to it what counts."""
+    before = cylinders[max(0, len(cylinders) - 1 - round(SETTLING / step))]
+    return bool((cylinders[-1] - before > GROWS * cylinders[-1]).any())

@@ -93,7 +93,7 @@ class ForceEstimate:
 
     Args:
         force: In N, positive in draft.
-        coupler: Number from 1, the one behind vehicle ``coupler``.
+        coupler: Number from 1, the one behind vehicle ``coupler``; 0 where a single vehicle has none.
     """
 
     force: float
@@ -112,6 +112,8 @@ def peak_force(track: TrackProfile, train: Train, x: float) -> ForceEstimate:
         The estimate.
     """
     forces = quasi_static_forces(track, train, x)
+    if not len(forces):
+        return ForceEstimate(force=0.0, coupler=0)
     at = int(np.argmax(np.abs(forces)))
     return ForceEstimate(force=float(forces[at]), coupler=at + 1)
 

@@ -237,3 +237,12 @@ def test_windows_lead_a_start_of_a_network_of_several_outputs() -> None:
 def test_a_drawn_start_is_not_taken_for_one_that_is_lost() -> None:
     fit = fit_vector_narx([coupled(400)], MAPPING, NETWORK, JointTraining(max_iterations=5))
     assert not any("windows" in note for note in fit.notes)
+
+
+def test_without_selection_traces_nothing_is_said_of_an_error_there() -> None:
+    options = JointTraining(max_iterations=5, starts=2)
+    alone = fit_vector_narx([coupled(400)], MAPPING, NETWORK, options).notes
+    assert not any("nan" in note or "selection" in note for note in alone)
+    assert any("mean squared residual (iterations): " in note for note in alone)
+    chosen = fit_vector_narx([coupled(400)], MAPPING, NETWORK, options, selection=[coupled(400, 1)]).notes
+    assert any("error on the selection traces (iterations): " in note for note in chosen)

@@ -81,10 +81,8 @@ class _Candidate:
 
     @property
     def sentence(self) -> str:
-        return (
-            f"from {self.origin} after {self.iteration} iterations: mean squared residual {self.loss:.4g}, on the "
-            f"selection traces {self.score:.4g}"
-        )
+        on_others = "" if np.isnan(self.score) else f", on the selection traces {self.score:.4g}"
+        return f"from {self.origin} after {self.iteration} iterations: mean squared residual {self.loss:.4g}{on_others}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -302,12 +300,14 @@ class Joint:
 
 
 def _others(seen: Sequence[_Candidate]) -> list[str]:
-    """One sentence for each start: how the selection error went on the way."""
+    """One sentence for each start: how the error that chooses went on the way."""
     by_origin: dict[str, list[str]] = {}
+    alone = all(np.isnan(one.score) for one in seen)
     for one in seen:
-        by_origin.setdefault(one.origin, []).append(f"{one.score:.4g} ({one.iteration})")
+        by_origin.setdefault(one.origin, []).append(f"{one.loss if alone else one.score:.4g} ({one.iteration})")
+    what = "mean squared residual" if alone else "error on the selection traces"
     return [
-        f"The other states from {origin}, error on the selection traces (iterations): {', '.join(errors)}."
+        f"The other states from {origin}, {what} (iterations): {', '.join(errors)}."
         for origin, errors in by_origin.items()
     ]
 
