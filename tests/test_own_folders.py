@@ -9,7 +9,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from sysid.ingest.cache import default_cache_folder
+from sysid.ingest.datasets.cache import default_cache_folder
 from sysid.own_folders import keep_kernels_where_it_is_allowed, own_folder
 
 

@@ -7,7 +7,7 @@ import pint
 import pytest
 
 from sysid import units
-from sysid.ingest.time_columns import is_time_unit
+from sysid.ingest.tables.time_columns import is_time_unit
 from sysid.units import STANDARD_ATMOSPHERE_PA, USUAL_UNITS, Reference, atmosphere_in, convert, is_pressure
 
 REGISTRY = pint.UnitRegistry(cache_folder=None)

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from sysid.estimation import StateSpaceTraining as StateSpaceTraining
     from sysid.estimation import Training as Training
     from sysid.estimation import TransferFunctionTraining as TransferFunctionTraining
-    from sysid.ingest.arrays import data as data
+    from sysid.ingest.memory.arrays import data as data
     from sysid.models import ARMAX as ARMAX
     from sysid.models import ARX as ARX
     from sysid.models import BJ as BJ

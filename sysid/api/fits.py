@@ -17,8 +17,8 @@ from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ChannelError, TraceError, shortened
 from sysid.estimation import FitResult
 from sysid.estimation.experiment import Experiment
-from sysid.ingest.run_inputs import inputs_of
-from sysid.ingest.run_records import before_a_run, level_of, measured_of
+from sysid.ingest.memory.run_inputs import inputs_of
+from sysid.ingest.memory.run_records import before_a_run, level_of, measured_of
 from sysid.models import History, Start
 from sysid.models.curve_values import curve_values
 from sysid.models.form import unheeded

@@ -12,8 +12,8 @@ from sysid.api.system_fit import SystemFit
 from sysid.estimation import FitResult, StabilityOptions, estimators
 from sysid.estimation.estimator import Options
 from sysid.ingest import load_dataset
+from sysid.ingest.inspecting.undescribed import load_file
 from sysid.ingest.reading import is_file_of_traces
-from sysid.ingest.undescribed import load_file
 from sysid.models import AbstractStructure, Mapping, Start, StartLike
 from sysid.models.rest_levels import levels_at_rest
 from sysid.traces import Role, TraceSet

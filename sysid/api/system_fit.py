@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysid.api.abstract_fit import AbstractFit
 from sysid.api.fits import Fit, check_outputs
 from sysid.errors import ChannelError
-from sysid.ingest.run_records import before_a_run, measured_of
+from sysid.ingest.memory.run_records import before_a_run, measured_of
 from sysid.models import Cascade, Start
 from sysid.traces import TraceSet
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from sysid.export.measured_run import Initial, check_able, check_one_start, run_measured, run_with
 from sysid.export.surrogate import Surrogate
-from sysid.ingest.frames import columns_by_name
-from sysid.ingest.headers import parse_header
-from sysid.ingest.run_inputs import inputs_of
-from sysid.ingest.run_records import record_of
+from sysid.ingest.cells.headers import parse_header
+from sysid.ingest.memory.run_inputs import inputs_of
+from sysid.ingest.memory.run_records import record_of
+from sysid.ingest.tables.frames import columns_by_name
 from sysid.models import AbstractModel, Cascade, Start, StartKind, StartLike
 from sysid.traces import Channel, Trace, check_units
 from sysid.units import Reference

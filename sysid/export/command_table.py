@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, UnitError
-from sysid.ingest.headers import parse_header, split_reference
+from sysid.ingest.cells.headers import parse_header, split_reference
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
 from sysid.yaml_files import parse_yaml

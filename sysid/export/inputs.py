@@ -12,8 +12,8 @@ from sysid.content import nearest_name
 from sysid.errors import ChannelError, ConfigError
 from sysid.export.bundle import Bundle, channel_of
 from sysid.ingest import FileOptions, GridOptions, RawTable, RepairOptions, read_table
-from sysid.ingest.assemble import Wanted, assemble
-from sysid.ingest.undescribed import guessed_time
+from sysid.ingest.assembling.assemble import Wanted, assemble
+from sysid.ingest.inspecting.undescribed import guessed_time
 from sysid.traces import Channel, Trace
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.export.surrogate import Surrogate
-from sysid.ingest.run_records import before_a_run, level_of
+from sysid.ingest.memory.run_records import before_a_run, level_of
 from sysid.models import AbstractModel, Cascade, History, Start, StartKind, beginning
 
 Initial = float | Dict[str, float] | tuple[Any, Any] | None

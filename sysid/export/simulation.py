@@ -18,7 +18,7 @@ from sysid.export.inputs import check_constants, ticking, with_constants
 from sysid.export.measured_run import Initial, able, check_able, check_one_start, obstacle, run_measured, run_with
 from sysid.export.reading import read_bundle
 from sysid.export.surrogate import Surrogate
-from sysid.ingest.run_records import record_of
+from sysid.ingest.memory.run_records import record_of
 from sysid.models import Start, StartKind, StartLike
 from sysid.models.ends import check_record
 from sysid.traces import Channel, Trace

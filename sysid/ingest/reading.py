@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UnitError
-from sysid.ingest.assemble import Wanted, assemble
-from sysid.ingest.columns import RawColumn
-from sysid.ingest.in_units import stamps_in_seconds
-from sysid.ingest.options import FileOptions, GridOptions, RepairOptions
+from sysid.ingest.assembling.assemble import Wanted, assemble
+from sysid.ingest.assembling.in_units import stamps_in_seconds
+from sysid.ingest.assembling.timing import Timing, even_step, round_step, survey
 from sysid.ingest.readers import READERS, choose_reader, read_with
 from sysid.ingest.readers.text_source import bare_stem
-from sysid.ingest.table import RawTable
-from sysid.ingest.timing import Timing, even_step, round_step, survey
+from sysid.ingest.tables.columns import RawColumn
+from sysid.ingest.tables.options import FileOptions, GridOptions, RepairOptions
+from sysid.ingest.tables.table import RawTable
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
 

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.ingest.frames import seconds
+from sysid.ingest.tables.frames import seconds
 from sysid.traces import Role, Trace, TraceSet
 
 Split = float | Sequence[float] | Sequence[str | Role] | Mapping[Any, Any] | str | None
-"""How records get their roles; :func:`sysid.ingest.arrays.data` says what each form means."""
+"""How records get their roles; :func:`sysid.ingest.memory.arrays.data` says what each form means."""
 
 ROLES = {role.value: role for role in Role} | {
     "train": Role.ESTIMATION,

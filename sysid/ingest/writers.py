@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, UserError
 from sysid.extras import need
-from sysid.ingest.headers import parse_header
+from sysid.ingest.cells.headers import parse_header
 from sysid.names import csv_cell
 from sysid.traces import Channel, Trace
 from sysid.units import Reference

@@ -21,7 +21,7 @@ from sysid.yaml_files import read_yaml
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from sysid.ingest.dataset import Unmade
+    from sysid.ingest.datasets.dataset import Unmade
     from sysid.traces import TraceSet
     from sysid.workbench.runner.program import Program
 

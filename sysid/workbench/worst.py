@@ -20,7 +20,7 @@ from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
 from sysid.export.simulation import simulate_bundle
 from sysid.ingest import DatasetDescription, Progress, load_described
-from sysid.ingest.description import CaseDescription
+from sysid.ingest.datasets.description import CaseDescription
 from sysid.models import Start
 from sysid.traces import Role
 from sysid.yaml_files import yaml_text

@@ -8,8 +8,8 @@ import pytest
 
 from sysid.airbrake.command import Command
 from sysid.airbrake.sequences import RandomCommand
-from sysid.ingest.dataset import load_dataset
-from sysid.ingest.description import read_description
+from sysid.ingest.datasets.dataset import load_dataset
+from sysid.ingest.datasets.description import read_description
 from sysid.traces import Role, TraceSet
 
 FOLDER = Path(__file__).parents[2] / "datasets"

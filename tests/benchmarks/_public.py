@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from sysid.ingest.description import read_description
+from sysid.ingest.datasets.description import read_description
 from tests.benchmarks._findings import read
 
 DATASETS = Path(__file__).resolve().parents[2] / "datasets"

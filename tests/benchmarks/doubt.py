@@ -39,7 +39,7 @@ from sysid.composite import DoubtFigures, committee, doubt_figures, doubt_thresh
 from sysid.export import EXPORTERS, Surrogate, read_bundle
 from sysid.export.run_times import SAMPLES, measure_run_times
 from sysid.ingest import load_dataset
-from sysid.ingest.dataset import find_dataset
+from sysid.ingest.datasets.dataset import find_dataset
 from sysid.models import Cascade
 from sysid.traces import Trace
 

@@ -27,8 +27,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from sysid.content import content_folders
 from sysid.errors import SysidError
-from sysid.ingest.dataset import find_dataset
-from sysid.ingest.description import read_description
+from sysid.ingest.datasets.dataset import find_dataset
+from sysid.ingest.datasets.description import read_description
 from sysid.reporting.results import Results
 from sysid.workbench.auto.run import Searched
 from sysid.workbench.kinds import RunRequest, kind_of, kinds

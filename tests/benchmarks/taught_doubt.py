@@ -34,7 +34,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 
 from sysid.composite import perturbed
 from sysid.export import read_bundle
-from sysid.ingest.dataset import find_dataset
+from sysid.ingest.datasets.dataset import find_dataset
 from sysid.models import Cascade
 from sysid.traces import Trace
 from tests.benchmarks.doubt import CALIBRATION, OUTPUT, REPORTS, UNSEEN, fresh, option, sequences

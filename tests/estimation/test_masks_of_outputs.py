@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 import sysid
 from sysid.ingest import read_trace, write_csv, write_parquet
-from sysid.ingest.cache import TraceCache
+from sysid.ingest.datasets.cache import TraceCache
 
 N = 600
 U = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, N // 5), 5)

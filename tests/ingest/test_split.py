@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from sysid.errors import ChannelError, ConfigError
-from sysid.ingest.arrays import data
+from sysid.ingest.memory.arrays import data
 from sysid.traces import Role
 
 Y = np.arange(20.0)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid.ingest.options import FileOptions
 from sysid.ingest.readers.csv_layout import Layout, recognise
+from sysid.ingest.tables.options import FileOptions
 from sysid.reporting.charts import Chart, chart_figure
 from sysid.reporting.figures.svg import svg
 

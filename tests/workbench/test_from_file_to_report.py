@@ -8,8 +8,8 @@ import pytest
 
 from sysid.reporting.results import read_results
 from sysid.workbench.cli import run_cli
-from tests.ingest import test_zoo_binary as binary
-from tests.ingest import test_zoo_text as text
+from tests.ingest.readers import test_zoo_binary as binary
+from tests.ingest.readers import test_zoo_text as text
 
 PIPELINE = """\
 name: rig

@@ -1,7 +1,7 @@
 """The readers: one file per format, one table of them all.
 
 Adding a reader is one file with a ``READER`` in it, one line here, and one row in the contract table
-of ``tests/ingest/test_readers.py``.
+of ``tests/ingest/readers/test_readers.py``.
 """
 
 from sysid.ingest.readers import arrow, csv_text, excel, hdf5, json_text, lvm, matlab, mdf4, numpy_arrays, tdms

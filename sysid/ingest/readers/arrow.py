@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.extras import need
-from sysid.ingest.columns import RawColumn, array_column, distinct
-from sysid.ingest.headers import Header, parse_header
-from sysid.ingest.options import FileOptions, RepairOptions
+from sysid.ingest.cells.headers import Header, parse_header
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.reader import Reader, damaged
-from sysid.ingest.table import RawTable
-from sysid.ingest.time_columns import recognise_time
+from sysid.ingest.tables.columns import RawColumn, array_column, distinct
+from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.table import RawTable
+from sysid.ingest.tables.time_columns import recognise_time
 from sysid.units import Reference
 
 

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from sysid.errors import ReaderError, shortened
 from sysid.extras import has
-from sysid.ingest.calendar import Calendar
-from sysid.ingest.numbers import MISSING, NumberFormat
-from sysid.ingest.options import RepairOptions
+from sysid.ingest.cells.calendar import Calendar
+from sysid.ingest.cells.numbers import MISSING, NumberFormat
+from sysid.ingest.cells.words import WordCollector
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, TOUCHING, Kind, Row, kind_of, split_rows, trimmed
 from sysid.ingest.readers.csv_layout import Layout
 from sysid.ingest.readers.growing import Growing
 from sysid.ingest.readers.sheets import SheetText
 from sysid.ingest.readers.text_source import Block, TextFile
-from sysid.ingest.words import WordCollector
+from sysid.ingest.tables.options import RepairOptions
 
 _PLAIN_FROM = 100_000
 """Characters: below, importing Arrow takes longer than reading row by row."""

@@ -11,9 +11,9 @@ from functools import lru_cache
 from pathlib import Path
 
 from sysid.errors import ReaderError
-from sysid.ingest.calendar import is_calendar
-from sysid.ingest.headers import is_unit
-from sysid.ingest.numbers import HEXADECIMAL, MISSING, usually_missing
+from sysid.ingest.cells.calendar import is_calendar
+from sysid.ingest.cells.headers import is_unit
+from sysid.ingest.cells.numbers import HEXADECIMAL, MISSING, usually_missing
 from sysid.units import USUAL_UNITS
 
 BLANKS = " "

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 from itertools import compress, pairwise
 
 from sysid.errors import ReaderError, shortened
-from sysid.ingest.options import FileOptions
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, is_units, kind_of, trimmed
 from sysid.ingest.readers.csv_split import Split
-from sysid.ingest.time_columns import is_called_time
+from sysid.ingest.tables.options import FileOptions
+from sysid.ingest.tables.time_columns import is_called_time
 
 _BRACKET = re.compile(r"(?P<name>.*?)\s*(?P<unit>[\[(<][^\])>]*[\])>])")
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.errors import ReaderError
-from sysid.ingest.numbers import NumberFormat
-from sysid.ingest.options import FileOptions
+from sysid.ingest.cells.numbers import NumberFormat
 from sysid.ingest.readers.csv_cells import (
     Kind,
     Row,
@@ -23,6 +22,7 @@ from sysid.ingest.readers.csv_cells import (
 )
 from sysid.ingest.readers.csv_header import header_of
 from sysid.ingest.readers.csv_split import SEPARATORS, Split, best_split, first_row
+from sysid.ingest.tables.options import FileOptions
 
 _SEP_LINE = re.compile(r'"?sep=(?P<mark>.)"?\s*', re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?[0-9]*(?:[.' ][0-9]{3})*,[0-9]+(?:[eEdD][+-]?[0-9]+)?")

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid.ingest.columns import RawColumn, distinct
-from sysid.ingest.headers import parse_header
-from sysid.ingest.numbers import NumberFormat
-from sysid.ingest.table import RawTable
-from sysid.ingest.time_columns import recognise_time
+from sysid.ingest.cells.headers import parse_header
+from sysid.ingest.cells.numbers import NumberFormat
+from sysid.ingest.tables.columns import RawColumn, distinct
+from sysid.ingest.tables.table import RawTable
+from sysid.ingest.tables.time_columns import recognise_time
 
 _MOST, _LEAST = 64, 8
 """Channels at most, and samples at least."""

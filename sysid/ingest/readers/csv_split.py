@@ -9,9 +9,9 @@ from itertools import compress
 from pathlib import Path
 
 from sysid.errors import ReaderError
-from sysid.ingest.headers import parse_header
-from sysid.ingest.options import FileOptions
+from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, kind_of, kinds_of, split_rows, trimmed
+from sysid.ingest.tables.options import FileOptions
 
 SEPARATORS = ("\t", ";", ",", "|", BLANKS)
 """What may stand between cells; the earlier one wins where two fit."""

@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
-from sysid.ingest.calendar import Calendar
-from sysid.ingest.columns import RawColumn
-from sysid.ingest.headers import Header, parse_headers, split_reference
-from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.rates import said_step
+from sysid.ingest.cells.calendar import Calendar
+from sysid.ingest.cells.headers import Header, parse_headers, split_reference
+from sysid.ingest.cells.words import WordCollector, states_for
 from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
 from sysid.ingest.readers.csv_cells import Kind, unit_text
 from sysid.ingest.readers.csv_layout import Layout, recognise
@@ -32,9 +30,11 @@ from sysid.ingest.readers.text_source import (
     not_text,
     seems_garbled,
 )
-from sysid.ingest.table import RawTable
-from sysid.ingest.time_columns import recognise_time
-from sysid.ingest.words import WordCollector, states_for
+from sysid.ingest.tables.columns import RawColumn
+from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.rates import said_step
+from sysid.ingest.tables.table import RawTable
+from sysid.ingest.tables.time_columns import recognise_time
 from sysid.names import from_csv_cell
 
 

@@ -17,13 +17,13 @@ import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.extras import need
-from sysid.ingest.columns import RawColumn
-from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_zip, too_large
 from sysid.ingest.readers.csv_text import table_of_text
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.sheets import NO_COMMENT, SEPARATOR, UNCOMPUTED, Rows, Sheet, as_text
-from sysid.ingest.table import RawTable, RecordChoice
+from sysid.ingest.tables.columns import RawColumn
+from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.table import RawTable, RecordChoice
 
 _ZIP, _OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _MOST_CELLS = 40_000_000

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import ReaderError
-from sysid.ingest.joining import Signal
 from sysid.ingest.readers.joining import joined_signals
 from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, refused, texts_of
 from sysid.ingest.readers.records import role_of
+from sysid.ingest.tables.joining import Signal
 
 _SECONDS = {
     "": 1.0, "seconds": 1.0, "second": 1.0, "s": 1.0, "sec": 1.0, "milliseconds": 1e-3, "ms": 1e-3,

@@ -9,12 +9,12 @@ from typing import Any
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
-from sysid.ingest.joining import Signal, joined
 from sysid.ingest.readers.leaves import Leaf
+from sysid.ingest.tables.joining import Signal, joined
 
 
 def joined_signals(signals: Sequence[Signal], path: Path) -> tuple[dict[str, Leaf], list[str]]:
-    """All signals at the stamps of the fastest one, as :func:`~sysid.ingest.joining.joined` puts them there.
+    """All signals at the stamps of the fastest one, as :func:`~sysid.ingest.tables.joining.joined` puts them there.
 
     Args:
         signals: At least one, each with samples.

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from sysid.errors import ReaderError
-from sysid.ingest.calendar import is_calendar
-from sysid.ingest.options import FileOptions, RepairOptions
+from sysid.ingest.cells.calendar import is_calendar
 from sysid.ingest.readers.bounds import too_large
 from sysid.ingest.readers.leaves import Leaf, number_of, step_in
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
-from sysid.ingest.table import RawTable
+from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.table import RawTable
 
 _MOST_BYTES = 2**30
 """Of Python objects, which JSON becomes before it is numbers."""

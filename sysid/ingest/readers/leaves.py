@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
-from sysid.ingest.rates import IN_HERTZ, IN_SECONDS
+from sysid.ingest.tables.rates import IN_HERTZ, IN_SECONDS
 from sysid.units import Reference
 
 _STEPS = {"ts", "dt", "sample_time", "sampletime", "sampling_time", "samplingtime", "sample_period", "sampling_period"}

@@ -9,12 +9,12 @@ import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.extras import need
-from sysid.ingest.joining import Signal
-from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.joining import as_leaf, joined_signals, not_over_time
 from sysid.ingest.readers.reader import Reader, damaged, silent
 from sysid.ingest.readers.tree import table_of
-from sysid.ingest.table import RawTable
+from sysid.ingest.tables.joining import Signal
+from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.table import RawTable
 
 _MARKS = (b"MDF     ", b"UnFinMF ")
 _FRAMES = {"CAN_DataFrame", "CAN_ErrorFrame", "CAN_RemoteFrame", "LIN_Frame", "FLX_Frame", "ETH_Frame", "MOST_Message"}

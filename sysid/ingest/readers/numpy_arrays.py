@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
-from sysid.ingest.options import FileOptions, RepairOptions
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.leaves import refused
 from sysid.ingest.readers.reader import Reader, damaged
 from sysid.ingest.readers.tree import table_of
-from sysid.ingest.table import RawTable
+from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.table import RawTable
 
 _MARK = b"\x93NUMPY"
 _DAMAGES = (

@@ -12,9 +12,9 @@ from threading import Lock
 
 from sysid.content import nearest_file
 from sysid.errors import ConfigError, ReaderError
-from sysid.ingest.meaning import with_meaning
-from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.table import RawTable
+from sysid.ingest.tables.meaning import with_meaning
+from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.table import RawTable
 
 _IS_TABLE = re.compile(rb"(?m)^[ \t]*[-+]?[0-9][-+0-9.,eE]*[ \t;,]+[-+]?[0-9][-+0-9.,eE]*[ \t;,\r\n]")
 """A line that begins with two numbers."""
@@ -30,7 +30,7 @@ class Reader:
         name: What the format is called in options and messages.
         suffixes: Endings of file names, lower case, with the dot.
         read: Reads a file; raises :class:`~sysid.errors.ReaderError` if it is not of this format.
-        options: The fields of :class:`~sysid.ingest.options.FileOptions` that mean something to it,
+        options: The fields of :class:`~sysid.ingest.tables.options.FileOptions` that mean something to it,
             besides those that mean something to all.
         is_mine: Whether a file is of this format, by its first 4,096 bytes; ``None`` where they do not tell.
     """

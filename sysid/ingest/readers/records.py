@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sysid.ingest.columns import RawColumn
-from sysid.ingest.table import RawTable, RecordChoice
-from sysid.ingest.time_columns import recognise_time
+from sysid.ingest.tables.columns import RawColumn
+from sysid.ingest.tables.table import RawTable, RecordChoice
+from sysid.ingest.tables.time_columns import recognise_time
 
 _ROLES = {
     "estimation": {"est", "estimation", "estim", "id", "ident", "idn", "identification", "train", "training", "trn"},

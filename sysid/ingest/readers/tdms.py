@@ -10,15 +10,15 @@ import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.extras import need
-from sysid.ingest.joining import Signal
-from sysid.ingest.options import FileOptions, RepairOptions
-from sysid.ingest.rates import said_step
 from sysid.ingest.readers.joining import joined_signals, not_over_time
 from sysid.ingest.readers.leaves import Leaf, refused
 from sysid.ingest.readers.reader import Reader, damaged, silent
 from sysid.ingest.readers.tree import table_of
-from sysid.ingest.table import RawTable
-from sysid.ingest.time_columns import is_called_time
+from sysid.ingest.tables.joining import Signal
+from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.rates import said_step
+from sysid.ingest.tables.table import RawTable
+from sysid.ingest.tables.time_columns import is_called_time
 
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "units")
 _NO_TIMES = {"frequency", "frequenz", "angle", "winkel", "order", "ordnung", "distance", "weg"}

@@ -15,15 +15,15 @@ from typing import Any
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError, did_you_mean
-from sysid.ingest.columns import array_column, distinct
-from sysid.ingest.headers import parse_header
-from sysid.ingest.options import FileOptions
-from sysid.ingest.rates import said_step
+from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.readers.forms import understood
 from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, step_in, texts_of
 from sysid.ingest.readers.records import Found, joined, records_of
-from sysid.ingest.table import RawTable, by_length
-from sysid.ingest.time_columns import recognise_time
+from sysid.ingest.tables.columns import array_column, distinct
+from sysid.ingest.tables.options import FileOptions
+from sysid.ingest.tables.rates import said_step
+from sysid.ingest.tables.table import RawTable, by_length
+from sysid.ingest.tables.time_columns import recognise_time
 
 _DEEPEST = 40
 _NAMES = {"names", "channels", "columns", "labels", "signals", "variables", "fields", "header"}

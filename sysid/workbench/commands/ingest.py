@@ -12,8 +12,8 @@ from rich.table import Table
 from sysid.content import nearest_file
 from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
-from sysid.ingest.findings import ColumnFinding
-from sysid.ingest.in_units import stamps_in_seconds
+from sysid.ingest.assembling.in_units import stamps_in_seconds
+from sysid.ingest.inspecting.findings import ColumnFinding
 from sysid.ingest.readers.text_source import bare_stem
 from sysid.reporting.figures.record_picture import record_picture
 from sysid.reporting.figures.svg import as_file

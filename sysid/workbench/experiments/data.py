@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysid.errors import ConfigError
-from sysid.ingest.dataset import Unmade
+from sysid.ingest.datasets.dataset import Unmade
 from sysid.references.candidates import Candidates
 from sysid.references.runs import Case, Progress, ReferenceRuns
 from sysid.traces import Role, Trace, TraceSet

@@ -19,7 +19,7 @@ from sysid.workbench.kinds import data_of_pipeline
 from sysid.workbench.runner.steps import Estimate
 
 if TYPE_CHECKING:
-    from sysid.ingest.dataset import Unmade
+    from sysid.ingest.datasets.dataset import Unmade
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,7 +103,7 @@ def unmade_data(names: Iterable[str | None], *, beside: Path) -> Estimate | None
     Raises:
         ConfigError: If there is no such data set.
     """
-    from sysid.ingest.dataset import unmade
+    from sysid.ingest.datasets.dataset import unmade
     from sysid.ingest.reading import is_file_of_traces
 
     found = []

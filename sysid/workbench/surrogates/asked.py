@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from sysid.errors import ConfigError
-from sysid.ingest.headers import parse_header
+from sysid.ingest.cells.headers import parse_header
 from sysid.names import slug
 from sysid.references.described import Wish
 from sysid.references.sources import KINDS, TABLES, source_of

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sysid.ingest.description import DatasetDescription
+from sysid.ingest.datasets.description import DatasetDescription
 from sysid.rail.constants import MPH
 from sysid.rail.traces.cycle_maker import MAKER, CycleOptions
 from sysid.rail.traces.stop_cycles import characteristic_of, handle_of_signal, servo, speed_commands, stop_cycle

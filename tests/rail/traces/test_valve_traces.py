@@ -5,7 +5,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.ingest import find_dataset
-from sysid.ingest.description import read_description
+from sysid.ingest.datasets.description import read_description
 from sysid.rail.traces.valve_traces import generate
 from sysid.traces import Channel, Trace
 from sysid.units import Reference

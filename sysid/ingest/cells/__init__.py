@@ -1,0 +1,1 @@
+"""What cells and headers of text say: numbers, dates, words, units, and what stands for nothing."""

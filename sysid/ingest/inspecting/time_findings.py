@@ -1,0 +1,122 @@
+"""Which column of an unknown file is its time, and what its stamps need."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.ingest.assembling.timing import Timing, even_step, round_step, rounded_step, survey
+from sysid.ingest.cells.headers import unit_in_name
+from sysid.ingest.inspecting.second_clocks import counts_rows, is_counter
+from sysid.ingest.readers.leaves import step_in
+from sysid.ingest.tables.clocks import clock_of
+from sysid.ingest.tables.columns import RawColumn
+from sysid.ingest.tables.options import FileOptions, GridOptions, TimeOptions
+from sysid.ingest.tables.table import RawTable
+from sysid.ingest.tables.time_columns import is_time_unit
+
+_RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
+_EVEN_SHARE = 0.9  # of its steps, that are like the usual one
+
+
+def find_time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
+    """The time column, and what of it or its unit had to be guessed."""
+    asked = files.time
+    if asked.step is not None:
+        return asked, ""
+    if table.settings.get("calendar") and table.time is not None:
+        return TimeOptions(column=table.time, unit="datetime", format=asked.format, zone=asked.zone), ""
+    name = asked.column or table.time or (_rising(table.columns) if table.step is None else None)
+    if name is None and table.step is not None:
+        return TimeOptions(step=table.step), ""
+    column = None if name is None else table.find(name)
+    counted = column is not None and name not in {asked.column, table.time} and counts_rows(column)
+    if column is None or name is None or counted:
+        beside = step_beside(table.columns)
+        if beside is not None:
+            return TimeOptions(step=beside[1]), ""
+        why = f"{name} counts the rows and says no time" if counted else "no time stamps"
+        return TimeOptions(step=1.0), f"guessed: {why}, 1 s between them"
+    by_rising = "" if name in {asked.column, table.time} else f"{name} is taken for time, as it rises"
+    clock = clock_of(column.values, column.name, origin=column.counted_from) if asked.unit is None else None
+    said = None if clock is not None and "clock" in table.settings else column.unit
+    unit = asked.unit or (said if said is not None and is_time_unit(said) else None) or unit_in_name(name)
+    if unit is not None:
+        return TimeOptions(column=column.name, unit=unit), by_rising and f"guessed: {by_rising}"
+    if clock is not None:
+        return TimeOptions(column=column.name, unit=clock.unit), f"guessed: {name} counts {clock.told}, by its size"
+    with np.errstate(invalid="ignore"):
+        steps = np.diff(column.values[:100_000])
+    step = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
+    # Few records are sampled slower than every 5 s, and few clocks count finer than they sample.
+    guess = "s" if step < 5.0 else "ms" if step < 5e3 else "us"
+    why = f"the file says {said}, which is no unit of time" if said else "the file does not say its unit"
+    first = f"{by_rising}; " if by_rising else ""
+    why += "; it rises by 1, as a number of samples does" if len(steps) and bool((steps == 1.0).all()) else ""
+    return TimeOptions(column=column.name, unit=guess), f"guessed: {first}{name} in {guess}; {why}"
+
+
+def without_copies(columns: Sequence[RawColumn]) -> tuple[RawColumn, ...]:
+    """The columns of a file in which a name stood twice; what was written twice, numbers and all, is aside."""
+    found: list[RawColumn] = []
+    for column in columns:
+        first = next((c for c in found if np.array_equal(c.values, column.values, equal_nan=True)), None)
+        again = first is not None and not column.aside and column.name.startswith(f"{first.name} ")
+        found.append(replace(column, aside=f"the same numbers as {first.name}") if first and again else column)
+    return tuple(found)
+
+
+def step_beside(columns: Sequence[RawColumn]) -> tuple[str, float] | None:
+    """The column that says the sample time or a rate, as public benchmarks have it, ``Ts``, and the seconds."""
+    for column in columns:
+        known = np.unique(finite_of(column.values))
+        if len(known) == 1:
+            step = step_in(f"{column.name} [{column.unit}]" if column.unit else column.name, float(known[0]))
+            if step is not None:
+                return column.name, step
+    return None
+
+
+def finite_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The finite ones; the same array, not a copy, where all are."""
+    known = np.isfinite(values)
+    return values if known.all() else values[known]
+
+
+def _rising(columns: Sequence[RawColumn]) -> str | None:
+    """A column that rises like a clock: nearly always, and by much the same step."""
+    for column in sorted(columns, key=lambda column: is_counter(column.name)):  # a clock goes before a counter
+        with np.errstate(invalid="ignore"):
+            steps = np.diff(column.values)
+        if column.problem is not None or not len(steps) or np.mean(steps > 0.0) < _RISING_SHARE:
+            continue
+        usual = np.median(steps)
+        if np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
+            return column.name
+    return None
+
+
+def needs_of_time(known: NDArray[np.float64], timing: Timing) -> tuple[float, dict[str, object], float | None]:
+    """Sample time, the repairs of time that the stamps need, and how far they are rounded where only that is uneven."""
+    known = known if timing.in_order else np.sort(known)
+    clean = timing if timing.in_order else survey(known)
+    if not clean.step > 0.0:
+        return 1.0, {"duplicates": "drop" if len(clean.duplicates) else None}, None
+    rising = np.delete(known, clean.duplicates) if len(clean.duplicates) else known
+    surveyed = clean if rising is known else survey(rising)
+    even = even_step(rising, surveyed, tolerance=GridOptions().tolerance)
+    rounded = rounded_step(rising, surveyed) if even is None else None
+    usual = float(np.mean(np.abs(np.diff(rising) - clean.median_step) <= 0.01 * clean.median_step))
+    # A stamp or two that are wrong say nothing of the others' distance.
+    uneven = round_step(clean.median_step if usual >= _EVEN_SHARE else clean.step)
+    step, tolerance = (even or uneven, None) if rounded is None else rounded
+    needs: dict[str, object] = {
+        "backward": "sort" if len(timing.backward) else None,
+        "duplicates": "drop" if len(clean.duplicates) else None,
+        "gaps": "mask" if len(clean.gaps) else None,
+        "jitter": "resample" if even is None and rounded is None else None,
+    }
+    return step, needs, tolerance

@@ -1,0 +1,145 @@
+"""A file of traces without a description: read as what would be proposed for it, with what was guessed told."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import yaml
+
+from sysid.errors import ReaderError, UnitError, UserError
+from sysid.field_checks import check
+from sysid.ingest.datasets.dataset import load_described
+from sysid.ingest.datasets.description import DatasetDescription
+from sysid.ingest.inspecting.findings import FileFinding
+from sysid.ingest.inspecting.inspection import inspect_file
+from sysid.ingest.inspecting.proposal import propose_dataset
+from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file
+from sysid.ingest.readers.text_source import bare_stem
+from sysid.ingest.reading import read_trace
+from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
+from sysid.ingest.tables.table import RawTable
+from sysid.traces import Role, TraceSet
+
+
+class GuessedWarning(UserWarning):
+    """A file does not say all that a record needs, and what it leaves out was guessed."""
+
+
+def load_file(path: Path) -> TraceSet:
+    """Read one file of traces.
+
+    What the file says is taken as it stands. What it leaves out (units, the column of time, its unit, how numbers are
+    written, which rows are a record) is read as ``sysid ingest --propose`` would describe it, and told. Samples are
+    never repaired: a gap or a missing value is refused, with the command that describes the file.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its record for estimation; or its records, where the file holds several.
+
+    Raises:
+        UserError: If it cannot be read, or its samples need repairs.
+
+    Warns:
+        GuessedWarning: If something was guessed.
+    """
+    with remedies_of_a_file(path):
+        try:
+            trace = read_trace(path)
+        except UserError as error:
+            return _as_proposed(path, error)
+    return TraceSet(name=bare_stem(path), traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
+
+
+def _as_proposed(path: Path, error: UserError) -> TraceSet:
+    """The traces of the description that would be proposed, but for its repairs."""
+    try:
+        found = inspect_file(path)
+        # A channel that never changes is no fault of the samples: those that use it say what it is worth.
+        left = replace(found, needed=RepairOptions(constant=found.needed.constant))
+        proposed = yaml.safe_load(propose_dataset(left))
+    except UserError:
+        raise error from None
+    # What was measured is not lost: a column in which words stand is said to be one, or to be left out, by a person.
+    lost = any(column.problem and not column.unit_guessed for column in found.columns)
+    if isinstance(error, ReaderError) and (lost or {"states", "missing"} & found.guessed):
+        raise error
+    guesses = list(_guesses(found))
+    known = {"name": bare_stem(path), "provenance": str(path), "inferred": guesses}
+    described = check(DatasetDescription, {**proposed, **known}, where=path)
+    try:
+        traces = load_described(described, path, cache=False)
+    except UserError as also:
+        raise also if isinstance(error, UnitError) else error from None
+    if guesses:
+        told = f"{_told(path, guesses)}. {proposal_of(path)} writes this down, to be corrected"
+        warnings.warn(told, GuessedWarning, stacklevel=4)
+    return traces
+
+
+def guessed_time(table: RawTable, files: FileOptions, *, sample_time: float) -> FileOptions:
+    """The options of a file's reader with its time, where the file does not say what that is.
+
+    Args:
+        table: The file as it was read.
+        files: What is known.
+        sample_time: Seconds between rows, where the file has no time stamps.
+
+    Returns:
+        The options; the same where the file says its time, or the options do.
+
+    Raises:
+        ReaderError: If the file cannot be read at all.
+
+    Warns:
+        GuessedWarning: If something was guessed.
+    """
+    # The unit of a column that is called time is told by the sample time that is asked for.
+    if table.step is not None or table.time is not None or files.time != TimeOptions():
+        return files
+    found = inspect_file(table.source, files=files)
+    if not found.time_guessed or found.cases:
+        return files
+    time, told = found.time, found.time_told.removeprefix("guessed: ")
+    if time.step is not None:
+        time, told = TimeOptions(step=sample_time), f"no time stamps, {sample_time:g} s between them"
+    warnings.warn(_told(table.source, [told]), GuessedWarning, stacklevel=3)
+    return files.model_copy(update={"time": time})
+
+
+def _told(path: Path, guesses: Sequence[str]) -> str:
+    return f"{path}: guessed, as the file does not say it: {'; '.join(guesses)}"
+
+
+def _guesses(found: FileFinding) -> Iterator[str]:
+    """What is taken to be so and what is left out, one phrase each."""
+    if found.time_told:
+        yield found.time_told.removeprefix("guessed: ")
+    without = [column.name for column in found.channels if column.unit_guessed and column.unit == "1"]
+    if without:
+        yield f"no unit for {_listed(without)}"
+    named = [
+        f"{column.name} in {column.unit}" for column in found.channels if column.unit_guessed and column.unit != "1"
+    ]
+    if named:
+        yield ", ".join(named)
+    yield from (f"{c.name} is {c.reference.value} pressure" for c in found.channels if c.reference_guessed)
+    yield from found.guesses
+    if found.cases:
+        yield from found.notes
+        yield "roles " + _listed([f"{case.name}: {case.role}" for case in found.cases])
+    aside = [
+        f"{column.name} ({column.problem or column.aside})" for column in found.columns if column not in found.channels
+    ]
+    if aside:
+        yield f"left out: {_listed(aside)}"
+
+
+def _listed(names: list[str], most: int = 6) -> str:
+    """The first of some names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

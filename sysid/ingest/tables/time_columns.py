@@ -1,0 +1,130 @@
+"""Which column of a file is its time, by what it is called and by its unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from sysid.errors import UnitError
+from sysid.ingest.tables.columns import RawColumn
+from sysid.units import USUAL_UNITS, check_unit, convert, plain_unit
+
+_TIME_NAMES = {
+    "t", "time", "zeit", "tijd", "temps", "tiempo", "tempo", "tid", "timestamp", "timestamps", "time stamp",
+    "elapsed time", "elapsed", "seconds", "tout", "date", "datum", "datetime", "date time", "date/time", "date & time",
+    "uhrzeit", "zeitstempel", "tijdstip", "clock", "hora", "heure", "fecha", "epoch", "unix time", "unixtime", "utc",
+    "local time", "localtime", "time of day", "timeofday",
+}  # fmt: skip
+_TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
+
+
+GOES_BACK = 0.25
+"""Part of the steps that lead back, from which on a column moves as a signal does; stamps that do are out of order."""
+
+
+def recognise_time(columns: Sequence[RawColumn]) -> str | None:
+    """The column that holds time, by its name, else by its unit.
+
+    A signal may be called ``t``, too, as a temperature is: what goes back and forth gives way to what does not, and
+    with a unit of something else it is no time at all.
+
+    Args:
+        columns: The columns of a file.
+
+    Returns:
+        Its name, or ``None`` if no column is plainly one.
+    """
+    named = [column for column in columns if is_called_time(column.name)]
+    # A capital T may be a temperature: only where nothing else is called time, and it rises.
+    plain = [column for column in named if re.split(r"[/.]", column.name.strip())[-1] != "T"]
+    clocks = [column for column in named if _may_be_clock(column)]
+    timed = [column for column in columns if column.unit is not None and time_unit(column.unit) in _TIME_UNITS]
+    likely = [*plain, *clocks, *timed]
+    back = {column.name for column in likely if _goes_back(column)}
+    found = next((column for column in likely if column.name not in back), None) or next(
+        (column for column in likely if not _has_other_unit(column)), None
+    )
+    return None if found is None else found.name
+
+
+def _goes_back(column: RawColumn) -> bool:
+    steps = np.diff(column.values)
+    return bool(len(steps)) and float(np.mean(steps < 0.0)) > GOES_BACK
+
+
+def _has_other_unit(column: RawColumn) -> bool:
+    """Whether a unit is known, and is none of time."""
+    if column.unit is None or is_time_unit(column.unit):
+        return False
+    try:
+        check_unit(column.unit)
+    except UnitError:
+        return False
+    return True
+
+
+def _may_be_clock(column: RawColumn) -> bool:
+    if column.unit is not None and time_unit(column.unit) not in _TIME_UNITS:
+        return False
+    rises = column.values[1:] > column.values[:-1]
+    return not len(rises) or bool(rises.mean() > 0.9)
+
+
+def is_called_time(name: str) -> bool:
+    """Whether a column is called time, by itself or in whatever group it stands.
+
+    Args:
+        name: Its name without the unit.
+
+    Returns:
+        Whether it is.
+
+    Example:
+        >>> is_called_time("rig/Time"), is_called_time("t_ms"), is_called_time("temperature")
+        (True, True, False)
+    """
+    whole = name.casefold().strip()
+    # In whatever group it stands: "rig/time", "run{2}.t".
+    for plain in (whole, re.split(r"[/.]", whole)[-1]):
+        # "t_ms", "time.s": the unit at the end of the name
+        stem = next((plain[: -len(u) - 1] for u in _TIME_UNITS if plain.endswith((f"_{u}", f".{u}"))), plain)
+        if plain in _TIME_NAMES or stem in _TIME_NAMES:
+            return True
+    return False
+
+
+def is_time_unit(unit: str) -> bool:
+    """Whether a unit is one of time.
+
+    Args:
+        unit: As found in a file.
+
+    Returns:
+        True if it is.
+    """
+    if time_unit(unit) in _TIME_UNITS:
+        return True
+    if unit in USUAL_UNITS:  # those of time are above
+        return False
+    try:
+        convert(np.zeros(1), unit, "s")
+    except UnitError:
+        return False
+    return True
+
+
+def time_unit(unit: str) -> str:
+    """A unit of time as pint writes it: in capitals, as loggers have it, it is another one to pint.
+
+    Args:
+        unit: For example ``"S"``, ``"MS"``, ``"ms"``.
+
+    Returns:
+        For example ``"s"``, ``"ms"``, ``"ms"``.
+    """
+    if unit in USUAL_UNITS:
+        return unit
+    plain = plain_unit(unit.casefold()) or unit
+    return plain if plain in _TIME_UNITS else unit

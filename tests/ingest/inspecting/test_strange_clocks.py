@@ -1,0 +1,116 @@
+"""Clocks and tables of other tools: rounded stamps, signals stamped one by one, zones by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sysid.errors import ReaderError
+from sysid.ingest import inspect_file, load_dataset, propose_dataset
+from sysid.ingest.assembling.timing import rounded_step, survey
+from sysid.traces import Trace
+
+N = 60
+U = np.repeat([1.0, 3.0, 1.0, 3.0, 3.0, 1.0], 10)
+Y = np.round(np.convolve(U, 0.2 * 0.8 ** np.arange(N))[:N], 6)
+
+
+def proposed(tmp_path: Path, text: str | bytes, name: str = "a.csv") -> Trace:
+    """The one record of a file, by the data set that is proposed for it."""
+    (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    (tmp_path / "dataset.yaml").write_text(propose_dataset(inspect_file(tmp_path / name)), encoding="utf-8")
+    (trace,) = load_dataset(tmp_path / "dataset.yaml").traces
+    return trace
+
+
+def rows(stamps: list[str], head: str = "t [s],u [V],y [V]") -> str:
+    return "\n".join([head, *(f"{t},{u},{y}" for t, u, y in zip(stamps, U, Y, strict=True))]) + "\n"
+
+
+@pytest.mark.parametrize(("rate", "digits"), [(30.0, 2), (120.0, 3), (24.0, 2)])
+def test_rounded_stamps_are_put_on_an_even_clock_and_no_value_is_changed(
+    tmp_path: Path, rate: float, digits: int
+) -> None:
+    trace = proposed(tmp_path, rows([f"{k / rate:.{digits}f}" for k in range(N)]))
+    assert trace.sample_time == pytest.approx(1.0 / rate, rel=1e-12)
+    np.testing.assert_array_equal(trace["y"], Y)
+
+
+def test_rounded_stamps_with_a_sample_left_out() -> None:
+    stamps = np.round(np.delete(np.arange(80), 33) / 30.0, 2)
+    found = rounded_step(stamps, survey(stamps))
+    assert found is not None
+    assert found[0] == pytest.approx(1 / 30.0)
+
+
+def test_a_clock_that_is_uneven_is_not_called_rounded() -> None:
+    stamps = np.arange(80) * 0.1 + np.random.default_rng(0).uniform(0, 0.02, 80)
+    assert rounded_step(stamps, survey(stamps)) is None
+
+
+def test_signals_that_are_stamped_one_by_one_are_joined(tmp_path: Path) -> None:
+    lines = ["time [s],signal,value"]
+    for k in range(N):
+        if k == 0 or U[k] != U[k - 1]:
+            lines.append(f"{max(k / 10 - 0.001, 0):.3f},u,{U[k]}")
+        lines.append(f"{k / 10:.3f},y,{Y[k]}")
+    trace = proposed(tmp_path, "\n".join(lines) + "\n")
+    assert trace.sample_time == pytest.approx(0.1)
+    np.testing.assert_array_equal(trace["u"], U)
+    np.testing.assert_array_equal(trace["y"], Y)
+
+
+def test_utf_16_without_its_mark(tmp_path: Path) -> None:
+    for encoding in ("utf-16-le", "utf-16-be"):
+        trace = proposed(tmp_path, rows([f"{k / 10:.1f}" for k in range(N)]).encode(encoding))
+        np.testing.assert_array_equal(trace["y"], Y)
+
+
+def test_names_in_another_encoding_are_told(tmp_path: Path) -> None:
+    text = rows([f"{k / 10:.1f}" for k in range(N)], "Время (с),Давление,Температура")
+    (tmp_path / "a.csv").write_bytes(text.encode("cp1251"))
+    assert any("name the encoding" in one for one in inspect_file(tmp_path / "a.csv").problems)
+    assert not any("encoding" in one for one in inspect_file(write(tmp_path, text)).problems)
+
+
+def test_stamps_in_a_form_that_is_not_known_ask_for_their_pattern(tmp_path: Path) -> None:
+    text = rows([f"2024:072:08:15:{k / 10:06.3f}" for k in range(N)], "Time,u [V],y [V]")
+    with pytest.raises(ReaderError, match=r"(?s)form that is not known.*format: "):
+        inspect_file(write(tmp_path, text))
+
+
+def test_one_sample_is_not_proposed(tmp_path: Path) -> None:
+    with pytest.raises(ReaderError, match="one sample is no record"):
+        propose_dataset(inspect_file(write(tmp_path, "t [s],u [V]\n0,1\n")))
+
+
+def test_words_that_may_be_states_are_quoted(tmp_path: Path) -> None:
+    text = "t [s],mode,y [V]\n" + "".join(f"{k / 10},{('Off', 'Heat', 'Cool')[k // 7 % 3]},{Y[k]}\n" for k in range(N))
+    (mode,) = (one for one in inspect_file(write(tmp_path, text)).columns if one.name == "mode")
+    assert "'Off', 'Heat', 'Cool'" in mode.problem
+    assert "states" in mode.problem
+
+
+def write(tmp_path: Path, text: str) -> Path:
+    """A file of text in UTF-8."""
+    path = tmp_path / "b.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_u_and_y_once_with_each_letter_are_two_records(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"ue": U[:30], "ye": Y[:30], "uv": U[30:], "yv": Y[30:], "Ts": 0.1})
+    found = {case.name: case.role for case in inspect_file(tmp_path / "a.mat").cases}
+    assert found == {"estimation": "estimation", "validation": "validation"}
+
+
+def test_varnames_beside_a_matrix_name_its_columns(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    names = np.array(["time", "pump", "level"], dtype=object)
+    savemat(tmp_path / "a.mat", {"data": np.column_stack([np.arange(N) / 10, U, Y]), "varnames": names})
+    assert [column.name for column in inspect_file(tmp_path / "a.mat").channels] == ["pump", "level"]
