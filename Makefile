@@ -5,7 +5,8 @@ BIN    := $(VENV)/bin
 # One BLAS thread per process: two processes with default threads were measured ten times slower.
 export OMP_NUM_THREADS = 1
 # A file of tests stays in one process, with what it prepares for all of its tests; each process takes a gigabyte. Files
-# run in their order: that of the most tests first has those last that take a minute for each of five.
+# with a slow test run first, others in their order: that of the most tests first has those last that take a minute for
+# each of five.
 SIDE_BY_SIDE := --numprocesses=auto --maxprocesses=4 --dist=loadfile --no-loadscope-reorder
 export MLFLOW_DISABLE_TELEMETRY = true
 # A hundred processes that the tests start would each translate our sources again.

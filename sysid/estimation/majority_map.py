@@ -43,16 +43,17 @@ def majority_map(
     if len(places) < 2 * n:
         return None
     size = np.maximum(np.abs(terms[places]).max(axis=0), 1e-300)
+    scaled = np.zeros(terms.shape)
+    scaled[places] = terms[places] / size
 
-    def follows(found: Array, of: NDArray[np.intp]) -> NDArray[np.bool_]:
-        off = np.abs(terms[of] / size @ found - values[of])
-        return np.asarray((off <= near * span).all(axis=1))
+    def follows(found: Array, of: tuple[Array, Array]) -> NDArray[np.bool_]:
+        return np.asarray((np.abs(of[0] @ found - of[1]) <= near * span).all(axis=1))
 
     looked = rng.choice(places, min(len(places), LOOKED), replace=False)
-    best = np.zeros(len(looked), dtype=bool)
+    seen, best = (scaled[looked], values[looked]), np.zeros(len(looked), dtype=bool)
     for _ in range(DRAWS):
         few = rng.choice(looked, n + 1, replace=False)
-        follow = follows(np.linalg.lstsq(terms[few] / size, values[few], rcond=None)[0], looked)
+        follow = follows(np.linalg.lstsq(scaled[few], values[few], rcond=None)[0], seen)
         best = follow if follow.sum() > best.sum() else best
         if best.mean() > MOST:
             break
@@ -60,6 +61,6 @@ def majority_map(
         return None
     chosen, found = looked[best], np.zeros((n, values.shape[1]))
     for _ in range(3):
-        found = np.linalg.lstsq(terms[chosen] / size, values[chosen], rcond=None)[0]
-        chosen = places[follows(found, places)]
+        found = np.linalg.lstsq(scaled[chosen], values[chosen], rcond=None)[0]
+        chosen = places[follows(found, (scaled[places], values[places]))]
     return (found / size[:, np.newaxis], chosen) if len(chosen) >= n else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -69,12 +70,24 @@ PLANTS = {
 }
 
 
+@cache
+def run_of(plant: str) -> Array:
+    T, u, made = PLANTS[plant]
+    return made(u, T)
+
+
+@cache
+def advice_on(plant: str, noise: float) -> Advice:
+    """Several tests ask it: a plant takes seconds to run, and seconds to look at."""
+    T, u, _ = PLANTS[plant]
+    return looked(u, run_of(plant), T, noise)
+
+
 @pytest.mark.parametrize("noise", [0.01, 0.1])
 @pytest.mark.parametrize("plant", PLANTS)
 def test_a_curve_in_the_state_is_told_and_asks_for_a_network(plant: str, noise: float) -> None:
     """Of a spring that hardens it was said that a linear model may do, of a pendulum that none is seen."""
-    T, u, made = PLANTS[plant]
-    found = looked(u, made(u, T), T, noise)
+    found = advice_on(plant, noise)
     told = [one for one in found.findings if one.code in {"linearity.curved_state", "linearity.curved"}]
     assert [one.verdict for one in told] == [Verdict.LOOK]
     assert any(one.structure.kind == "NARX" for one in found.suggestions)
@@ -84,8 +97,7 @@ def test_a_curve_in_the_state_is_told_and_asks_for_a_network(plant: str, noise: 
 @pytest.mark.parametrize("plant", ["pendulum", "spring that hardens", "two wells"])
 def test_no_slower_rate_is_proposed_to_it(plant: str, noise: float) -> None:
     """0.3 s had been, to a pendulum that swings in 2 s and turns over faster."""
-    T, u, made = PLANTS[plant]
-    assert looked(u, made(u, T), T, noise).find("sampling.fast") is None
+    assert advice_on(plant, noise).find("sampling.fast") is None
 
 
 LINEAR = {

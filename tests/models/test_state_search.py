@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Scaling
+from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Scaling, equation_programs
 from sysid.models.grey_box import lowered
 from sysid.models.state_search import StateSearch
 
@@ -38,6 +38,18 @@ def test_a_system_at_rest_stands_still(equations: str, u: float, y: float, state
     assert model.recursion.state(history) == pytest.approx(np.array(state), abs=1e-9)
     run = model.simulate(np.full((20, 1), u), history)
     assert run == pytest.approx(np.full(20, run[0]), abs=1e-8)
+
+
+def test_a_state_at_rest_is_looked_for_once_and_no_run_moves_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thousand sequences that begin at one plateau each looked for it: twenty times as long as to run them."""
+    model, searches = a_model("dx/dt = u - sqrt(x); y = x"), list[float]()
+    found = equation_programs.at_rest
+    monkeypatch.setattr(equation_programs, "at_rest", lambda *given: searches.append(0.0) or found(*given))
+    begun = [History.at_rest(inputs=[u], output=0.0) for u in (3.0, 3.0, 2.0, 3.0)]
+    runs = [model.simulate(np.ones((20, 1)), history) for history in begun]
+    assert len(searches) == 2
+    assert [run[0] for run in runs] == pytest.approx([9.0, 9.0, 4.0, 9.0])
+    np.testing.assert_array_equal(runs[0], runs[3])
 
 
 def test_a_declared_state_is_where_it_is_declared() -> None:

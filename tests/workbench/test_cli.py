@@ -213,6 +213,7 @@ def sysid(workspace: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*SYSID, *arguments], cwd=workspace, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_a_workspace_of_ones_own_from_first_to_last(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -37,6 +37,7 @@ def test_flags_can_be_overruled_by_the_environment(monkeypatch: pytest.MonkeyPat
     assert ui.server_environment()["MLFLOW_SERVER_ENABLE_JOB_EXECUTION"] == "true"
 
 
+@pytest.mark.slow
 def test_the_server_answers_and_leaves_nothing_behind(workspace: Path, empty_store: Path) -> None:
     shutil.copyfile(empty_store, workspace / "mlflow.db")
     command = [str(Path(sys.executable).with_name("sysid")), "ui", "--no-browser"]

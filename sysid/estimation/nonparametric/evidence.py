@@ -193,7 +193,7 @@ def _from_products(data: Triangle, L: NDArray[np.float64]) -> Factored | None:
     M = dtrmm(1.0, L.T, from_the_left(L, both), side=1, lower=0, trans_a=1, overwrite_b=1)
     if not np.diag(M).max(initial=0.0) < WELL_SCALED:
         return None
-    M[np.diag_indices_from(M)] += 1.0
+    M.flat[:: len(M) + 1] += 1.0
     R = linalg.cholesky(M, overwrite_a=True, check_finite=False)
     z = linalg.solve_triangular(R, L.T @ target, trans="T", check_finite=False)
     rest = size - float(z @ z)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +42,11 @@ class Prior:
     length: int
     dead: NDArray[np.int64]
     theta: NDArray[np.float64]
-    kept: NDArray[np.bool_] = field(init=False)
 
-    def __post_init__(self) -> None:
-        lags = np.arange(self.length)
-        object.__setattr__(self, "kept", np.concatenate([lags >= k for k in self.dead]))
+    @cached_property
+    def kept(self) -> NDArray[np.bool_]:
+        """Which lags of all inputs lie behind the dead times, shape ``(n_inputs * length,)``."""
+        return (np.arange(self.length) >= self.dead[:, np.newaxis]).ravel()
 
     @property
     def hyperparameters(self) -> tuple[Hyperparameters, ...]:
@@ -265,6 +266,11 @@ class _Search:
         one = [(-12.0, 60.0), (np.log(0.2), np.log(20.0 * self.length)), (np.log(0.1), np.log(1e3))]
         return one[: self.kernel.size] * len(self.dead)
 
+    @cached_property
+    def kept(self) -> Triangle:
+        """The regression on the lags that are kept: the same for all that is tried."""
+        return self.data.columns(self.prior(np.zeros(0)).kept)
+
     def prior(self, theta: NDArray[np.float64]) -> Prior:
         return Prior(kernel=self.kernel, length=self.length, dead=self.dead, theta=theta)
 
@@ -286,13 +292,12 @@ class _Search:
         return np.clip(rows[:, : self.kernel.size].ravel(), low, high)
 
     def value(self, theta: NDArray[np.float64]) -> float:
-        prior = self.prior(theta)
-        return factored(self.data.columns(prior.kept), prior.factor()).log_evidence
+        return factored(self.kept, self.prior(theta).factor()).log_evidence
 
     def descent(self, theta: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         """Minus the logarithm of the evidence and its gradient."""
         prior = self.prior(theta)
-        data, L = self.data.columns(prior.kept), prior.factor()
+        data, L = self.kept, prior.factor()
         whole = factored(data, L)
         mean = L @ linalg.solve_triangular(whole.R, whole.z, check_finite=False)
         w = data.R.T @ (data.z - data.R @ mean)

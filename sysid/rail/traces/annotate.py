@@ -1,4 +1,4 @@
-"""States of the brake along a trace: for weighting fits, and for figures of merit state by state."""
+"""States of the brake along a trace, by which pipelines weigh fits and tell figures of merit."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.rail.dynamics.equalising import EQUALISING_RATE, equalising_from_handle
+from sysid.rail.dynamics.equalising import equalising_from_handle
 from sysid.rail.end_of_train.brake_computer import APPLICATION, BrakeComputer, ComputerSettings, Reading, State
 from sysid.traces import Channel, Trace
 from sysid.units import Reference, convert
-from sysid.validation.metrics import Figures, figures
 
 
 class EventKind(enum.Enum):
@@ -53,10 +52,6 @@ class Annotation:
     time: NDArray[np.float64]
     states: NDArray[np.int64]
     events: tuple[Event, ...]
-
-    def during(self, *states: State) -> NDArray[np.bool_]:
-        """Which samples are in one of these states."""
-        return np.isin(self.states, [list(State).index(state) for state in states])
 
 
 def annotate(
@@ -137,81 +132,6 @@ def _psi(trace: Trace, name: str) -> NDArray[np.float64]:
     )
 
 
-def events_of_handle(
-    handle: NDArray[np.float64], sample_time: float, *, rate: float = EQUALISING_RATE
-) -> tuple[Event, ...]:
-    """What a driver's handle does, to hold an annotation against.
-
-    A step down is an application, and a lap once the equalising reservoir has followed it; a step up is a release;
-    a step to 0 is an emergency.
-
-    Args:
-        handle: Psi gauge, shape ``(n_samples,)``.
-        sample_time: In s.
-        rate: Of the equalising reservoir in psi/s.
-
-    Returns:
-        Events in order of time.
-    """
-    events = []
-    reservoir = equalising_from_handle(handle, sample_time, rate=rate)
-    for k in np.flatnonzero(np.diff(handle)) + 1:
-        now = float(k * sample_time)
-        if handle[k] == 0.0:
-            events.append(Event(kind=EventKind.EMERGENCY, time=now))
-        elif handle[k] > handle[k - 1]:
-            events.append(Event(kind=EventKind.RELEASE, time=now))
-        else:
-            events.append(Event(kind=EventKind.APPLICATION, time=now))
-            arrived = k + int(np.argmax(reservoir[k:] <= handle[k] + 1e-9))
-            if np.all(handle[k : arrived + 1] == handle[k]):
-                events.append(Event(kind=EventKind.LAP, time=float(arrived * sample_time)))
-    return tuple(sorted(events, key=lambda event: event.time))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Agreement:
-    """Events found against events that were.
-
-    Args:
-        delays: For each true event that was found, by how many seconds after it.
-        missed: True events that were not found.
-        invented: Events found that were none.
-    """
-
-    delays: tuple[float, ...]
-    missed: tuple[Event, ...]
-    invented: tuple[Event, ...]
-
-
-def agreement(found: tuple[Event, ...], truth: tuple[Event, ...], *, within: float) -> Agreement:
-    """Match events of the same kind, each once.
-
-    Args:
-        found: By an annotation.
-        truth: As they were.
-        within: Largest distance in time in s.
-
-    Returns:
-        The agreement.
-
-    Example:
-        >>> event = Event(kind=EventKind.LAP, time=3.0)
-        >>> agreement((event,), (), within=2.0).invented == (event,)
-        True
-    """
-    left, delays, missed = list(found), [], []
-    for event in truth:
-        near = [one for one in left if one.kind is event.kind and abs(one.time - event.time) <= within + 1e-9]
-        if near:
-            best = min(near, key=lambda one: abs(one.time - event.time))
-            left.remove(best)
-            delays.append(best.time - event.time)
-        else:
-            missed.append(event)
-    return Agreement(delays=tuple(delays), missed=tuple(missed), invented=tuple(left))
-
-
 STATE_CHANNEL = "STATE"
 """Channel that an annotation adds: the index of the state in ``State``."""
 
@@ -241,41 +161,6 @@ def annotated(trace: Trace, annotation: Annotation) -> Trace:
         values=np.column_stack([trace.values, annotation.states.astype(np.float64)]),
         provenance=(*trace.provenance, "states of the brake by the end-of-train brake computer"),
     )
-
-
-def figures_by_state(
-    target: NDArray[np.float64], output: NDArray[np.float64], unit: str, annotation: Annotation
-) -> dict[State, Figures]:
-    """Figures of merit state by state.
-
-    Args:
-        target: Shape ``(n_samples,)``.
-        output: Same shape.
-        unit: Of both.
-        annotation: Of the trace that the target is from.
-
-    Returns:
-        Figures of every state that occurs.
-    """
-    return {
-        state: figures(target, output, unit, annotation.during(state))
-        for state in State
-        if annotation.during(state).any()
-    }
-
-
-def weights_by_state(annotation: Annotation, weights: dict[State, float]) -> NDArray[np.float64]:
-    """A weight for every sample, for a weighted fit.
-
-    Args:
-        annotation: Of the trace.
-        weights: By state; 1 where a state is not named.
-
-    Returns:
-        Shape ``(n_samples,)``.
-    """
-    table = np.array([weights.get(state, 1.0) for state in State])
-    return table[annotation.states]
 
 
 class BrakeStates:

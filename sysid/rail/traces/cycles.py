@@ -270,36 +270,3 @@ def command_of(handle: NDArray[np.float64], sample_time: float) -> Command:
         pressures=tuple(float(handle[k]) for k in moves),
         duration=float(len(handle) * sample_time),
     )
-
-
-def reductions_of_notches(
-    notch: NDArray[np.int64], *, running: float = 90.0, first: float = 5.8, deepest: float = 25.8
-) -> NDArray[np.float64]:
-    """The handle of a driver who thinks in notches: each braking notch is a reduction, and letting off is a release.
-
-    A direct-release brake cannot be let off in part: from a shallower braking notch the brake stays as deep as it was,
-    until a notch that does not brake releases it.
-
-    Args:
-        notch: At each sample; braking below 0.
-        running: Released handle in psi gauge.
-        first: Reduction of notch -1 in psi.
-        deepest: Reduction of the deepest notch that occurs in psi.
-
-    Returns:
-        Handle in psi gauge, same shape.
-
-    Example:
-        >>> reductions_of_notches(np.array([2, -1, -3, -2, 0]), first=6.0, deepest=26.0).tolist()
-        [90.0, 84.0, 64.0, 64.0, 90.0]
-    """
-    most = max(1, int(-notch.min(initial=0)))
-    handle, depth = np.empty(len(notch)), 0.0
-    for k, value in enumerate(notch):
-        if value >= 0:
-            depth = 0.0
-        else:
-            share = (-int(value) - 1) / (most - 1) if most > 1 else 1.0
-            depth = max(depth, first + share * (deepest - first))
-        handle[k] = round(running - depth, 6)
-    return handle

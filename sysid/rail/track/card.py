@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sysid.atomic import replacing
 from sysid.errors import ConfigError, ReaderError
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.track import STRAIGHT, TrackProfile
@@ -182,19 +181,6 @@ def _row(cells: list[str], where: str) -> CardRow:
             got=",".join(cells),
             remedy=str(error),
         ) from None
-
-
-def write_card(card: TrackCard, path: Path) -> None:
-    """Write a card.
-
-    Args:
-        card: The card.
-        path: The file; an earlier one is replaced.
-    """
-    with replacing(path) as draft, draft.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(HEADER)
-        writer.writerows((r.section, f"{r.distance / 1000.0:.6g}", r.code.value, f"{r.value:.6g}") for r in card.rows)
 
 
 class CardReader:

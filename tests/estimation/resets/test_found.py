@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -131,6 +132,7 @@ OTHERS = {
 """Second inputs."""
 
 
+@cache
 def of(name: str) -> tuple[ResetMap | None, list[tuple[Array, Array]]]:
     """What is found in twelve records, and twenty others."""
     run, low, high, each = REFERENCES[name]

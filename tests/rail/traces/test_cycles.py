@@ -10,7 +10,7 @@ from sysid.ingest import find_dataset, load_dataset, read_description
 from sysid.rail.constants import KMH
 from sysid.rail.dynamics.drive import Run
 from sysid.rail.dynamics.train import heavy_haul
-from sysid.rail.traces.cycles import HabitSettings, command_of, drive_cycle, reductions_of_notches, rolling_line
+from sysid.rail.traces.cycles import HabitSettings, command_of, drive_cycle, rolling_line
 from sysid.traces import Role
 
 SEEDS = (1, 2)
@@ -48,20 +48,6 @@ def test_a_cycle_comes_from_its_seed() -> None:
 def test_a_command_vector_is_the_handle_again(cycle: Run) -> None:
     command = command_of(cycle.handle, 0.1)
     np.testing.assert_array_equal(command.sampled(sample_time=0.1), cycle.handle)
-
-
-@pytest.mark.parametrize(
-    ("notches", "handle"),
-    [
-        ([0, 0], [90.0, 90.0]),
-        ([-1], [64.2]),
-        ([-1, -2, -1, 0, -2], [84.2, 64.2, 64.2, 90.0, 64.2]),
-        ([-4, -1], [64.2, 64.2]),
-    ],
-    ids=["coasting", "one notch is all there is", "no partial release", "deepest first"],
-)
-def test_notches_become_reductions(notches: list[int], handle: list[float]) -> None:
-    assert reductions_of_notches(np.array(notches)).tolist() == pytest.approx(handle)
 
 
 def test_a_rolling_line_rises_and_falls() -> None:

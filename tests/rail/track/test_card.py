@@ -15,7 +15,7 @@ from sysid.rail.dynamics.drive import AbstractDriver, Limits, Run, drive
 from sysid.rail.dynamics.motion import MovingTrain
 from sysid.rail.dynamics.track import TrackProfile
 from sysid.rail.dynamics.train import heavy_haul, read_train
-from sysid.rail.track.card import CardCode, CardReader, TrackCard, read_card, write_card
+from sysid.rail.track.card import CardCode, CardReader, TrackCard, read_card
 from sysid.rail.transit.ato import AtoSettings, CardDriver, FullNotchDriver, target_speed
 from sysid.rail.transit.notch import Calm, Closeness, Predictor, choose, predicted_speed, true_acceleration
 
@@ -39,11 +39,6 @@ def test_the_example_card_is_the_line_of_the_source(card: TrackCard) -> None:
     assert float(track.speed_limit(351.0)) == pytest.approx(45.0 * KMH)
     assert float(track.speed_limit(349.0)) > 45.0 * KMH
     assert card.sections == ("A", "B")
-
-
-def test_a_written_card_is_read_back(card: TrackCard, tmp_path: Path) -> None:
-    write_card(card, tmp_path / "card.csv")
-    assert read_card(tmp_path / "card.csv") == card
 
 
 @pytest.mark.parametrize(("travelled", "known"), [(0.0, -0.020), (599.0, -0.020), (600.0, 0.020), (800.0, -0.005)])

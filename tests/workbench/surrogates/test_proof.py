@@ -223,11 +223,10 @@ class Killed(BaseException):
 
 
 @pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize("at", ["Searching", "Fitting best", "Exporting", "Proving", "Writing the report"])
-def test_a_surrogate_that_was_killed_goes_on_and_runs_nothing_twice(
-    at: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_surrogate_that_was_killed_again_and_again_goes_on_and_runs_nothing_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Experiments that are killed half-way are tested where they are run."""
+    """Each time a step further on; experiments that are killed half-way are tested where they are run."""
     lag = Family(kind="ARX", linear=True, first=lambda _: [Try(structure=sysid.ARX(na=1, nb=(1,), nk=(0,)))])
     monkeypatch.setattr("sysid.workbench.auto.plan.FAMILIES", (lag,))
     monkeypatch.setattr("sysid.workbench.auto.plan.suggested", lambda *_, **__: [])
@@ -242,14 +241,14 @@ def lag(time, inputs, parameters):
 """
     content = {"kind": "experiment", "name": "lag", "workers": 1}
     content["experiment"] = {"duration": 20.0, "runs": {"estimation": 4, "selection": 2, "test": 1}}
+    content["reference"] = {**REFERENCE, "python": "lag.py:lag", "folder": "."}
+    for name in ("whole", "killed"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "lag.py").write_text(text, encoding="utf-8")
+        (tmp_path / name / "lag.yaml").write_text(json.dumps(content), encoding="utf-8")
 
     def made(name: str, watch: Watcher) -> Made:
         place = tmp_path / name
-        place.mkdir(exist_ok=True)
-        if not (place / "lag.py").is_file():
-            (place / "lag.py").write_text(text, encoding="utf-8")
-        reference = {**REFERENCE, "python": "lag.py:lag", "folder": "."}
-        (place / "lag.yaml").write_text(json.dumps({**content, "reference": reference}), encoding="utf-8")
         monkeypatch.setenv("SYSID_CACHE", str(place / "cache"))
         return surrogate_of(
             place / "lag.yaml", wish_of([], [], [], sample_time=None, duration=None), place / "out", minutes=1.0,
@@ -257,20 +256,27 @@ def lag(time, inputs, parameters):
             proof=6, rounds=None, workers=None, seed=0, iterations=20, watch=watch,
         )  # fmt: skip
 
-    def kill(event: Event) -> None:
+    def runs(name: str) -> int:
+        return (tmp_path / name / "lag.py.log").read_text(encoding="utf-8").count("run")
+
+    def kill(at: str, event: Event) -> None:
         half = isinstance(event, StepProgress) and event.fraction is not None and event.fraction >= 0.5
         if isinstance(event, StepStarted | StepProgress) and event.step.startswith(at) and (half or at != "Proving"):
             raise Killed
 
     whole = made("whole", lambda _: None)
-    with pytest.raises(Killed):
-        made("killed", kill)
+    ran = []
+    for at in ("Searching", "Fitting best", "Exporting", "Proving", "Writing the report"):
+        with pytest.raises(Killed):
+            made("killed", partial(kill, at))
+        ran.append(runs("killed"))
     after = made("killed", lambda _: None)
     np.testing.assert_array_equal(after.proof.errors, whole.proof.errors)
     assert after.notes == whole.notes
-    counted = [(tmp_path / name / "lag.py.log").read_text(encoding="utf-8") for name in ("whole", "killed")]
-    # With one worker one run may be on its way when it is killed: that has no result, and is run again.
-    assert 0 <= counted[1].count("run") - counted[0].count("run") <= (at == "Proving")
+    assert ran[0] == ran[1] == ran[2], "no experiment is run again for the sake of a search, a fit or an export"
+    # With one worker one run of the proof may be on its way when it is killed: that has no result, and is run again.
+    assert 0 <= ran[4] - runs("whole") <= 1
+    assert runs("killed") == ran[4]
     assert "Of 6 new random experiments" in after.report.read_text(encoding="utf-8")
 
 

@@ -86,6 +86,7 @@ def test_a_job_that_is_given_up_leaves_its_worker_free_for_another(crew: LocalWo
     assert collect(crew, 1)[1]["status"] != FAILED
 
 
+@pytest.mark.slow
 def test_a_killed_workers_job_is_done_again_with_the_same_result(crew: LocalWorkers) -> None:
     # Both workers stand, however long the machine takes to start them.
     crew.submit(job(2), None)
@@ -93,7 +94,7 @@ def test_a_killed_workers_job_is_done_again_with_the_same_result(crew: LocalWork
     assert crew.free == 0
     assert set(collect(crew, 2)) == {2, 3}
     # Long enough to be killed in the middle of it.
-    long = job(20, training={"seed": 1, "max_iterations": 3000, "patience": 3000}, iterations=3000)
+    long = job(20, training={"seed": 1, "max_iterations": 1000, "patience": 1000}, iterations=1000)
     crew.submit(long, None)
     time.sleep(0.1)
     assert not crew.finished()
