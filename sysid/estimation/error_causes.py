@@ -237,8 +237,9 @@ def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[st
         return ""
     return (
         "Nothing in these records says that {name} moves with {inputs}: what the model makes of it is no nearer than "
-        "chance, and neither are simple curves of it with any memory. Measure what moves {name}, excite it more, or "
-        "give its dead time; where it moves by itself, as in a limit cycle, a network with more states may tell."
+        "chance, and neither are simple curves of filtered inputs. Measure what moves {name}, excite it more, or give "
+        "its dead time; where it moves by itself, as in a limit cycle, or along something less simple, a network with "
+        "more states or starts may tell."
     )
 
 

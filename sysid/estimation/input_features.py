@@ -16,6 +16,8 @@ STEP = 3.0
 """From one memory to the next."""
 ORDERS = 3
 """Times that a linear memory follows itself."""
+BENT = 2
+"""Of these, those that are bent and multiplied with each other: behind a filter of two poles a curve is another."""
 AT = (0.2, 0.4, 0.6, 0.8)
 """Quantiles at which a curve bends."""
 WIDTHS = (0.1, 0.2, 0.35)
@@ -47,10 +49,15 @@ def features(inputs: Array, simulated: Array) -> dict[str, list[Array]]:
     plays += [held]
     for memory in memories:
         slow = u
-        for _ in range(ORDERS):
+        for order in range(ORDERS):
             slow = _slowed(slow, memory)
             linear.append(slow)
-        curves += [_slowed(bent, memory), *(_curves(one) for one in _slowed(u, memory).T)]
+            if order < BENT:
+                curves += [
+                    *(_curves(one) for one in slow.T),
+                    *([np.column_stack(two)] if (two := _products(slow)) else []),
+                ]
+        curves += [_slowed(bent, memory)]
         plays += [_slowed(held, memory)]
     found, kinds = list[Array](), dict[str, list[Array]]()
     for kind, parts in ((LINEAR, linear), (CURVES, curves), (PLAYS, plays)):

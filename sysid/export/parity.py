@@ -34,6 +34,12 @@ above rounding, far below what would reach a network's bends."""
 LOST = 1e6
 """Amplification from which a difference in the last digit may be as large as what is allowed."""
 
+ROUNDINGS = 1e3
+"""Roundings of the last digit that add up in a run, of which each is amplified."""
+
+NEAR_0 = 10.0
+"""Movements from 0 within which a channel's level makes rounding no coarser than is allowed anyway."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParityCase:
@@ -106,13 +112,19 @@ class Allowed:
     Args:
         each: Largest difference of each output, in its unit, shape ``(n_outputs,)``.
         share: The same as a share of each output's size; ``None`` where it was given.
+        rounding: What rounding at the channels' levels makes of each output, before it is amplified; nothing of
+            channels that move about 0.
     """
 
     each: NDArray[np.float64]
     share: float | None = None
+    rounding: NDArray[np.float64] | float = 0.0
 
     def over(self, run: ParityCase) -> NDArray[np.float64]:
         """What is allowed in a run: more where its outputs are larger than in all cases, as an unstable model's become.
+
+        And where a channel stands far from 0: what moves by 50 Pa about 100 kPa is rounded 2,000 times as coarsely as
+        its movement, and so is every output that it moves, also one that stands at 0 itself.
 
         Args:
             run: The model's.
@@ -122,7 +134,8 @@ class Allowed:
         """
         if self.share is None:
             return self.each
-        return np.asarray(np.maximum(self.each, self.share * np.abs(run.output).max(axis=0, initial=0.0)))
+        own = np.maximum(self.each, self.share * np.abs(run.output).max(axis=0, initial=0.0))
+        return np.asarray(np.maximum(own, self.rounding * min(run.amplification, LOST)))
 
     @classmethod
     def of(cls, cases: Sequence[ParityCase], dtype: str, given: float | None = None) -> Allowed:
@@ -144,7 +157,22 @@ class Allowed:
             return cls(each=np.full(sizes.shape, given))
         # One that is 0 throughout has no size of its own.
         usable = np.isfinite(sizes) & (sizes > 0.0)
-        return cls(each=SHARES[dtype] * np.where(usable, sizes, 1.0), share=SHARES[dtype])
+        return cls(
+            each=SHARES[dtype] * np.where(usable, sizes, 1.0),
+            share=SHARES[dtype],
+            rounding=ROUNDINGS * np.finfo(dtype).eps * _far_from_0(cases),
+        )
+
+
+def _far_from_0(cases: Sequence[ParityCase]) -> NDArray[np.float64]:
+    """How far channels stand from 0, beyond some of their movements, as movements of each output."""
+    inputs, outputs = (np.concatenate([getattr(case, name) for case in cases]) for name in ("inputs", "output"))
+    with np.errstate(over="ignore", invalid="ignore"):  # of a model that grows without bound
+        every = np.column_stack([inputs, outputs])
+        moves, levels = every.std(axis=0), np.abs(every.mean(axis=0))
+    moving = np.isfinite(moves) & np.isfinite(levels) & (moves > 0.0)
+    farthest = float((levels[moving] / moves[moving]).max(initial=0.0))
+    return np.where(moving, moves, 0.0)[inputs.shape[1] :] * max(0.0, farthest - NEAR_0)
 
 
 def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[ParityCase, ...]:

@@ -167,3 +167,22 @@ def test_a_dead_time_is_told_as_it_is_where_levels_are_held(held: int) -> None:
     y = lfilter([*np.zeros(41), 0.1], [1.0, -0.9], u) + 0.005 * rng.standard_normal(1500)
     fit = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.ARX(na=1, nb=1, nk=1))
     assert [note for note in fit.notes if "Begin there (nk: 41)" in note]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_output_behind_a_curve_and_filters_moves_with_its_inputs(seed: int) -> None:
+    """An even curve of what two inputs do slowly, followed once more: it was said that nothing moves it with them."""
+    rng = np.random.default_rng(seed)
+    u, v = (np.repeat(rng.uniform(-1.0, 1.0, 100), hold)[:400] for hold in (8, 5))
+    within = _slow(0.15 * np.tanh(2.0 * u) + 0.05 * v)
+    y = _slow(within**2, 2.0)
+    model = SimpleNamespace(mapping=Mapping(inputs=("u", "v"), outputs=("y",)), n_parameters=10)
+    run = FreeRun(
+        inputs=np.column_stack([u, v]),
+        output=y[:, np.newaxis],
+        simulated=np.full((400, 1), y.mean()),
+        usable=np.ones(400, dtype=bool),
+        history=History.at_rest(inputs=[0.0, 0.0], output=0.0),
+    )
+    (told,) = causes(model, run)
+    assert "along a curve that the model lacks" in told

@@ -139,6 +139,19 @@ def test_what_is_allowed_is_the_same_in_whatever_unit_and_for_each_output_its_ow
     assert Allowed.of((run_of([0.0]),), "float64").each.tolist() == [1e-9]
 
 
+@pytest.mark.parametrize("level", [0.0, 1e5])
+def test_what_a_channel_far_from_0_does_to_another_output_is_rounding(level):
+    """A pressure at 100 kPa that moves by 50 Pa is rounded so coarsely that a strain that it moves was refused."""
+    moves = np.tile([-1.0, 1.0], 50)
+    case = replace(run_of([*(level + 50.0 * moves)], [*(5e-10 * moves)]), amplification=80.0)
+    ulp = np.finfo(np.float64).eps * level / 50.0
+    expected = [1e-9 * (level + 50.0), max(5e-19, 5e-10 * 1e3 * (ulp - 10.0 * np.finfo(np.float64).eps) * 80.0)]
+    np.testing.assert_allclose(Allowed.of((case,), "float64").over(case), expected)
+    # Not more than what is told as lost by itself.
+    lost = Allowed.of((case,), "float64").over(replace(case, amplification=1e300))
+    assert lost[1] <= max(5e-19, 5e-10 * 1e3 * ulp * 1e6)
+
+
 def test_of_several_outputs_each_is_held_to_its_own_and_the_nearest_is_told(tmp_path, monkeypatch):
     small, large = (
         Port(name=name, unit=unit, identifier=name, level=0.0) for name, unit in (("small", "m"), ("large", "Pa"))
