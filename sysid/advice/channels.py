@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from sysid.advice.answered import answered
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, stacked
-from sysid.estimation.held_output import held_for, straight_for
-from sysid.estimation.record_drift import sums_up, trend_of
-from sysid.estimation.wrapped import jumping, period_of
+from sysid.estimation.remarks.held_output import held_for, straight_for
+from sysid.estimation.remarks.record_drift import sums_up, trend_of
+from sysid.estimation.remarks.wrapped import jumping, period_of
 from sysid.traces.converter import coarse_step, converter_step
 
 COARSE = 0.1

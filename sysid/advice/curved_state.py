@@ -16,10 +16,10 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.informative import beyond_chance, by_chance
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.segments import Segment, columns_of_lags
+from sysid.estimation.records.informative import beyond_chance, by_chance
 
 FACTORS = (1, 2, 4, 8, 16, 32)
 """Samples of a step."""

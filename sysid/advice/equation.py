@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UserError
-from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, search_orders
+from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import ARX, ARXModel, Mapping, Start, StartKind
 from sysid.traces import Trace
 

@@ -10,9 +10,9 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import UserError
-from sysid.estimation.experiment import experiments_of, unit_range
 from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.neural.start import linear_start
+from sysid.estimation.records.experiment import experiments_of, unit_range
 from sysid.models import Mapping, NeuralForm, Start, StartKind
 from sysid.models.neural_sizes import Sizes
 from sysid.traces import Trace

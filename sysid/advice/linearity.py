@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from sysid.advice.dynamics import AWAY
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import BARELY, Record, Residual
-from sysid.estimation.informative import beyond_chance, by_chance
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.noise import whitener
 from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.estimation.nonparametric.segments import Segment
+from sysid.estimation.records.informative import beyond_chance, by_chance
 
 SURE, LIKELY = 1e-4, 1e-2
 SLIGHT, CLEAR = 0.05, 0.2

@@ -13,12 +13,12 @@ from sysid.advice.curved_state import StateCurve, curve_of_state
 from sysid.advice.equation import Equation, least_bic
 from sysid.advice.integrators import SAMPLES, integrates
 from sysid.errors import UserError
-from sysid.estimation.informative import own_part
 from sysid.estimation.nonparametric.feedback import Feedback, find_feedback
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.remembered import remembered_response
 from sysid.estimation.nonparametric.response import FrequencyResponse, estimate_frequency_response
 from sysid.estimation.nonparametric.segments import Segment, segments_of, stretches
+from sysid.estimation.records.informative import own_part
 from sysid.models import Mapping
 from sysid.traces import Trace
 

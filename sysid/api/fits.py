@@ -16,7 +16,7 @@ from sysid.api.abstract_fit import AbstractFit
 from sysid.api.given import TracesLike, traces_of
 from sysid.errors import ChannelError, TraceError, shortened
 from sysid.estimation import FitResult
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.records.experiment import Experiment
 from sysid.ingest.memory.run_inputs import inputs_of
 from sysid.ingest.memory.run_records import before_a_run, level_of, measured_of
 from sysid.models import History, Start

@@ -10,7 +10,7 @@ import numpy as np
 
 from sysid.composite.fixed.member import FixedMember, Standing
 from sysid.errors import ConfigError
-from sysid.estimation.named import check_alike
+from sysid.estimation.parameters.named import check_alike
 from sysid.models import Cascade, GreyBoxModel
 from sysid.models.declared import Parameter
 

@@ -27,7 +27,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Training, estimators
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.warm_start import grown, widened
-from sysid.estimation.result import Loop, Status
+from sysid.estimation.results.result import Loop, Status
 from sysid.models import AbstractModel, Cascade, NARXModel
 from sysid.traces import Trace
 

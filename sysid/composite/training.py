@@ -28,7 +28,7 @@ from sysid.composite.training_data import TrainingData
 from sysid.composite.warm_start import started_from
 from sysid.errors import ConfigError
 from sysid.estimation import CascadeFit, FitResult
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 from sysid.models import Cascade
 from sysid.traces import Trace
 

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
-    from sysid.estimation.attempts import Attempt as Attempt
     from sysid.estimation.linear.arx import fit_arx as fit_arx
     from sysid.estimation.linear.frequency_response import Spectrum as Spectrum
     from sysid.estimation.linear.frequency_response import fit_spectra as fit_spectra
@@ -29,13 +28,14 @@ if TYPE_CHECKING:
     from sysid.estimation.networks.training import FitProgress as FitProgress
     from sysid.estimation.networks.training import Training as Training
     from sysid.estimation.networks.vector_narx import fit_vector_narx as fit_vector_narx
-    from sysid.estimation.operating_point import OperatingPoint as OperatingPoint
-    from sysid.estimation.result import Evidence as Evidence
-    from sysid.estimation.result import FitResult as FitResult
-    from sysid.estimation.result import Loop as Loop
-    from sysid.estimation.result import Status as Status
+    from sysid.estimation.records.operating_point import OperatingPoint as OperatingPoint
+    from sysid.estimation.results.attempts import Attempt as Attempt
+    from sysid.estimation.results.result import Evidence as Evidence
+    from sysid.estimation.results.result import FitResult as FitResult
+    from sysid.estimation.results.result import Loop as Loop
+    from sysid.estimation.results.result import Status as Status
+    from sysid.estimation.results.uncertainty import Uncertainty as Uncertainty
     from sysid.estimation.stability import StabilityOptions as StabilityOptions
-    from sysid.estimation.uncertainty import Uncertainty as Uncertainty
 
 __getattr__, __all__ = imported_when_asked(__file__)
 """A frozen model is run without anything that fits one, which takes longest to import."""

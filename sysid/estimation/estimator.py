@@ -10,8 +10,6 @@ from functools import cached_property
 from typing import Any
 
 from sysid.errors import ConfigError
-from sysid.estimation.equilibrium import equilibrium_notes
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
@@ -20,7 +18,9 @@ from sysid.estimation.linear_posteriors import LinearPosterior
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.training import Training
-from sysid.estimation.record_notes import (
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.remarks.equilibrium import equilibrium_notes
+from sysid.estimation.remarks.record_notes import (
     between_levels,
     contradicted,
     held,
@@ -29,7 +29,7 @@ from sysid.estimation.record_notes import (
     underexcited,
     undetermined,
 )
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.estimation.stability.check import (
     AbstractStabilityCheck,
     FreeRunCheck,

@@ -48,7 +48,7 @@ from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.training import FitProgress, Training, check_lagged
 from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.estimation.stability.check import (
     PoleCheck,
     StabilityOptions,

@@ -9,11 +9,11 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.state_space.fit import matrices_root
 from sysid.estimation.networks.posterior import Noise, Posterior, free_run_errors, remaining
 from sysid.estimation.nonparametric.noise import persistence
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import FitResult
 from sysid.models import (
     AbstractModel,
     ARXModel,

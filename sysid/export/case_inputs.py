@@ -13,7 +13,7 @@ from sysid.models.grey_box_model import EquationModel
 from sysid.traces import Channel, Trace, TraceSet
 
 if TYPE_CHECKING:
-    from sysid.estimation.result import FitResult
+    from sysid.estimation.results.result import FitResult
 
 DESCRIPTION = "a parameter by case, estimated; constant over a record, the range is that of the cases that were fitted"
 

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 import sysid
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.export.exporter import ExportedFile
 from sysid.export.forms.layout import HiddenState
 from sysid.export.forms.stage import Port, Stage

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 from sysid.estimation.stability.check import FreeRunCheck, StabilityOptions
 from sysid.estimation.stability.free_run import Stability
 from sysid.export.parity import ParityCase

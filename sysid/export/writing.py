@@ -12,7 +12,7 @@ import numpy as np
 
 from sysid.atomic import replacing, replacing_folder
 from sysid.errors import ConfigError
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.export.archive import write_archive
 from sysid.export.bundle import Bundle, bundle_files
 from sysid.export.card import model_card

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from sysid.estimation.linear.order_search import Criterion, weighed
-from sysid.estimation.tolerance import outside
+from sysid.estimation.results.tolerance import outside
 from sysid.reporting.records import Number, Record, parse_record, read_document, write_record
 from sysid.units import squared
 

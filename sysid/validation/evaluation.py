@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation import Posterior
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import AbstractModel, Start, beginning, gaps
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.intervals import CaseIntervals, case_intervals

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Posterior
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import AbstractModel, Start, gaps
 from sysid.traces import Trace
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.order_search import OrderLosses
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.models import Mapping, Start, beginning
 from sysid.traces import Trace
 from sysid.validation.metrics import Figures, figures, mean_fit

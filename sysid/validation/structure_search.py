@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, UserError
 from sysid.estimation.estimators import fit
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.order_search import Criterion, OrderLosses, weighed
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import FitResult
 from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, TransferFunction, gaps
 from sysid.traces import Trace
 from sysid.validation.order_finalists import Finalist, finalist_of

@@ -17,9 +17,9 @@ from functools import partial
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.together.provider import CascadeProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import NARX, Cascade, History, Mapping, NARXModel, Scaling, parameter_count
 from sysid.reporting.numbers import number
 from sysid.traces import Channel, Trace

@@ -17,8 +17,8 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import NARX, History, Recursion, Scaling, parameter_count
 
 SAMPLES = (5_000, 10_000, 20_000, 50_000, 100_000)

@@ -20,7 +20,7 @@ import numpy as np
 
 from sysid.estimation import JointTraining, Training
 from sysid.estimation.estimators import fit
-from sysid.estimation.result import Loop
+from sysid.estimation.results.result import Loop
 from sysid.models import (
     ARMAX,
     ARX,

@@ -61,8 +61,8 @@ def measured(kind: str, file: str) -> dict[str, float]:
 
 def one_pass(fit: Any, u: np.ndarray, y: np.ndarray) -> float:
     """Median processor time of a linearisation at the fitted parameters."""
-    from sysid.estimation.experiment import Experiment
     from sysid.estimation.networks.neural.provider import NeuralProvider
+    from sysid.estimation.records.experiment import Experiment
     from sysid.models import History
 
     rest = History.at_rest(inputs=u[:1], output=float(y[0]))

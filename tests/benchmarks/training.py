@@ -29,8 +29,8 @@ from threadpoolctl import threadpool_limits
 from sysid.airbrake.command import Command
 from sysid.airbrake.consist import Consist
 from sysid.airbrake.simulate import Probe, simulate
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import NARX, History, Recursion, Scaling, parameter_count
 from sysid.reporting.numbers import number
 from tests.benchmarks._findings import found

@@ -12,8 +12,8 @@ import sysid
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import Posterior, StateSpaceTraining
 from sysid.estimation.estimators import fit
-from sysid.estimation.experiment import Experiment
-from sysid.estimation.result import Loop
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import Loop
 from sysid.models import ARMAX, ARX, LinearStateSpace, Mapping, Start, TransferFunction
 from sysid.models.transfer_function import TransferFunctionModel
 from sysid.validation import predict_interval

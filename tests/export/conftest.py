@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.export import (
     EXPORTERS,
     AbstractExporter,

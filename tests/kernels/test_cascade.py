@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.program_provider import BLOCK
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.kernels.neurons import NEURONS
 from sysid.models import NARX, History, Recursion, Scaling, parameter_count
 from sysid.testing import finite_difference_jacobian, simulate

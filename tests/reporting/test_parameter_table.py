@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid.estimation import FitResult, Loop, Status
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.sections.parameter_table import parameter_tables
 from tests.export.grey_boxes import GREY_BOXES

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.records.experiment import Experiment
 from sysid.ingest import load_dataset
 from sysid.models import Mapping, Start
 from sysid.reporting.results import read_results

@@ -20,12 +20,12 @@ from sysid.estimation.blocks.equations import hammerstein_wiener, wiener_hammers
 from sysid.estimation.blocks.grown import grown
 from sysid.estimation.blocks.linear_start import LinearStart, integrating_start, linear_start, parted, shifted, whole
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.grey_box.fit import fit_equations, raced_equations
 from sysid.estimation.grey_box.layout import Begun
 from sysid.estimation.grey_box.readying import built_template
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import FitResult
 from sysid.models import BuiltModel, GreyBox, HammersteinWiener, Mapping, Start, WienerHammerstein
 from sysid.models.block_oriented import BlockStructure
 from sysid.models.curves import Text

@@ -15,13 +15,13 @@ from sysid.equations.system import written_name
 from sysid.errors import FitDivergedError
 from sysid.estimation.blocks.selection import Chosen, choose_terms
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.grey_box.fit import fit_equations
 from sysid.estimation.grey_box.readying import built_template
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import nothing_in_a_row
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import Experiment, experiments_of
+from sysid.estimation.results.result import FitResult
 from sysid.models import BuiltModel, GreyBox, Lags, Mapping, PolynomialNARX, Start
 from sysid.models.curves import Text, number
 from sysid.models.polynomial_narx import Term

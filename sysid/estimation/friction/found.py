@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.output_ends import found_ends
+from sysid.estimation.records.output_ends import found_ends
 from sysid.models.output_limits import Between
 
 Array = NDArray[np.float64]

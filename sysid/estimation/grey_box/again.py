@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from sysid.errors import ConfigError
-from sysid.estimation.experiment import experiments_of
 from sysid.estimation.grey_box.finishing import noise_of
 from sysid.estimation.grey_box.layout import EquationLayout
 from sysid.estimation.grey_box.preparing import WINDOW, provider_for
@@ -17,8 +16,9 @@ from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
-from sysid.estimation.named import named_of
-from sysid.estimation.result import FitResult
+from sysid.estimation.parameters.named import named_of
+from sysid.estimation.records.experiment import experiments_of
+from sysid.estimation.results.result import FitResult
 from sysid.models import Start
 from sysid.models.grey_box import PROFILE
 from sysid.models.grey_box_model import EquationModel

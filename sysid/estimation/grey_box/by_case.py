@@ -9,9 +9,9 @@ from typing import TypeVar
 import numpy as np
 
 from sysid.errors import ConfigError
-from sysid.estimation.experiment import Experiment
-from sysid.estimation.named import named_of
-from sysid.estimation.result import FitResult
+from sysid.estimation.parameters.named import named_of
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import FitResult
 from sysid.models import Start
 from sysid.models.case_values import case_of, cases_among
 from sysid.models.grey_box_model import EquationModel

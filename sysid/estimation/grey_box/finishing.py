@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.clock import now
-from sysid.estimation.findings import with_evidence
 from sysid.estimation.grey_box.preparing import ROUNDS, SHARPER, seen_terms
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.stepping import ACCURACY, Stepping, substeps_for
@@ -16,10 +15,11 @@ from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, at_minimum
 from sysid.estimation.least_squares.termination import Termination
-from sysid.estimation.named import Named, named_of
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.training import Training
-from sysid.estimation.result import Status
+from sysid.estimation.parameters.findings import with_evidence
+from sysid.estimation.parameters.named import Named, named_of
+from sysid.estimation.results.result import Status
 from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 
 Array = NDArray[np.float64]

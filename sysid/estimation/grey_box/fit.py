@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.grey_box.by_case import with_cases
 from sysid.estimation.grey_box.finishing import Ready, finished, settled
 from sysid.estimation.grey_box.layout import Begun, EquationLayout
@@ -40,7 +39,8 @@ from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range, unit_ranges
+from sysid.estimation.results.result import FitResult
 from sysid.models import History, Mapping, Start, beginning
 from sysid.models.built_model import BuiltModel
 from sysid.models.grey_box import GreyBox

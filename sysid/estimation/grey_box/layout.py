@@ -12,8 +12,8 @@ from sysid.equations import Net
 from sysid.estimation.grey_box.preparing import WINDOW
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.named import FLAT_ALPHA, Named, precision_of
 from sysid.estimation.networks.initialise import AbstractLayout
+from sysid.estimation.parameters.named import FLAT_ALPHA, Named, precision_of
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.grey_box.stepping import STEPPED
-from sysid.estimation.named import named_of
+from sysid.estimation.parameters.named import named_of
 from sysid.models.equation_form import EquationForm
 from sysid.models.grey_box_model import EquationModel
 

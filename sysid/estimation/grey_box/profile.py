@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, State
 from sysid.estimation.least_squares.termination import Termination
-from sysid.estimation.named import Named
-from sysid.estimation.result import Status
+from sysid.estimation.parameters.named import Named
+from sysid.estimation.results.result import Status
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.first_samples import is_another, moves_of_shown
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.records.first_samples import is_another, moves_of_shown
 from sysid.kernels.arrays import forget_what_has_died_away
 from sysid.models.equation_form import EquationForm
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from sysid.equations import ROSENBROCK, RUNGE_KUTTA, Lowered
 from sysid.errors import TraceError
-from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.grey_box.finishing import Ready
 from sysid.estimation.grey_box.preparing import WINDOW, first_terms, norms_for, provider_for, seen_terms, widths_for
 from sysid.estimation.grey_box.provider import EquationProvider
@@ -20,7 +19,8 @@ from sysid.estimation.grey_box.record import Record
 from sysid.estimation.grey_box.shooting import in_windows
 from sysid.estimation.grey_box.stepping import STIFF, Stepping, can_be_implicit, explicit_steps, solver_for
 from sysid.estimation.linear.arx import first_output
-from sysid.estimation.named import named_of
+from sysid.estimation.parameters.named import named_of
+from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range
 from sysid.models import AbstractStructure, Mapping, Start
 from sysid.models.built_model import BuiltModel
 from sysid.models.grey_box import GreyBox, lowered

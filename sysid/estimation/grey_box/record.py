@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.records.experiment import Experiment
 from sysid.models.equation_form import EquationForm
 
 Array = NDArray[np.float64]

@@ -18,11 +18,11 @@ from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquard
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
-from sysid.estimation.named import FLAT_ALPHA, Named
 from sysid.estimation.networks.starts.advancing import PRETRAINED
 from sysid.estimation.networks.starts.multistart import Candidate, Multistart
 from sysid.estimation.networks.training import Training
-from sysid.estimation.result import FitResult
+from sysid.estimation.parameters.named import FLAT_ALPHA, Named
+from sysid.estimation.results.result import FitResult
 from sysid.models.built_model import BuiltModel
 from sysid.models.grey_box_model import EquationModel
 

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.estimation.experiment import Experiment
-from sysid.estimation.findings import Findings
-from sysid.estimation.first_samples import shown_note
 from sysid.estimation.grey_box.by_case import case_notes
 from sysid.estimation.grey_box.finishing import Done
 from sysid.estimation.grey_box.profile import Profiler
 from sysid.estimation.grey_box.stepping import step_note, step_warning
-from sysid.estimation.named import Named
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
-from sysid.estimation.result import FitResult, Status
+from sysid.estimation.parameters.findings import Findings
+from sysid.estimation.parameters.named import Named
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.records.first_samples import shown_note
+from sysid.estimation.results.result import FitResult, Status
 from sysid.models import Start
 from sysid.models.built_model import BuiltModel
 from sysid.models.grey_box import PROFILE

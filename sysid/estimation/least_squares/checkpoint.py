@@ -17,7 +17,7 @@ from sysid.estimation.least_squares.damping import damping_of
 from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, State
 from sysid.estimation.least_squares.provider import AbstractProvider
-from sysid.estimation.result import Evidence
+from sysid.estimation.results.result import Evidence
 
 MEASURED = ("mse", "damping", "effective_parameters", "elapsed_s")
 """Figures of an iteration."""

@@ -21,7 +21,7 @@ from sysid.estimation.least_squares.evidence import Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, State
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.threads import one_blas_thread
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 
 EVERY_S = 30.0
 """Seconds between two writings: what a killed fit does again at most."""

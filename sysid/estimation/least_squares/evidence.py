@@ -40,7 +40,7 @@ from scipy import linalg
 
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.small_matrices import add_to_diagonal, cholesky, inverse_of
-from sysid.estimation.result import Evidence
+from sysid.estimation.results.result import Evidence
 from sysid.kernels.arrays import read_only
 
 BETA_LIMIT = float(np.finfo(np.float64).eps ** -2)

@@ -67,7 +67,7 @@ from sysid.estimation.least_squares.provider import AbstractProvider, Linearisat
 from sysid.estimation.least_squares.small_matrices import add_to_diagonal, cholesky, solved
 from sysid.estimation.least_squares.termination import MAX_DAMPING, Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
-from sysid.estimation.result import Evidence, Status
+from sysid.estimation.results.result import Evidence, Status
 
 MIN_GAIN = 1e-4
 """Smallest share of the promised decrease for which a step is taken (Nocedal and Wright 2006, algorithm 4.1)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 
 MAX_DAMPING = 1e12
 """Damping at which a step no longer changes the parameters in double precision."""

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.regression import Solution, deviation, regress
-from sysid.estimation.operating_point import OperatingPoint
-from sysid.estimation.result import FitResult, Loop, Status
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.records.experiment import Experiment, experiments_of
+from sysid.estimation.records.operating_point import OperatingPoint
+from sysid.estimation.results.result import FitResult, Loop, Status
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import ARX, ARXModel, Mapping, Start
 from sysid.traces import Trace
 

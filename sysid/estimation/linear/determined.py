@@ -9,11 +9,11 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
-from sysid.estimation.informative import informative
 from sysid.estimation.linear.poles import sections_of
-from sysid.estimation.result import FitResult
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.records.informative import informative
+from sysid.estimation.results.result import FitResult
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import Domain, Mapping, Scaling, TransferFunction, TransferFunctionModel
 from sysid.models.linear_state_space import state_space_names
 from sysid.models.polynomial import PolynomialModel

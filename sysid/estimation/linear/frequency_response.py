@@ -18,7 +18,7 @@ from sysid.estimation.linear.spectral_record import SpectralRecord
 from sysid.estimation.linear.transfer_function_search import AbstractProblem
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.models import Mapping, Scaling, TransferFunction
 from sysid.models.orthonormal_basis import Domain
 

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.linear.arx import arx_experiments, arx_model, arx_uncertainty, first_output, stability_note
 from sysid.estimation.linear.regression import Solution, regress, regressor_matrix, solve
-from sysid.estimation.operating_point import OperatingPoint
-from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.records.operating_point import OperatingPoint
+from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.models import ARX, ARXModel, Mapping, Start
 from sysid.traces import Trace
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel
 from sysid.models.continuous import NEGATIVE
 from sysid.models.ratio import Ratio

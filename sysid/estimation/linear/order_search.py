@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from sysid.atomic import replacing
 from sysid.errors import ConfigError, TraceError
-from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.regression import blocks_of
 from sysid.estimation.nonparametric.evidence import triangle
+from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.kernels import linear_orders as kernel
 from sysid.models import ARX, Lags, Mapping, Start
 from sysid.traces import Trace

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import TraceError
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.nonparametric.evidence import triangle
-from sysid.estimation.operating_point import OperatingPoint
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.records.operating_point import OperatingPoint
 from sysid.models import Lags
 
 TALL = 4096

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment, unit_range
+from sysid.estimation.records.experiment import Experiment, unit_range
 from sysid.models import Scaling
 
 Array = NDArray[np.float64]

@@ -10,8 +10,6 @@ import numpy as np
 
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment, experiments_of
-from sysid.estimation.informative import informative
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
@@ -29,7 +27,9 @@ from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
 from sysid.estimation.nonparametric.feedback import find_feedback
 from sysid.estimation.nonparametric.segments import Segment
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import Experiment, experiments_of
+from sysid.estimation.records.informative import informative
+from sysid.estimation.results.result import FitResult
 from sysid.models import AbstractModel, Domain, Mapping, Scaling, Start, TransferFunction, TransferFunctionModel
 from sysid.traces import Trace
 

@@ -15,7 +15,7 @@ from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import Sections, SeparableProvider
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 
 SIGNIFICANT = 6.6
 """Drop of twice the log-likelihood that one more free parameter has by chance in one case of a hundred."""

@@ -28,8 +28,8 @@ from sysid.estimation.linear.transfer_function_uncertainty import transfer_funct
 from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_speed, of_stability, of_starts
 from sysid.estimation.linear.variable_projection import PoleParameters, Sections, SeparableProvider
 from sysid.estimation.nonparametric.dead_time import descend
-from sysid.estimation.result import FitResult, Loop
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.result import FitResult, Loop
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel, intersample
 from sysid.models.orthonormal_basis import Domain
 

@@ -11,7 +11,7 @@ from scipy import linalg
 from sysid.estimation.linear.coloured_errors import colour, information, sandwich
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import SeparableProvider, Separated
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import TransferFunctionModel
 from sysid.models import orthonormal_basis as bases
 from sysid.models.orthonormal_basis import Domain

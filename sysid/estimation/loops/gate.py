@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.majority_map import majority_map
+from sysid.estimation.linear.majority_map import majority_map
 
 Array = NDArray[np.float64]
 

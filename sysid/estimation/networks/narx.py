@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment, experiments_of, unit_range
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
@@ -30,8 +29,9 @@ from sysid.estimation.networks.starts.result import left_on, multistart_result, 
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import check_initial, grown
 from sysid.estimation.networks.windows import Windows, in_place, with_note
-from sysid.estimation.output_ends import ends_of, told
-from sysid.estimation.result import FitResult, Loop
+from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range
+from sysid.estimation.records.output_ends import ends_of, told
+from sysid.estimation.results.result import FitResult, Loop
 from sysid.models import NARX, History, Mapping, NARXModel, Recursion, Start
 from sysid.traces import Trace
 

@@ -51,12 +51,12 @@ import scipy
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.evidence import SAMPLES_PER_PARAMETER
 from sysid.estimation.least_squares.levenberg_marquardt import State
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.nonparametric.noise import persistence
-from sysid.estimation.result import Evidence, Loop
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import Evidence, Loop
 from sysid.models import AbstractModel, Recursion, gaps
 from sysid.models.innovation_moves import prediction_moves
 

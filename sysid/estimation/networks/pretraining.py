@@ -28,12 +28,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.linear.regression import lagged
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.estimation.networks.program_provider import BLOCK
+from sysid.estimation.records.experiment import Experiment
 from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import NARXModel
 

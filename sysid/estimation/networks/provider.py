@@ -35,11 +35,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.networks.joint_record import Record
 from sysid.estimation.networks.program_provider import ProgramProvider
 from sysid.estimation.networks.trained_members import TrainedMembers
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import Recursion
 from sysid.models.lagged_form import opened, side_by_side
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.damping import DAMPINGS
-from sysid.estimation.result import Loop
+from sysid.estimation.results.result import Loop
 from sysid.models.typed_fields import TypedFields
 
 CHOICES = {

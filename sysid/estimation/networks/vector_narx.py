@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.together.fit import Joint
 from sysid.estimation.networks.together.layout import JointLayout
@@ -18,8 +17,9 @@ from sysid.estimation.networks.together.member_layout import MemberLayout
 from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.together.result import CascadeFit
 from sysid.estimation.networks.training import FitProgress
-from sysid.estimation.output_ends import ends_of_several, told
-from sysid.estimation.result import FitResult, Loop
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.records.output_ends import ends_of_several, told
+from sysid.estimation.results.result import FitResult, Loop
 from sysid.models import (
     AbstractStructure,
     Cascade,

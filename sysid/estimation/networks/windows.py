@@ -19,13 +19,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.networks.starts.advancing import advanced
 from sysid.estimation.networks.starts.choosing import Choice
 from sysid.estimation.networks.starts.multistart import Candidate, Multistart
 from sysid.estimation.networks.training import Training
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import FitResult
 
 LONG = 200_000
 """Samples of all records together above which starts are raced on windows without being asked: below, all samples take

@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.records.experiment import Experiment
 from sysid.kernels.linear import slowed
 
 TIME_CONSTANTS = (0.0, 2.0, 5.0, 12.0, 30.0, 80.0, 200.0)

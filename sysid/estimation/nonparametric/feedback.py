@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.informative import beyond_chance, by_chance, informative
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.memory import Memory, key_of
 from sysid.estimation.nonparametric.segments import Segment, columns_of_lags, segments_of
+from sysid.estimation.records.informative import beyond_chance, by_chance, informative
 from sysid.models import Mapping
 from sysid.traces import Trace
 

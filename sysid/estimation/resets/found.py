@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.estimation.majority_map import majority_map
+from sysid.estimation.linear.majority_map import majority_map
 from sysid.estimation.resets.quotients import ratios_of
 from sysid.estimation.resets.reset_map import Armed, Array, Guard, ResetMap, Rest, features, quantity, with_ratios
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError, shortened
 from sysid.estimation.clock import now
 from sysid.estimation.linear.arx import fit_arx
-from sysid.estimation.result import NOT_STABLE, FitResult, Loop, Status
+from sysid.estimation.results.result import NOT_STABLE, FitResult, Loop, Status
 from sysid.estimation.stability.beginnings import TWICE, Beginnings
 from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
 from sysid.reporting.linear_views import linear_views

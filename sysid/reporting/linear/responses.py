@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.linear.modes import Mode
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.extras import need
 from sysid.models import AbstractModel
 from sysid.reporting.linear.step_responses import (

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sysid.estimation import FitResult
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models.grey_box_model import EquationModel
 from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.numbers import number

@@ -12,7 +12,7 @@ from sysid.advice.dynamics import INTEGRATES
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
 from sysid.estimation.linear.state_space.orders import state_orders
-from sysid.estimation.output_ends import found_ends
+from sysid.estimation.records.output_ends import found_ends
 from sysid.estimation.resets import derived_from, found_resets, grey_box_of, switches
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind, VectorGreyBox
 from sysid.reporting.advice.record import AdviceRecord

@@ -10,7 +10,7 @@ import numpy as np
 
 from sysid.estimation import FitResult, Status
 from sysid.estimation.estimators import with_stability
-from sysid.estimation.tolerance import outside, spans_of
+from sysid.estimation.results.tolerance import outside, spans_of
 from sysid.models import AbstractModel
 from sysid.traces import Role, Trace
 from sysid.validation import case_results

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation import FitResult
-from sysid.estimation.result import Status
-from sysid.estimation.tolerance import outside
+from sysid.estimation.results.result import Status
+from sysid.estimation.results.tolerance import outside
 from sysid.reporting.numbers import quantity
 from sysid.traces import Role
 from sysid.units import squared

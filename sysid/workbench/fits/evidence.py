@@ -9,7 +9,7 @@ from typing import Any, Final
 from sysid.errors import TraceError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import estimator_of
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.records.experiment import Experiment
 from sysid.models.curve_values import curve_values, has_curves
 from sysid.traces import Role
 from sysid.validation import Linearity, analyse_residuals, judge_linearity

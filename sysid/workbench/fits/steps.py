@@ -21,8 +21,8 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, estimators
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.grey_box.by_case import for_case
+from sysid.estimation.results.tolerance import spans_of
 from sysid.estimation.stability import StabilityOptions
-from sysid.estimation.tolerance import spans_of
 from sysid.export.exporters import wanted_formats
 from sysid.models import AbstractStructure, Cascade
 from sysid.traces import Role

@@ -7,7 +7,7 @@ from statistics import median
 from rich.table import Table
 from rich.text import Text
 
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.results import Results, SystemRecord
 from sysid.reporting.sections.fit_tables import scored_cases

@@ -21,7 +21,7 @@ from sysid.composite.growth import in_rounds, worst_of
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, StabilityOptions, Training, estimators
 from sysid.estimation.estimators import estimator_of
-from sysid.estimation.tolerance import outside, spans_of
+from sysid.estimation.results.tolerance import outside, spans_of
 from sysid.models import Start
 from sysid.references.candidates import Candidates
 from sysid.references.config import ReferenceConfig

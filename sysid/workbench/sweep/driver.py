@@ -17,7 +17,7 @@ from typing import Any
 from sysid.code_digest import code_digest
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
-from sysid.estimation.tolerance import outside
+from sysid.estimation.results.tolerance import outside
 from sysid.models import structure_from_dict
 from sysid.reporting.sweep_record import FIGURES, Trial
 from sysid.workbench.runner.events import StepProgress, Watcher

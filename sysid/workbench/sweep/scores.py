@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.estimation.tolerance import spans_of
+from sysid.estimation.results.tolerance import spans_of
 from sysid.models import AbstractModel, Start, beginning, gaps
 from sysid.traces import Trace, TraceSet
 from sysid.validation.resolution import parts_of

@@ -13,7 +13,7 @@ import sysid
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.grey_box.by_case import for_case
 from sysid.estimation.grey_box.fit import fit_equations, fit_grey_box
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Start, StartKind
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.validation import evaluate, predict_interval

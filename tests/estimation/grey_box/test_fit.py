@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import sysid
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.grey_box.fit import fit_grey_box
-from sysid.estimation.result import FitResult, Status
+from sysid.estimation.results.result import FitResult, Status
 from sysid.models import GreyBox, GreyBoxModel, Mapping, Start, StartKind, VectorGreyBox
 from sysid.traces import Channel, Trace
 from sysid.validation import predict_interval

@@ -10,7 +10,7 @@ import scipy
 
 import sysid
 from sysid.errors import ConfigError
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 
 SATURATING = "y = top*(1 - exp(-rate*u))"
 

@@ -11,14 +11,14 @@ import pytest
 import sysid
 from sysid.errors import ConfigError
 from sysid.estimation import estimators
-from sysid.estimation.experiment import experiments_of, unit_range
 from sysid.estimation.grey_box import at_noise
 from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.readying import common, ready_for
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.grey_box.shooting import Shooting, cut
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import experiments_of, unit_range
+from sysid.estimation.results.result import FitResult
 from sysid.models import NARX, AbstractStructure, GreyBox, GreyBoxModel, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Channel, Trace
 

@@ -12,7 +12,7 @@ from sysid.estimation.least_squares.evidence import Group, Prior, update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, stands
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.least_squares.termination import Termination
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 
 
 @dataclass(eq=False)

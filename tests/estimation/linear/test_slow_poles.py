@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from sysid.estimation import fit_polynomial, fit_state_space, fit_transfer_function
 from sysid.estimation.linear import slow_poles
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.models import OE, History, LinearStateSpace, Mapping, Scaling, Start, StartKind, TransferFunction
 from sysid.models.innovations import Innovations
 from sysid.models.state_space import StateSpace

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import History, Lags, Recursion, Scaling
 from sysid.testing import finite_difference_jacobian
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from sysid.estimation.networks.starts.result import multistart_status
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 
 
 def candidate(number: int, iteration: int, status: Status) -> Any:

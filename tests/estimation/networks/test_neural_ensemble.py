@@ -8,11 +8,11 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training, fit_neural_state_space
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.neural import ensemble as neural_ensemble
 from sysid.estimation.networks.neural.ensemble import ALONE, BEHIND, Member, _together
 from sysid.estimation.networks.starts.halving import planned_iterations
-from sysid.estimation.result import Loop
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import Loop
 from sysid.models import History, Mapping, NeuralStateSpace, Start, VectorNeuralStateSpace, model_from_dict
 from sysid.validation import predict_interval
 from tests.estimation.networks.test_neural_state_space import MAPPING, a_trace, hidden_saturation

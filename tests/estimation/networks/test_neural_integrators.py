@@ -9,10 +9,10 @@ from scipy.linalg import block_diag
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Training, fit_neural_state_space
-from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks.neural.integrators import summed
 from sysid.estimation.networks.neural.map import learnt_map
 from sysid.estimation.networks.neural.provider import NeuralProvider
+from sysid.estimation.records.experiment import experiments_of
 from sysid.models import (
     History,
     Mapping,

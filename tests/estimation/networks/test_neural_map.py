@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from sysid.estimation import Training, fit_neural_state_space
-from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks.neural.map import learnt_map
 from sysid.estimation.networks.neural.provider import NeuralProvider
+from sysid.estimation.records.experiment import experiments_of
 from sysid.models import (
     History,
     Mapping,

@@ -8,7 +8,6 @@ import pytest
 
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space
-from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks.neural import layout as neural_layout
 from sysid.estimation.networks.neural import start as neural_start
 from sysid.estimation.networks.neural.layout import NeuralLayout
@@ -16,6 +15,7 @@ from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.neural.start import linear_start
 from sysid.estimation.networks.neural.state_space import STARTS
 from sysid.estimation.networks.program_provider import BLOCK
+from sysid.estimation.records.experiment import experiments_of
 from sysid.models import (
     Mapping,
     NeuralForm,

@@ -8,12 +8,12 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from sysid.estimation import Evidence, Loop, Posterior, Training, fit_narx
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.damping.marquardt import MarquardtDamping
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import State
 from sysid.estimation.networks.posterior import Noise, calibrate, laplace, remaining
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import NARX, History, Mapping, NARXModel, Scaling, Start
 from sysid.testing import finite_difference_jacobian, simulate
 from sysid.traces import Channel, Trace

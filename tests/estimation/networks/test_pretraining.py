@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import sysid
 from sysid.estimation import Training, fit_narx
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.pretraining import SHARPEST, SMOOTHEST, StepSamples, space_filling
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.kernels.neurons import NEURONS
 from sysid.models import NARX, History, Mapping, NARXModel, Scaling
 from sysid.testing import finite_difference_jacobian

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.together.provider import CascadeProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import NARX, Cascade, History, Mapping, NARXModel, Scaling, parameter_count
 from sysid.traces import Channel, Trace
 

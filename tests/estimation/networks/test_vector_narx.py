@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ConfigError
 from sysid.estimation import JointTraining, Loop, fit_vector_narx
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.together.member_layout import MemberLayout
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import Cascade, History, Mapping, Start, StartKind, VectorNARX, beginning
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.store import model_from_dict

@@ -9,9 +9,9 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation.estimators import fit
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.networks.training import Training
 from sysid.estimation.networks.windows import COUNT, LONG, SAMPLES, Windows
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import NARX, AbstractStructure, HammersteinWiener, History, Mapping, NeuralStateSpace
 from sysid.traces import Channel, Trace
 

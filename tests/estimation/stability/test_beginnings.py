@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid.estimation.result import FitResult, Loop, Status
+from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.estimation.stability import StabilityOptions
 from sysid.estimation.stability.beginnings import Beginnings
 from sysid.estimation.stability.check import FreeRunCheck

@@ -9,7 +9,7 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
-from sysid.estimation.result import NOT_STABLE
+from sysid.estimation.results.result import NOT_STABLE
 from sysid.estimation.stability import FreeRunCheck, PoleCheck, StabilityOptions, check_stability
 from sysid.estimation.stability.sequences import InputSequence
 from sysid.models import ARX, ARXModel, Mapping

@@ -6,7 +6,7 @@ from types import SimpleNamespace as Fake
 
 import pytest
 
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 from sysid.workbench.fits.choice import choose
 
 

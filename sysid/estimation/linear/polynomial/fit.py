@@ -11,7 +11,6 @@ from scipy import linalg
 
 from sysid.errors import ConfigError, FitDivergedError, TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment, experiments_of
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.termination import Termination
@@ -28,8 +27,9 @@ from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.state_space.refinement import flat_prior
 from sysid.estimation.linear.stretches import stretches, told_of
-from sysid.estimation.result import FitResult, Loop, Status
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.records.experiment import Experiment, experiments_of
+from sysid.estimation.results.result import FitResult, Loop, Status
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import Mapping, Start
 from sysid.models.polynomial import PolynomialModel
 from sysid.models.polynomial_orders import AbstractPolynomial

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from sysid.errors import TraceError, UserError
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.delay_search import check_max_delay, searched_delays
 from sysid.estimation.linear.segments import Segment
@@ -16,6 +15,7 @@ from sysid.estimation.linear.state_space.search import quick_size
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.subspace.starts import ENOUGH
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import History, LinearStateSpace
 from sysid.models.linear_state_space import AUTO
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import experiments_of
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.determined import Determined
@@ -22,7 +21,8 @@ from sysid.estimation.linear.state_space.refinement import Found
 from sysid.estimation.linear.state_space.search import around, search
 from sysid.estimation.linear.state_space.training import METHODS, StateSpaceTraining
 from sysid.estimation.linear.state_space.uncertainty import coordinates_root, state_space_uncertainty
-from sysid.estimation.result import FitResult, Loop
+from sysid.estimation.records.experiment import experiments_of
+from sysid.estimation.results.result import FitResult, Loop
 from sysid.models import (
     LinearStateSpace,
     LinearStateSpaceModel,

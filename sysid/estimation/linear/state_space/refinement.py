@@ -29,7 +29,7 @@ from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import ENOUGH, Subspace
 from sysid.estimation.linear.subspace.system import EDGE, stabilised
 from sysid.estimation.linear.subspace.yardstick import beyond_chance
-from sysid.estimation.result import Status
+from sysid.estimation.results.result import Status
 from sysid.models import LinearStateSpace
 from sysid.models.innovations import Innovations
 

@@ -10,7 +10,7 @@ from scipy import linalg
 
 from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.state_space.refinement import Found
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import LinearStateSpaceModel, VectorStateSpaceModel
 from sysid.models.innovations import Innovations
 from sysid.models.linear_state_space import polynomials, state_space_names

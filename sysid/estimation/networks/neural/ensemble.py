@@ -31,7 +31,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Solution
 from sysid.estimation.networks.ensemble import elect
 from sysid.estimation.networks.neural.provider import NeuralProvider
@@ -39,6 +38,7 @@ from sysid.estimation.networks.posterior import Posterior, laplace
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.advancing import judged
 from sysid.estimation.networks.starts.choosing import Choice, choose, rank, refusal
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import NeuralEnsemble, NeuralStateSpaceModel, VectorNeuralStateSpaceModel, beginning
 from sysid.models.neural_sizes import Sizes
 from sysid.traces import Trace

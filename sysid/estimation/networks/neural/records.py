@@ -9,10 +9,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.experiment import Experiment
-from sysid.estimation.first_samples import is_another, moves_of_shown
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.networks.program_provider import BLOCK
+from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.records.first_samples import is_another, moves_of_shown
 from sysid.kernels import neural_state_space as kernel
 from sysid.models import NeuralForm
 from sysid.models.neural_form import Seen

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.clock import now
-from sysid.estimation.experiment import Experiment, experiments_of, unit_range, unit_ranges
-from sysid.estimation.first_samples import other_note, shown_note
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.networks.neural.ensemble import United, united
@@ -33,7 +31,9 @@ from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
 from sysid.estimation.networks.windows import Windows, in_place, with_note
-from sysid.estimation.result import FitResult
+from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range, unit_ranges
+from sysid.estimation.records.first_samples import other_note, shown_note
+from sysid.estimation.results.result import FitResult
 from sysid.kernels.neurons import NEURONS
 from sysid.models import (
     AbstractStructure,

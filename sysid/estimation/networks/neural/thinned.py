@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.networks.neural.finer import HALF_WIDTH, finer, taps
 from sysid.estimation.networks.training import Training
-from sysid.estimation.result import FitResult, Status
+from sysid.estimation.results.result import FitResult, Status
 from sysid.models import Mapping, Start, StartKind
 from sysid.traces import Trace
 

@@ -18,8 +18,8 @@ from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.starts.multistart import INITIAL_ALPHA, SETTLED, Candidate, Multistart, Network
 from sysid.estimation.networks.training import Training
-from sysid.estimation.result import Loop, Status
-from sysid.estimation.tolerance import outside, spans_of
+from sysid.estimation.results.result import Loop, Status
+from sysid.estimation.results.tolerance import outside, spans_of
 from sysid.models import (
     beginning,
     gaps,

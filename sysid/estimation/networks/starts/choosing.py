@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid.estimation.networks.starts.multistart import Candidate, Network
-from sysid.estimation.result import NOT_STABLE
+from sysid.estimation.results.result import NOT_STABLE
 
 
 def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, float]:

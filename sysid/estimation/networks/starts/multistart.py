@@ -32,7 +32,7 @@ from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.estimation.networks.training import FitProgress, Training
-from sysid.estimation.result import Loop
+from sysid.estimation.results.result import Loop
 from sysid.models import (
     EquationModel,
     NARXModel,

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.attempts import Attempt
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.choosing import Choice, rank
 from sysid.estimation.networks.training import Training
-from sysid.estimation.result import FitResult, Status
+from sysid.estimation.results.attempts import Attempt
+from sysid.estimation.results.result import FitResult, Status
 from sysid.models import History
 
 MOST_NAMES = 3

@@ -9,9 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.attempts import Attempt
 from sysid.estimation.clock import now
-from sysid.estimation.findings import Findings, with_evidence
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
@@ -25,8 +23,10 @@ from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.together.provider import CascadeProvider
 from sysid.estimation.networks.together.result import CascadeFit
 from sysid.estimation.networks.training import FitProgress
-from sysid.estimation.result import Status
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.parameters.findings import Findings, with_evidence
+from sysid.estimation.results.attempts import Attempt
+from sysid.estimation.results.result import Status
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import Cascade
 from sysid.traces import Trace
 

@@ -10,9 +10,9 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.named import Named, check_alike, precision_of
 from sysid.estimation.networks.equation_layout import EquationLayout
 from sysid.estimation.networks.together.member_layout import MemberLayout, basis_of
+from sysid.estimation.parameters.named import Named, check_alike, precision_of
 from sysid.models import Member
 from sysid.models.column_recursion import ColumnRecursion
 from sysid.models.declared import Parameter

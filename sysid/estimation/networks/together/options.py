@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sysid.errors import ConfigError
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.networks.together.provider import CascadeProvider
 from sysid.estimation.networks.training import check_choice
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import Cascade
 from sysid.models.typed_fields import TypedFields
 from sysid.traces import Trace

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError
-from sysid.estimation.experiment import Experiment
 from sysid.estimation.least_squares.counted_rows import counted_rows
 from sysid.estimation.networks.joint_record import Record, windows_of
 from sysid.estimation.networks.program_provider import ProgramProvider
 from sysid.estimation.networks.trained_members import TrainedMembers
+from sysid.estimation.records.experiment import Experiment
 from sysid.models import Cascade, Member
 from sysid.traces import Trace
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.attempts import Attempt
 from sysid.estimation.least_squares.levenberg_marquardt import Solution
-from sysid.estimation.result import Evidence, Status, common_fields
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.attempts import Attempt
+from sysid.estimation.results.result import Evidence, Status, common_fields
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import Cascade, cascade_from_dict
 
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 import sysid
-from sysid.estimation.held_output import held_for
 from sysid.estimation.nonparametric.segments import Segment
+from sysid.estimation.remarks.held_output import held_for
 
 POLE, EVERY = 0.95, 5
 

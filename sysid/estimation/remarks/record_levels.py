@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from sysid.errors import UserError
-from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.nonparametric.remembered import remembered_response
+from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import AbstractModel
 from sysid.traces import Trace
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.evidence import update
 from sysid.estimation.least_squares.levenberg_marquardt import Solution
-from sysid.estimation.named import Named
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.parameters.named import Named
+from sysid.estimation.results.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
     from sysid.estimation.grey_box.profile import Profile

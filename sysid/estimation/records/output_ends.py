@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.estimation.experiment import Experiment
+from sysid.estimation.records.experiment import Experiment
 from sysid.models.output_limits import FOUND, Between, Named
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sysid.estimation.input_features import CURVES, LINEAR, PLAYS, features
+from sysid.estimation.remarks.input_features import CURVES, LINEAR, PLAYS, features
 
 
 def test_columns_are_settled_and_depend_on_nothing_that_comes_later() -> None:

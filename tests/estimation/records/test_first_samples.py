@@ -9,12 +9,12 @@ import pytest
 
 import sysid
 from sysid.estimation import FitResult, fit_neural_state_space
-from sysid.estimation.experiment import Experiment, experiments_of
-from sysid.estimation.first_samples import is_another, moves_of_shown, other_note, shown_note
 from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.grey_box.preparing import provider_for
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.networks.neural.provider import NeuralProvider
+from sysid.estimation.records.experiment import Experiment, experiments_of
+from sysid.estimation.records.first_samples import is_another, moves_of_shown, other_note, shown_note
 from sysid.models import GreyBox, GreyBoxModel, Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start, StartKind
 from sysid.traces import Channel, Trace
 

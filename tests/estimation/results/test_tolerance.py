@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sysid.estimation.tolerance import outside, spans_of
+from sysid.estimation.results.tolerance import outside, spans_of
 from sysid.traces import Channel, Trace
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sysid.estimation.fitted_run import FreeRun
+from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import AbstractModel
 from sysid.traces.converter import converter_step
 

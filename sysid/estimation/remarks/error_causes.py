@@ -12,10 +12,10 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.informative import by_chance, informative, unit, with_past
-from sysid.estimation.input_features import CURVES, LINEAR, features
 from sysid.estimation.least_squares.correlation import correlation_time
+from sysid.estimation.records.informative import by_chance, informative, unit, with_past
+from sysid.estimation.remarks.fitted_run import FreeRun
+from sysid.estimation.remarks.input_features import CURVES, LINEAR, features
 from sysid.models import AbstractModel
 
 Array = NDArray[np.float64]

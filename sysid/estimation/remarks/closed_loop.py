@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sysid.estimation.error_lags import at_lag, has_path
-from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.informative import informative
 from sysid.estimation.nonparametric.feedback import feedback_of
-from sysid.estimation.result import Loop
+from sysid.estimation.records.informative import informative
+from sysid.estimation.remarks.error_lags import at_lag, has_path
+from sysid.estimation.remarks.fitted_run import FreeRun
+from sysid.estimation.results.result import Loop
 from sysid.models import AbstractModel, Mapping
 from sysid.traces import Trace
 

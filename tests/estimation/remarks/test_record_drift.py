@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 import sysid
-from sysid.estimation.record_drift import trend_of
+from sysid.estimation.remarks.record_drift import trend_of
 
 N = 800
 STRUCTURES = {

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 import sysid
-from sysid.estimation.record_notes import wraps
-from sysid.estimation.wrapped import period_of
+from sysid.estimation.remarks.record_notes import wraps
+from sysid.estimation.remarks.wrapped import period_of
 from sysid.models import Mapping
 
 N = 1000

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sysid.estimation.findings import TOGETHER, Findings, _lost
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import Solution, State
 from sysid.estimation.least_squares.provider import Linearisation
-from sysid.estimation.named import Named
-from sysid.estimation.result import Status
+from sysid.estimation.parameters.findings import TOGETHER, Findings, _lost
+from sysid.estimation.parameters.named import Named
+from sysid.estimation.results.result import Status
 from sysid.models.declared import Parameter
 
 FLAT = 1e-8

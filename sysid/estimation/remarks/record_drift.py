@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UserError
-from sysid.estimation.fitted_run import FreeRun
 from sysid.estimation.nonparametric.remembered import remembered_response
+from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import AbstractModel, Mapping
 from sysid.traces import Trace
 

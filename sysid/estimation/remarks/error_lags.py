@@ -7,9 +7,9 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.informative import SAME, by_chance, by_chance_of_signs, informative, unit, with_past
 from sysid.estimation.least_squares.correlation import products
+from sysid.estimation.records.informative import SAME, by_chance, by_chance_of_signs, informative, unit, with_past
+from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import AbstractModel, GreyBox, TransferFunction
 from sysid.models.intersample import MOVING
 from sysid.models.orthonormal_basis import Domain

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid.estimation.error_lags import left_out
-from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.record_notes import between_levels, contradicted, outnumbered, underexcited, undetermined
+from sysid.estimation.remarks.error_lags import left_out
+from sysid.estimation.remarks.fitted_run import FreeRun
+from sysid.estimation.remarks.record_notes import between_levels, contradicted, outnumbered, underexcited, undetermined
 from sysid.models import History, Mapping, Start
 
 N = 400

@@ -5,9 +5,9 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import Status, Training, fit_narx
-from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks.provider import RecursionProvider
-from sysid.estimation.output_ends import found_ends
+from sysid.estimation.records.experiment import experiments_of
+from sysid.estimation.records.output_ends import found_ends
 from sysid.models import NARX, Mapping, Start
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace

@@ -9,8 +9,8 @@ import pytest
 from scipy.signal import lfilter
 
 import sysid
-from sysid.estimation.error_causes import causes
-from sysid.estimation.fitted_run import FreeRun
+from sysid.estimation.remarks.error_causes import causes
+from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import History, Mapping
 
 N = 600

@@ -8,20 +8,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.closed_loop import feedback_told
-from sysid.estimation.error_causes import causes
-from sysid.estimation.error_lags import left_out
-from sysid.estimation.fitted_run import FreeRun
-from sysid.estimation.held_output import held_for, straight_for
-from sysid.estimation.informative import informative, own_part, still
 from sysid.estimation.nonparametric.excitation_order import MOST, excitation_order
 from sysid.estimation.nonparametric.segments import segments_of
-from sysid.estimation.record_drift import drifts_told
-from sysid.estimation.record_levels import levels_told
-from sysid.estimation.record_resolution import resolution_told
-from sysid.estimation.uncertainty import Uncertainty
-from sysid.estimation.wrapped import jumping, period_of
-from sysid.estimation.wrapped import told as wrapped
+from sysid.estimation.records.informative import informative, own_part, still
+from sysid.estimation.remarks.closed_loop import feedback_told
+from sysid.estimation.remarks.error_causes import causes
+from sysid.estimation.remarks.error_lags import left_out
+from sysid.estimation.remarks.fitted_run import FreeRun
+from sysid.estimation.remarks.held_output import held_for, straight_for
+from sysid.estimation.remarks.record_drift import drifts_told
+from sysid.estimation.remarks.record_levels import levels_told
+from sysid.estimation.remarks.record_resolution import resolution_told
+from sysid.estimation.remarks.wrapped import jumping, period_of
+from sysid.estimation.remarks.wrapped import told as wrapped
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel, Mapping, Start
 from sysid.traces import Trace
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.attempts import Attempt
-from sysid.estimation.uncertainty import Uncertainty
+from sysid.estimation.results.attempts import Attempt
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel, model_from_dict
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Parameters with names: how they are trained, and what a fit says of each."""

@@ -1,0 +1,1 @@
+"""What an estimator gives back: the fit, its starts, how well its parameters are determined."""
