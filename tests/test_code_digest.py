@@ -22,7 +22,8 @@ from sysid.code_digest import code_digest, look_again, reached
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, NARX, AbstractStructure, Mapping, NeuralStateSpace, TransferFunction
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 PLANT = {
     "__init__.py": '''"""A plant."""
@@ -239,8 +240,7 @@ def record(seed: int) -> Trace:
     y = np.zeros(len(u))
     for t in range(1, len(u)):
         y[t] = 0.9 * y[t - 1] + 0.1 * np.tanh(u[t - 1])
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
-    return Trace(name=f"r{seed}", sample_time=0.1, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, name=f"r{seed}", sample_time=0.1, units={"u": "V", "y": "m"})
 
 
 TRACES = [record(1), record(2)]

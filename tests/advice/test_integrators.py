@@ -10,7 +10,8 @@ from scipy.signal import lfilter
 from sysid.advice import Advice, Verdict, advise
 from sysid.advice.integrators import integrates
 from sysid.models import Mapping, NeuralStateSpace
-from sysid.traces import Channel, Role, Trace, TraceSet
+from sysid.traces import Role, Trace, TraceSet
+from tests.traces.made import trace_of
 
 Array = NDArray[np.float64]
 MAPPING = Mapping.parse("u -> y")
@@ -21,8 +22,7 @@ STEPS = np.repeat(np.random.default_rng(3).uniform(-1.0, 1.0, N // 15), 15)
 def a_trace(u: Array, y: Array, noise: float = 0.01) -> Trace:
     """With noise as a share of the output's deviation."""
     noisy = y + noise * np.std(y) * np.random.default_rng(9).standard_normal(len(y))
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
-    return Trace(name="a", sample_time=0.1, channels=channels, values=np.column_stack([u, noisy]))
+    return trace_of({"u": u, "y": noisy}, name="a", sample_time=0.1, units={"u": "V", "y": "m"})
 
 
 def carriage(n: int = N) -> tuple[Array, Array]:

@@ -10,7 +10,8 @@ import pytest
 
 import sysid
 from sysid.errors import ConfigError
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 ARX = sysid.ARX(na=1, nb=1, nk=1)
 WORDS: dict[str, Callable[[Any], Any]] = {
@@ -31,8 +32,7 @@ def record(name: str) -> Trace:
     y = np.zeros(200)
     for k in range(1, 200):
         y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1]
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
-    return Trace(name=name, sample_time=0.1, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, name=name, sample_time=0.1, units={"u": "V", "y": "m"})
 
 
 @pytest.mark.parametrize("word", WORDS)

@@ -11,6 +11,7 @@ from sysid.estimation import Training
 from sysid.models import NARX, Limit, Mapping, NARXModel
 from sysid.traces import Channel, Trace
 from tests.models.cascades import network
+from tests.traces.made import trace_of
 
 THREE = NARX(input_delays=[0, 1, 3], output_delays=2, neurons=3)
 
@@ -85,5 +86,4 @@ def tank_trace(seed: int, n: int = 300) -> Trace:
         down = 0.15 * np.sqrt(max(upper[t - 1] - 0.3 * lower[t - 1], 0.0))
         upper[t] = upper[t - 1] + 0.1 * pump[t] - down
         lower[t] = lower[t - 1] + down - 0.08 * lower[t - 1]
-    channels = tuple(Channel(name=name, unit="cm") for name in ("pump", "upper", "lower"))
-    return Trace(name=f"tank {seed}", sample_time=1.0, channels=channels, values=np.column_stack([pump, upper, lower]))
+    return trace_of({"pump": pump, "upper": upper, "lower": lower}, name=f"tank {seed}", units="cm")

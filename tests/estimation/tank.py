@@ -3,7 +3,8 @@
 import numpy as np
 
 from sysid.models import Mapping
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 TANK = Mapping(inputs=("pump",), output="level")
 
@@ -15,5 +16,6 @@ def tank(seed: int, n: int = 600) -> Trace:
     level = np.zeros(n)
     for t in range(1, n):
         level[t] = level[t - 1] + 0.05 * (pump[t - 1] - 1.2 * np.sqrt(max(level[t - 1], 0.0)))
-    channels = (Channel(name="pump", unit="V"), Channel(name="level", unit="m"))
-    return Trace(name=f"tank {seed}", sample_time=0.5, channels=channels, values=np.column_stack([pump, level]))
+    return trace_of(
+        {"pump": pump, "level": level}, name=f"tank {seed}", sample_time=0.5, units={"pump": "V", "level": "m"}
+    )

@@ -11,8 +11,8 @@ import pytest
 from sysid.estimation import Training, clock, fit_neural_state_space
 from sysid.estimation.clock import SLOWEST, now, processor_time
 from sysid.models import Mapping, NeuralStateSpace, Start, StartKind
-from sysid.traces import Channel, Trace
 from tests.estimation.networks.test_neural_state_space import steps
+from tests.traces.made import trace_of
 
 
 def test_the_wall_counts_unless_something_else_is_said() -> None:
@@ -54,10 +54,7 @@ def test_where_iterations_are_slow_there_are_fewer_starts(
     monkeypatch.setattr(clock._CLOCK, "read", lambda: float(next(ticks)))
     u = steps(80, np.random.default_rng(0))
     y = np.tanh(np.convolve(u, 0.5 ** np.arange(10))[:80])
-    trace = Trace(
-        name="t", sample_time=1.0, values=np.column_stack([u, y]),
-        channels=(Channel(name="u", unit="V"), Channel(name="y", unit="V")),
-    )  # fmt: skip
+    trace = trace_of({"u": u, "y": y}, name="t")
     fit = fit_neural_state_space(
         [trace], Mapping.parse("u -> y"), NeuralStateSpace(states=1, neurons=2),
         Training(starts=4, max_iterations=100, max_time_s=seconds, workers=1, tolerance=0.0),

@@ -13,7 +13,8 @@ from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Status, Training, fit_arx
 from sysid.estimation.estimators import ESTIMATORS, JOINING, estimator_of, fit, with_stability
 from sysid.models import ARX, NARX, Mapping, NeuralStateSpace, Start
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 ORDERS = ARX(na=1, nb=(1,), nk=(1,))
@@ -24,8 +25,7 @@ def trace(pole: float = 0.9) -> Trace:
     u, y = np.random.default_rng(0).normal(size=120), np.zeros(120)
     for t in range(119):
         y[t + 1] = pole * y[t] + 0.1 * u[t]
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    return Trace(name="record", sample_time=0.5, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, sample_time=0.5)
 
 
 @pytest.mark.parametrize("structure", [NETWORK, NeuralStateSpace(states=1, neurons=1)], ids=["NARX", "NSS"])

@@ -11,7 +11,8 @@ from sysid.estimation.networks.training import Training
 from sysid.models import BuiltModel, HammersteinWiener, History, Mapping, WienerHammerstein
 from sysid.models.curve_values import curve_values
 from sysid.reporting.figures.curves_figure import curves_figure
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 U = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, 40), 5)
@@ -23,8 +24,7 @@ def a_trace() -> Trace:
     y = np.zeros(len(U))
     for k in range(len(U) - 1):
         y[k + 1] = 0.8 * y[k] + 0.2 * np.clip(U[k], -0.4, 0.6)
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
-    return Trace(name="record", sample_time=0.1, channels=channels, values=np.column_stack([U, y]))
+    return trace_of({"u": U, "y": y}, sample_time=0.1, units={"u": "V", "y": "m"})
 
 
 def a_model(structure: HammersteinWiener | WienerHammerstein) -> BuiltModel:

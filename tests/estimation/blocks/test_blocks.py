@@ -33,7 +33,8 @@ from sysid.models import (
 )
 from sysid.models.curve_values import curve_values, has_curves
 from sysid.models.curves import Curve
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 ONE = Training(starts=1, max_iterations=80, workers=1)
@@ -41,8 +42,7 @@ POLES = np.poly([0.85 * np.exp(0.2j), 0.85 * np.exp(-0.2j)]).real
 
 
 def a_trace(u: np.ndarray, y: np.ndarray) -> Trace:
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    return Trace(name="record", sample_time=0.5, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, sample_time=0.5)
 
 
 def steps(seed: int, n: int = 400) -> np.ndarray:
@@ -107,8 +107,7 @@ NAMED = {
 def named(structure: str, given: str, comes: str) -> sysid.Fit:
     """A fit of channels with these names; how well it ends is no matter of theirs."""
     u = steps(0)
-    channels = (Channel(name=given, unit="V"), Channel(name=comes, unit="V"))
-    trace = Trace(name="r", sample_time=1.0, channels=channels, values=np.column_stack([u, saturated(u)]))
+    trace = trace_of({given: u, comes: saturated(u)}, name="r")
     brief = Training(starts=2, max_iterations=5, workers=1)
     return sysid.fit(trace, Mapping(inputs=(given,), outputs=(comes,)), NAMED[structure], brief)
 

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.models import Mapping
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 
@@ -51,10 +52,6 @@ def shaken(seed: int, force: float, *, n: int = 6000, modes: int = 2, stiffening
         x = x + h * half
         v = half + 0.5 * h * accelerated(x, half, u[k + 1])
     y += 1e-3 * np.std(y) * rng.standard_normal(n)
-    channels = (Channel(name="u", unit="N"), Channel(name="y", unit="m/s^2"))
-    return Trace(
-        name=f"shaken {seed}",
-        sample_time=SAMPLE_TIME,
-        channels=channels,
-        values=np.column_stack([u[::SUBSTEPS][:n], y]),
+    return trace_of(
+        {"u": u[::SUBSTEPS][:n], "y": y}, name=f"shaken {seed}", sample_time=SAMPLE_TIME, units={"u": "N", "y": "m/s^2"}
     )

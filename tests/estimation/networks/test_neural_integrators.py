@@ -24,7 +24,8 @@ from sysid.models import (
     structure_from_dict,
 )
 from sysid.models.neural_sizes import Sizes
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 MEASURED, ESTIMATED = Start(kind=StartKind.MEASURED, n_measured=20), Start(kind=StartKind.ESTIMATED)
@@ -33,8 +34,7 @@ UNIT = Scaling(input_offset=(0.0,), input_scale=(1.0,), output_offset=0.0, outpu
 
 
 def a_trace(u: np.ndarray, y: np.ndarray) -> Trace:
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
-    return Trace(name="record", sample_time=0.1, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, sample_time=0.1, units={"u": "V", "y": "m"})
 
 
 def ball_and_beam(seed: int, n: int = 400, size: float = 1.0) -> Trace:

@@ -17,7 +17,8 @@ from sysid.models import (
     Start,
     StartKind,
 )
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 ESTIMATED, MEASURED = Start(kind=StartKind.ESTIMATED), Start(kind=StartKind.MEASURED, n_measured=20)
@@ -25,8 +26,7 @@ SIZES = NeuralStateSpace(states=2, neurons=3).sizes(1)
 
 
 def a_trace(u: np.ndarray, y: np.ndarray, usable: np.ndarray | None = None) -> Trace:
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    return Trace(name="record", sample_time=1.0, channels=channels, values=np.column_stack([u, y]), usable=usable)
+    return trace_of({"u": u, "y": y}, usable=usable)
 
 
 def steps(n: int, seed: int) -> np.ndarray:

@@ -24,17 +24,17 @@ from sysid.models import (
     Start,
     StartKind,
 )
-from sysid.traces import Channel, Role, Trace
+from sysid.traces import Role, Trace
 from sysid.validation import evaluate_case
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
-CHANNELS = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
 MEASURED = Start(kind=StartKind.MEASURED, n_measured=20)
 FREE = Start(kind=StartKind.ESTIMATED)
 
 
 def a_trace(name: str, u: np.ndarray, y: np.ndarray) -> Trace:
-    return Trace(name=name, sample_time=1.0, channels=CHANNELS, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, name=name)
 
 
 def steps(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -180,8 +180,7 @@ def test_one_measured_sample_is_a_system_that_has_stood_there_in_the_fit_as_in_t
         u, y = np.repeat(rng.uniform(-1.0, 1.0, 10), 20), np.full(200, first)
         for k in range(199):
             y[k + 1] = 0.95 * y[k] + 0.05 * u[k]
-        channels = (Channel(name="u", unit="1"), Channel(name="y", unit="1"))
-        return Trace(name=name, sample_time=0.1, channels=channels, values=np.column_stack([u, y]))
+        return trace_of({"u": u, "y": y}, name=name, sample_time=0.1, units="1")
 
     records = (record("a", 2.0), record("b", -1.0))
     start = Start(kind=StartKind.MEASURED, n_measured=1)

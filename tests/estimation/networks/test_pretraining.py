@@ -18,7 +18,7 @@ from sysid.estimation.records.experiment import Experiment
 from sysid.kernels.neurons import NEURONS
 from sysid.models import NARX, History, Mapping, NARXModel, Scaling
 from sysid.testing import finite_difference_jacobian
-from sysid.traces import Channel, Trace
+from tests.traces.made import trace_of
 
 NETWORK = NARX(input_delays=[0, 2], output_delays=[1, 2], neurons=4)
 GATED = replace(NETWORK, gated=True)
@@ -128,12 +128,7 @@ def test_a_valve_that_switches_is_learnt_with_it_in_iterations_in_which_it_is_no
     for t in range(1, len(u)):  # fills fast through an open valve, empties slowly through a choke
         flow = 0.2 * (u[t] - y[t - 1])
         y[t] = y[t - 1] + (flow if flow > 0.0 else 0.1 * flow)
-    trace = Trace(
-        name="valve",
-        sample_time=1.0,
-        channels=(Channel(name="u", unit="bar"), Channel(name="y", unit="bar")),
-        values=np.column_stack([u, y]),
-    )
+    trace = trace_of({"u": u, "y": y}, name="valve", units="bar")
     network = NARX(input_delays="0:1", output_delays=1, neurons=8)
     common = {"max_iterations": 15, "starts": 1, "seed": 3}
     mse = {}

@@ -13,9 +13,10 @@ from sysid.estimation.networks.neural.state_space import fit_neural_state_space
 from sysid.estimation.networks.neural.thinned import LONG, band_allows, thinned
 from sysid.estimation.networks.training import Training
 from sysid.models import NeuralForm, NeuralStateSpace, Scaling, Start
-from sysid.traces import Channel, Role, Trace
+from sysid.traces import Role, Trace
 from sysid.validation import case_results
 from tests.estimation.networks.structures import MAPPING, shaken
+from tests.traces.made import trace_of
 
 EVERY = 5
 
@@ -24,8 +25,7 @@ def tones(*frequencies: float, n: int = LONG) -> Trace:
     """Sines of the same size in both channels, in parts of half the sampling rate."""
     t = np.arange(n)
     wave = np.sum([np.sin(np.pi * f * t) for f in frequencies], axis=0)
-    channels = (Channel(name="u", unit="N"), Channel(name="y", unit="m/s^2"))
-    return Trace(name="tones", sample_time=0.01, channels=channels, values=np.column_stack([wave, wave]))
+    return trace_of({"u": wave, "y": wave}, name="tones", sample_time=0.01, units={"u": "N", "y": "m/s^2"})
 
 
 @pytest.mark.parametrize(

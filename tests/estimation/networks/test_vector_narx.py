@@ -21,6 +21,7 @@ from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.validation.evaluation import evaluate_outputs
 from sysid.validation.intervals import predict_interval
 from tests.models.cascades import block, command, network
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> x+y")
 
@@ -33,12 +34,7 @@ def coupled(n: int = 800, seed: int = 0) -> Trace:
         flow = 0.15 * (x[t - 1] - y[t - 1]) / (1.0 + 0.1 * abs(x[t - 1] - y[t - 1]))
         x[t] = x[t - 1] + 0.2 * (u[t] - x[t - 1]) - flow
         y[t] = y[t - 1] + flow
-    return Trace(
-        name=f"record {seed}",
-        sample_time=0.1,
-        channels=tuple(Channel(name=name, unit="psi") for name in ("u", "x", "y")),
-        values=np.column_stack([u, x, y]),
-    )
+    return trace_of({"u": u, "x": x, "y": y}, name=f"record {seed}", sample_time=0.1, units="psi")
 
 
 NETWORK = VectorNARX(input_delays=[0], output_delays=1, neurons=4)

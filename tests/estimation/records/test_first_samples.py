@@ -16,7 +16,8 @@ from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.records.first_samples import is_another, moves_of_shown, other_note, shown_note
 from sysid.models import GreyBox, GreyBoxModel, Mapping, NeuralStateSpace, NeuralStateSpaceModel, Start, StartKind
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
@@ -32,8 +33,7 @@ def carriage(n: int = 600) -> Trace:
         y[t] = q
         for _ in range(10):
             q, v = q + 0.005 * v, v + 0.005 * (u[t] - 0.5 * v - 0.3 * v * abs(v))
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
-    return Trace(name="carriage", sample_time=0.05, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, name="carriage", sample_time=0.05, units={"u": "V", "y": "m"})
 
 
 def by_equations(record: Trace, start: Start, iterations: int = 50) -> FitResult:

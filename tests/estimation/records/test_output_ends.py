@@ -10,7 +10,8 @@ from sysid.estimation.records.experiment import experiments_of
 from sysid.estimation.records.output_ends import found_ends
 from sysid.models import NARX, Mapping, Start
 from sysid.testing import finite_difference_jacobian
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 SLIDE = Mapping.parse("u -> y")
 
@@ -22,8 +23,7 @@ def slide(seed: int, *, low: float = -np.inf, high: float = np.inf, pole: float 
     for k in range(400):
         at = min(max(pole * at + 0.3 * u[k] * abs(u[k]), low), high)
         y[k] = at
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
-    return Trace(name=f"slide {seed}", sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, name=f"slide {seed}", units={"u": "V", "y": "m"})
 
 
 @pytest.mark.parametrize(

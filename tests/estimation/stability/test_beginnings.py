@@ -15,7 +15,8 @@ from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import Run, check_stability
 from sysid.estimation.stability.sequences import InputSequence
 from sysid.models import ARX, ARXModel, Mapping
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 
@@ -30,10 +31,7 @@ def model(pole: float = 0.9) -> ARXModel:
 def record() -> Trace:
     """Always in motion, so that there is no plateau on which it would be seen where a run settles."""
     u = np.random.default_rng(0).uniform(0.0, 1.0, 2000)
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    return Trace(
-        name="record", sample_time=0.5, channels=channels, values=np.column_stack([u, model().simulate(u[:, None])])
-    )
+    return trace_of({"u": u, "y": model().simulate(u[:, None])}, sample_time=0.5)
 
 
 def swinging(share: float) -> Run:
