@@ -38,6 +38,9 @@ MOST_NAMES = 4
 ALIKE = 0.9999
 """The same of parameters that nobody named: coefficients of one smooth response are nearly as correlated as a rule."""
 
+MUCH_WIDER = 2.0
+"""Times that an interval is wider with nothing held at a bound, from which on that is told."""
+
 NORMAL = 1.959964
 """Standard deviations of half a 95 % interval."""
 
@@ -93,6 +96,7 @@ class Findings:
         bound: Of each the bound at which it stands, or ``scale`` where it is held as a scale that no record can tell;
             an empty text for none.
         profiles: Of each, where somebody asked for them.
+        widened: How many times as wide each interval would be were no parameter held at a bound; 1 where nothing is.
     """
 
     named: tuple[Named, ...]
@@ -100,6 +104,7 @@ class Findings:
     covariance: Array
     bound: tuple[str, ...]
     profiles: Sequence[Profile] = ()
+    widened: Array | None = None
 
     @classmethod
     def of(cls, solution: Solution, trained: Scaled, named: tuple[Named, ...], *, built: bool = False) -> Findings:
@@ -142,11 +147,14 @@ class Findings:
         inner[:, lost] = np.nan
         covariance = np.full((len(named), len(named)), np.nan)
         covariance[np.ix_(open_, open_)] = inner
+        released = held.copy()
+        released[places] = [side == "scale" for side in at]
         return cls(
             named=named,
             values=theta * scale,
             covariance=covariance * np.outer(scale, scale),
             bound=tuple(at),
+            widened=_widened(H, held, released)[places],
         )
 
     def uncertainty(self, noise_variance: float) -> Uncertainty:
@@ -235,6 +243,7 @@ class Findings:
                     f"The parameter {one.name} stands at its bound, {value:g}: it has no interval. Widen the bound, or "
                     "fix it there."
                 )
+        told += self._while_held
         deviations = np.sqrt(np.diag(self.covariance))
         for one, deviation, side in zip(self.named, deviations, self.bound, strict=True):
             if np.isnan(deviation) and not side:
@@ -245,6 +254,38 @@ class Findings:
         with np.errstate(invalid="ignore"):
             correlation = self.covariance / np.outer(deviations, deviations)
         return (*told, *_together([one.name for one in self.named], np.abs(correlation)))
+
+    @property
+    def _while_held(self) -> list[str]:
+        """A sentence where intervals are short only because another parameter is held at its bound."""
+        if self.widened is None or self.profiles:
+            return []
+        known = ~np.isnan(np.diag(self.covariance))
+        short = [i for i in np.flatnonzero(known) if self.widened[i] > MUCH_WIDER]
+        if not short:
+            return []
+        names, most = ", ".join(self.named[i].name for i in short[:MOST_NAMES]), float(self.widened[short].max())
+        return [
+            f"{names}{', ...' if len(short) > MOST_NAMES else ''}: these intervals hold only if the parameter at the "
+            f"bound is there; beside a free one they would be up to {most:.2g} times as wide. Ask for profiles "
+            "(intervals: profile), or measure what tells them apart."
+        ]
+
+
+def _widened(curvature: Array, held: NDArray[np.bool_], released: NDArray[np.bool_]) -> Array:
+    """How many times larger each standard deviation is where fewer parameters are held; 1 of those that are held."""
+    times = np.ones(len(held))
+    if (held == released).all():
+        return times
+    found = np.ones((2, len(held)))
+    for row, fixed in zip(found, (held, released), strict=True):
+        free = np.flatnonzero(~fixed)
+        root = np.sqrt(np.diag(curvature)[free])
+        values, vectors = np.linalg.eigh(curvature[np.ix_(free, free)] / np.outer(root, root))
+        row[free] = np.sqrt(np.sum(vectors**2 / np.maximum(values, ROUNDING), axis=1)) / root
+    open_ = np.flatnonzero(~held)
+    times[open_] = found[1, open_] / found[0, open_]
+    return times
 
 
 def _lost(covariance: Array, precision: Array, unseen: Array) -> NDArray[np.bool_]:

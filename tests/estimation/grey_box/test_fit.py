@@ -94,6 +94,27 @@ def test_a_bound_that_binds_is_told_and_has_no_interval() -> None:
     assert any("gain stands at its bound, 2" in warning for warning in fit.warnings)
 
 
+@pytest.mark.parametrize(("apart", "told"), [(0.02, True), (1.0, False)])
+def test_intervals_that_are_short_only_for_a_bound_are_told(apart: float, told: bool) -> None:
+    """Beside a coefficient at its bound that of nearly the same input was known a hundred times too well."""
+    rng = np.random.default_rng(0)
+    u = rng.uniform(-1.0, 1.0, 300)
+    v = u + apart * rng.standard_normal(300)
+    y = 2.0 * u - v / apart * 0.02 + 0.05 * rng.standard_normal(300)
+    traces = sysid.data((np.column_stack([u, v]), y), sample_time=1.0)
+    two = sysid.GreyBox(equations="y = a*u1 + b*u2", parameters={"a": 1.0, "b": {"start": 0.1, "low": 0}})
+    fit = sysid.fit(traces, "u1+u2 -> y", two, sysid.Training(starts=1), stability=sysid.StabilityOptions(count=0))
+    assert any("b stands at its bound, 0" in one for one in fit.warnings)
+    said = [one for one in fit.warnings if "hold only if the parameter at the bound is there" in one]
+    assert bool(said) is told
+    if told:
+        # By least squares: the deviation of a beside b, and without it.
+        wide, narrow = (np.linalg.inv(x.T @ x)[0, 0] for x in (np.column_stack([u, v]), u[:, np.newaxis]))
+        assert said[0].startswith("a: ")
+        times = float(said[0].split("up to ")[1].split(" times")[0])
+        assert times == pytest.approx(np.sqrt(wide / narrow), rel=0.05)
+
+
 def test_parameters_that_the_record_leaves_open_are_told() -> None:
     fit = fitted([first_order(3.0, 4.0)], "dx/dt = (a*b*u - x)/lag; y = x", parameters={"a": 1, "b": 1, "lag": 1})
     assert any("a and b can hardly be told apart" in w or "not determine" in w for w in fit.warnings)
