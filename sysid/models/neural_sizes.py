@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.models import low_rank
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sizes:
@@ -25,6 +27,8 @@ class Sizes:
         integrators: The last so many states are sums: :attr:`held` says which parameters that fixes.
         integrators_seen: Neurons read the sums all the same.
         linear_inputs: Neurons do not read the inputs.
+        directions: Neurons read so many combinations of states and inputs, and move the states in so many ways; in any
+            where it is ``None``. ``W`` and ``Wy`` over each other, without their last column, and ``V`` have that rank.
 
     Example:
         >>> Sizes(states=2, inputs=1, neurons=5, output_neurons=0).count
@@ -39,6 +43,7 @@ class Sizes:
     integrators: int = 0
     integrators_seen: bool = False
     linear_inputs: bool = False
+    directions: int | None = None
 
     @property
     def row(self) -> int:
@@ -110,20 +115,41 @@ class Sizes:
         """
         n, places = self.states, np.arange(self.count)
         M, V = places[self.linear].reshape(n, self.row), places[self.readout].reshape(n, self.neurons)
+        kept = [M[: j + 1, j] for j in range(n)[self.sums]]
+        kept += [
+            places[part].reshape(-1, self.row)[:, self._unread].ravel() for part in (self.hidden, self.output_hidden)
+        ]
+        return np.concatenate([*kept, V[self.unfed].ravel()])
+
+    @cached_property
+    def _unread(self) -> NDArray[np.bool_]:
+        """Which entries of ``z`` no neuron reads."""
         unread = np.zeros(self.row, dtype=bool)
         unread[self.sums] = not self.integrators_seen
-        unread[n:-1] = self.linear_inputs
-        kept = [M[: j + 1, j] for j in range(n)[self.sums]]
-        kept += [places[part].reshape(-1, self.row)[:, unread].ravel() for part in (self.hidden, self.output_hidden)]
-        return np.concatenate([*kept, V[self.unfed].ravel()])
+        unread[self.states : -1] = self.linear_inputs
+        return unread
+
+    @cached_property
+    def _ranked(self) -> tuple[NDArray[np.int64], ...]:
+        """Places of the matrices whose rank :attr:`directions` bounds, without what is held."""
+        if self.directions is None or self.neurons + self.output_neurons == 0:
+            return ()
+        places, read = np.arange(self.count), np.flatnonzero(~self._unread[:-1])
+        hidden = np.concatenate([places[part].reshape(-1, self.row) for part in (self.hidden, self.output_hidden)])
+        readout = places[self.readout].reshape(self.states, self.neurons)
+        matrices = (hidden[:, read], np.delete(readout, self.unfed, axis=0))
+        return tuple(matrix for matrix in matrices if min(matrix.shape) > self.directions)
 
     @property
     def free(self) -> int:
-        """Number of parameters without those that are held."""
-        return self.count - len(self.held)
+        """Number of parameters without those that are held, and without those that others of a matrix bind."""
+        bound = sum(at.size - low_rank.dimension(at.shape, self.directions or 0) for at in self._ranked)
+        return self.count - len(self.held) - bound
 
     def hold(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Parameters of which those that are held have their values: 1 of a sum by itself, else 0.
+        """The nearest parameters that the sizes allow.
+
+        Those that are held have their values, 1 of a sum by itself, else 0; matrices have no more than their rank.
 
         Args:
             theta: Flat parameters, those of records' initial states behind them or not.
@@ -134,7 +160,22 @@ class Sizes:
         found = theta.copy()
         found[self.held] = 0.0
         found[np.arange(self.states)[self.sums] * (self.row + 1)] = 1.0
+        for at in self._ranked:
+            found[at] = low_rank.nearest(found[at], self.directions or 0)
         return found
+
+    def along(self, theta: NDArray[np.float64], *arrays: NDArray[np.float64]) -> None:
+        """Take from the last axis of arrays what no step from some parameters may have.
+
+        Args:
+            theta: Flat parameters that the sizes allow, those of records' initial states behind them or not.
+            arrays: Each of shape ``(..., n_parameters)``, changed: gradients, or rows of a Jacobian.
+        """
+        bound = [(at.ravel(), low_rank.normal(theta[at], self.directions or 0)) for at in self._ranked]
+        for array in arrays:
+            array[..., self.held] = 0.0
+            for at, out in bound:
+                array[..., at] -= array[..., at] @ out
 
     @property
     def count(self) -> int:

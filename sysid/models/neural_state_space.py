@@ -47,6 +47,8 @@ class NeuralStateSpace(AbstractStructure):
         integrators_seen: Neurons read the sums too: friction or a load that depends on the place. No linear term does,
             so that bounded neurons let nothing run away.
         linear_inputs: Neurons do not read the inputs, which act in proportion however large: a force, a flow.
+        directions: Neurons read so many learnt combinations of states and inputs, and move the states in so many ways:
+            the linear fractional form of a linear plant with a static nonlinearity in it. In any by default.
 
     Raises:
         ConfigError: If a number or a name cannot be used.
@@ -64,6 +66,7 @@ class NeuralStateSpace(AbstractStructure):
     integrators: int = 0
     integrators_seen: bool = False
     linear_inputs: bool = False
+    directions: int | None = None
 
     acts_at_once = True
     kind = "NSS"
@@ -97,6 +100,14 @@ class NeuralStateSpace(AbstractStructure):
                 got="integrators: 0",
                 remedy="declare the integrators, or leave integrators_seen out",
             )
+        if self.directions is not None and (not whole(self.directions) or not 1 <= self.directions <= MOST_UNITS):
+            raise ConfigError(
+                "not a number of directions",
+                where="directions",
+                expected=f"a whole number from 1 to {MOST_UNITS:,}, or nothing where neurons may read all",
+                got=shortened(self.directions),
+                remedy="write for example {kind: NSS, states: 4, neurons: 10, directions: 1}",
+            )
         check_activation(self.activation)
         if self.output not in OUTPUTS:
             raise ConfigError(
@@ -116,6 +127,8 @@ class NeuralStateSpace(AbstractStructure):
             many, seen = "s" * (self.integrators > 1), " seen" * self.integrators_seen
             words.append(f"{self.integrators} integrator{many}{seen}")
         words += ["linear inputs"] * self.linear_inputs
+        if self.directions is not None:
+            words.append(f"{self.directions} direction{'s' * (self.directions > 1)}")
         return " ".join([self.kind, "/".join(str(number) for number in numbers), *words])
 
     def for_outputs(self, n_outputs: int) -> NeuralStateSpace:
@@ -143,6 +156,7 @@ class NeuralStateSpace(AbstractStructure):
             integrators=self.integrators,
             integrators_seen=self.integrators_seen,
             linear_inputs=self.linear_inputs,
+            directions=self.directions,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -159,6 +173,7 @@ class NeuralStateSpace(AbstractStructure):
                 {"integrators": self.integrators, "integrators_seen": self.integrators_seen} if self.integrators else {}
             ),
             **({"linear_inputs": True} if self.linear_inputs else {}),
+            **({} if self.directions is None else {"directions": self.directions}),
         }
 
 

@@ -305,7 +305,8 @@ class LevenbergMarquardt:
         bounds = box = provider.bounds
         while damping.factor <= MAX_DAMPING:
             step = _bounded(state.theta, box, (H, damping, g))
-            trial = state.theta + step if box is None else np.clip(state.theta + step, *box)  # a bound exactly
+            trial = provider.nearest(state.theta + step)
+            trial = trial if box is None else np.clip(trial, *box)  # a bound exactly
             with np.errstate(over="ignore", invalid="ignore"):  # what is promised is then no number, and nothing gained
                 promised = -float(g @ step + 0.5 * step @ (H @ step))
             loss = provider.loss(trial)

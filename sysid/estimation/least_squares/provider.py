@@ -56,6 +56,17 @@ class AbstractProvider(ABC):
         """Least and greatest value of each parameter; ``None`` where there are no bounds."""
         return None
 
+    def nearest(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The parameters that a step leads to, where not all that it could lead to are any.
+
+        Args:
+            theta: Flat parameters and a step.
+
+        Returns:
+            The same shape; as they are by default.
+        """
+        return theta
+
     @abstractmethod
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; ``inf`` where it is not finite.

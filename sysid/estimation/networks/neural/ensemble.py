@@ -145,8 +145,7 @@ class United:
 
         Args:
             runs: The estimation records as the ensemble's free run goes over them.
-            unread: Places of parameters that are none, or that no record's run depends on: their uncertainty is not
-                known.
+            unread: Places of parameters that no record's run depends on: their uncertainty is not known.
 
         Returns:
             The posterior; ``None`` where a member's evidence was never computed.
@@ -158,6 +157,7 @@ class United:
             state, turned = member.candidate.solution.state, np.diag(member.turned(sizes))
             to_plain = np.eye(sizes.count, len(state.theta))
             to_plain[unread] = 0.0
+            sizes.along(state.theta, to_plain.T)
             own = laplace(state, member.candidate.model, turned @ to_plain, runs, copies=1)
             if own is None:
                 return None

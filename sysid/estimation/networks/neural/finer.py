@@ -107,7 +107,7 @@ def finer(
     found = [*stepped, *(_read_anew(one, traces, mapping) for one in stepped)]
     errors = [_error(one, traces, mapping) for one in found]
     best = int(np.argmin(errors))
-    return replace(found[best], theta=_evened(found[best].theta, s, z[:, : s.states])) if errors[best] < LOST else None
+    return replace(found[best], theta=evened(found[best].theta, s, z[:, : s.states])) if errors[best] < LOST else None
 
 
 def _stepped(form: NeuralForm, R: Array, paths: Sequence[Array], every: int) -> NeuralForm:
@@ -158,7 +158,7 @@ def _error(form: NeuralForm, traces: Sequence[Trace], mapping: Mapping) -> float
     return error if np.isfinite(error) else np.inf
 
 
-def _evened(theta: Array, s: Sizes, path: Array) -> Array:
+def evened(theta: Array, s: Sizes, path: Array) -> Array:
     """The same model in states that vary alike in every direction.
 
     A run that begins at few measured samples seeks a state near what the oldest tells, as near in one direction as in

@@ -75,8 +75,15 @@ class NeuralLayout(AbstractLayout):
         places = np.arange(len(centre))
         places[s.held] = -1
         members = {"linear": places[s.linear], "readout": places[s.readout], "output": places[s.output_linear]}
-        for name, part in (("hidden", s.hidden), ("output hidden", s.output_hidden)):
-            members |= {f"{name} {i}": places[part].reshape(-1, s.row)[:, i] for i in range(s.row)}
+        parts = {
+            "hidden": places[s.hidden].reshape(-1, s.row),
+            "output hidden": places[s.output_hidden].reshape(-1, s.row),
+        }
+        if s.directions is not None:
+            # They share what they read. Drawn to nothing alike they keep their rank: no step is drawn out of it.
+            parts = {"hidden": np.concatenate([*parts.values()])}
+        for name, columns in parts.items():
+            members |= {f"{name} {i}": columns[:, i] for i in range(s.row)}
         members |= {"output readout": places[s.output_readout], "start": places[s.start], "records": places[s.count :]}
         members = {name: where[where >= 0] for name, where in members.items()} | {"held": s.held}
         groups = tuple(Group(name=name, members=where) for name, where in members.items() if len(where))
@@ -186,19 +193,33 @@ class NeuralLayout(AbstractLayout):
         """
         s = self.sizes
         theta = centre.copy()
+        read = self._read(rng, centre)
+        n = len(read)
         for hidden, readout, k in (
             (s.hidden, s.readout, s.neurons),
             (s.output_hidden, s.output_readout, s.output_neurons),
         ):
             if k == 0:
                 continue
-            directions = rng.uniform(-1.0, 1.0, (k, s.row - 1))
-            length = 0.7 * k ** (1.0 / (s.row - 1))
+            directions = rng.uniform(-1.0, 1.0, (k, n)) @ read
+            length = 0.7 * k ** (1.0 / n)
             weights = length * directions / np.linalg.norm(directions, axis=1, keepdims=True)
             biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
             theta[hidden] = np.column_stack([weights, biases]).ravel()
             theta[readout] = READOUT_SPREAD * rng.standard_normal(readout.stop - readout.start)
         return s.hold(theta)
+
+    def _read(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What neurons read of states and inputs, shape ``(n_read, n_states + n_inputs)``.
+
+        Of a few directions the first are those of the outputs, by which much that bends goes; the others are random.
+        """
+        s = self.sizes
+        if s.directions is None:
+            return np.eye(s.row - 1)
+        outputs = centre[s.output_linear].reshape(s.outputs, s.row)[: s.directions, :-1]
+        more = rng.standard_normal((s.directions - len(outputs), s.row - 1))
+        return np.concatenate([outputs, more / np.linalg.norm(more, axis=1, keepdims=True)])
 
 
 def _swinging(

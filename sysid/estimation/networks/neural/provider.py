@@ -20,6 +20,10 @@ from sysid.kernels.arrays import forget_what_has_died_away
 class NeuralProvider(NeuralRecords, AbstractProvider):
     """Residuals of a :class:`NeuralForm` in free run, as a function of its parameters and the records' states."""
 
+    def nearest(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Parameters whose matrices have their rank again; see the base class."""
+        return theta if self.template.sizes.directions is None else self.template.sizes.hold(theta)
+
     def loss(self, theta: NDArray[np.float64]) -> float:
         """Half the weighted sum of squared residuals; see the base class."""
         if self.stable and not self._dies_away(theta):
@@ -71,8 +75,7 @@ class NeuralProvider(NeuralRecords, AbstractProvider):
             self._add(self._of_begun(record, theta), raw_gradient, raw_matrix, gradient, matrix)
             for whole in residuals.T if correlation else ():
                 correlated += len(whole) * correlation_time(whole)
-        held = self.template.sizes.held
-        gradient[held], matrix[held], matrix[:, held] = 0.0, 0.0, 0.0
+        self.template.sizes.along(theta, gradient, matrix, matrix.T)
         return Linearisation(
             loss=loss,
             gradient=gradient,
@@ -204,5 +207,5 @@ class NeuralProvider(NeuralRecords, AbstractProvider):
             J = np.zeros((*raw.shape[:2], len(theta)))
             J[..., dynamic], J[..., output] = raw[..., dynamic], raw[..., begun.stop :]
             J[..., to] += raw[..., begun] @ D
-            J[..., self.template.sizes.held] = 0.0
+            self.template.sizes.along(theta, J)
             yield rows, y, J

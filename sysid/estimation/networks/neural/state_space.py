@@ -16,6 +16,7 @@ from sysid.errors import ConfigError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import first_output
+from sysid.estimation.networks.neural.directions import begun_from, in_few_directions, run_name
 from sysid.estimation.networks.neural.ensemble import United, united
 from sysid.estimation.networks.neural.layout import NeuralLayout
 from sysid.estimation.networks.neural.map import learnt_map
@@ -38,7 +39,6 @@ from sysid.kernels.neurons import NEURONS
 from sysid.models import (
     AbstractStructure,
     Mapping,
-    NeuralEnsemble,
     NeuralStateSpace,
     NeuralStateSpaceModel,
     Scaling,
@@ -80,8 +80,6 @@ def check_training(training: Training) -> None:
 LINEAR_SHARE, LINEAR_SHARE_GIVEN = 0.3, 0.1
 """Share of a fit's time that its linear start may take; where a fit is given to begin from it is only what weights are
 drawn to."""
-GIVEN = "from a given fit: "
-"""What runs of such a fit are called: where both are parts of one, those of the fit that gave it are others."""
 LEAST_FREE = 0.5
 """Share of a fit's time that its starts have in any case, however long the linear model took that they begin with."""
 
@@ -134,6 +132,8 @@ def fit_neural_state_space(
     named, begun = dict(zip(mapping.outputs, rests, strict=True)), start or Start()
     given: dict[str, Any] = {"mapping": mapping, "network": network, "start": begun, "rest_output": named, "vet": vet}
     given |= {"traces": traces, "selection": selection, "on_progress": on_progress}
+    if network.directions is not None and initial is None:
+        return in_few_directions(given, training or Training(), fit_neural_state_space)
     sparse = None if initial is not None else Thinned.of(given, training or Training())
     if sparse is not None:
         return sparse.fit(fit_neural_state_space)
@@ -266,13 +266,13 @@ def _multistart(
         template=template,
         selection=records.selection,
         start=records.start,
-        initial=None if records.initial is None else _numbers(records.initial),
+        initial=None if records.initial is None else begun_from(records.initial, provider),
         on_progress=on_progress,
         learnt=partial(learnt_map, provider),
         checkpoints=checkpoints_of(on_progress),
         # A fit whose linear start took all of its time would be that start alone.
         least=training.ensemble,
-        name="" if records.initial is None else GIVEN,
+        name="" if records.initial is None else run_name(records.initial, template.network),
         until=max(starts.deadline(began, training, on_progress), now() + LEAST_FREE * training.max_time_s),
     )
 
@@ -321,12 +321,13 @@ def _posterior(
     runs, others = records.runs(model)
     sizes = provider.template.sizes
     places = np.arange(sizes.count)
-    unread = np.concatenate([sizes.held, places[sizes.start] if provider.all_free else places[:0]])
+    unread = places[sizes.start] if provider.all_free else places[:0]
     if whole is not None and chosen is whole.candidate:
         found = whole.posterior(runs, unread)
     else:
         to_plain = np.eye(len(model.theta), provider.n_parameters)
         to_plain[unread] = 0.0
+        sizes.along(chosen.solution.theta, to_plain.T)
         found = laplace(chosen.solution.state, model, to_plain, runs, copies=1)
     return None if found is None else calibrate(found, model, others)
 
@@ -342,18 +343,13 @@ def check_neural_initial(network: AbstractStructure, initial: AbstractStructure,
     Raises:
         ConfigError: If they differ.
     """
-    if network != initial:
+    free = replace(network, directions=None) if isinstance(network, NeuralStateSpace) else network
+    if initial not in (network, free):
         raise ConfigError(
             "the initial fit has other hidden states than what is to start from it", where="initial",
             expected=network.label, got=initial.label,
-            remedy="start from a fit of the same structure, or leave initial out",
+            remedy="start from a fit of the same structure, or of the same without directions, or leave initial out",
         )  # fmt: skip
-
-
-def _numbers(initial: FitResult) -> NDArray[np.float64]:
-    """The parameters of an initial fit; of an ensemble those of its first member, the best of them."""
-    form = initial.model.recursion
-    return (form.members[0] if isinstance(form, NeuralEnsemble) else form).numbers
 
 
 def _scaling(initial: FitResult) -> Any:
