@@ -8,9 +8,9 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training, fit_neural_state_space
-from sysid.estimation.experiment import experiments_of
 from sysid.estimation.networks.neural.directions import narrowed
 from sysid.estimation.networks.neural.provider import NeuralProvider
+from sysid.estimation.records.experiment import experiments_of
 from sysid.models import (
     Mapping,
     NeuralForm,

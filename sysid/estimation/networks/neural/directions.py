@@ -21,7 +21,7 @@ from scipy import linalg
 from sysid.estimation.networks.neural.finer import evened
 from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.training import Training
-from sysid.estimation.result import FitResult
+from sysid.estimation.results.result import FitResult
 from sysid.kernels.neurons import NEURONS
 from sysid.models import AbstractStructure, NeuralEnsemble, NeuralForm, NeuralStateSpace
 
