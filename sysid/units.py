@@ -119,6 +119,23 @@ _LETTERS = re.compile(r"[^\W\d_]+")
 
 
 @cache
+def in_unit(figure: str, unit: str) -> str:
+    """A figure in its unit; a pure number has none to be told.
+
+    Args:
+        figure: As it is written.
+        unit: Its unit; ``"1"`` of a pure number.
+
+    Returns:
+        Both.
+
+    Example:
+        >>> in_unit("0.5", "m"), in_unit("0.5", "1")
+        ('0.5 m', '0.5')
+    """
+    return figure if unit == "1" else f"{figure} {unit}"
+
+
 def plain_unit(unit: str) -> str | None:
     """A unit as people write it, in the words that pint knows.
 

@@ -21,6 +21,7 @@ from sysid.composite.growth import in_rounds, worst_of
 from sysid.composite.plan import ActiveLearning
 from sysid.models import Cascade
 from sysid.traces import Trace
+from sysid.units import in_unit
 
 LEARNED = "active learning"
 """How its stages are called in the report, with the number of the round."""
@@ -118,7 +119,7 @@ class ActiveLearned:
     @property
     def limit(self) -> str:
         """The error that a sequence should stay under, with its unit."""
-        return f"{self.asked.within:g} {self.unit}".strip()
+        return in_unit(f"{self.asked.within:g}", self.unit).strip()
 
     @property
     def sentence(self) -> str:
@@ -128,7 +129,7 @@ class ActiveLearned:
             f"Grown over {len(self.rounds) - 1} rounds by {self.added} sequences, {self.where}; {self.ended}. On "
             f"{self.held_out} sequences of the pool that train nothing the share with an error of {outputs} under "
             f"{self.limit} goes from {100.0 * first.within:.3g} to {100.0 * last.within:.3g} %, the error "
-            f"that 99 % stay under from {first.rare:.3g} to {last.rare:.3g} {self.unit}".strip()
+            f"that 99 % stay under from {in_unit(f'{first.rare:.3g} to {last.rare:.3g}', self.unit)}".strip()
             + "."
         )
 

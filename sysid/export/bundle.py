@@ -20,7 +20,7 @@ from sysid.ingest.memory.run_records import record_of
 from sysid.ingest.tables.frames import columns_by_name
 from sysid.models import AbstractModel, Cascade, Start, StartKind, StartLike
 from sysid.traces import Channel, Trace, check_units
-from sysid.units import Reference
+from sysid.units import Reference, in_unit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,7 +188,7 @@ def said_outside(inputs: NDArray[np.float64], units: Dict[str, str], ranges: Dic
     for column, (name, unit) in zip(inputs.T, units.items(), strict=True):
         low, high = ranges.get(name, (-np.inf, np.inf))
         if share := float(np.mean((column < low) | (column > high))):
-            of = f"{low:g} to {high:g}" + ("" if unit == "1" else f" {unit}")
+            of = in_unit(f"{low:g} to {high:g}", unit)
             told.append(f"{name} is beyond {of} in {100.0 * share:.3g} % of the samples")
     return f"{'; '.join(told)}: nothing there was fitted, and the accuracy is unknown" if told else ""
 

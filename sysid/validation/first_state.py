@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.models import AbstractModel, Start, StartKind, beginning
 from sysid.traces import Trace
+from sysid.units import in_unit
 from sysid.validation.metrics import Figures, figures, percent
 from sysid.validation.resolution import parts_of, tied
 
@@ -81,5 +82,5 @@ def _told(model: AbstractModel, trace: Trace, start: Start) -> str:
 def _figure(seen: Sequence[Figures]) -> tuple[str, list[str]]:
     """What is told of runs, and its values: the fit, and of an output that never changes, which has none, the error."""
     if np.isnan(seen[0].nrmse_fit):
-        return "rms error", [f"{np.sqrt(one.mse):.3g} {one.unit}" for one in seen]
+        return "rms error", [in_unit(f"{np.sqrt(one.mse):.3g}", one.unit) for one in seen]
     return "fit", [f"{percent(one.nrmse_fit)} %" for one in seen]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.estimation.records.experiment import Experiment
 from sysid.models.output_limits import FOUND, Between, Named
+from sysid.units import in_unit
 
 Array = NDArray[np.float64]
 Records = Sequence[tuple[Array, Array]]
@@ -153,7 +154,7 @@ def told(ends: Between, output: str, unit: str) -> str:
         'The free run of level is held at 0 m from below.'
     """
     sides = [
-        f"at {value:.6g} {unit} from {side}"
+        f"at {in_unit(f'{value:.6g}', unit)} from {side}"
         for value, side in zip(ends, ("below", "above"), strict=True)
         if value is not None
     ]

@@ -11,6 +11,7 @@ from sysid.errors import TraceError
 from sysid.estimation.linear.arx import fit_arx
 from sysid.models import ARX, AbstractModel, ARXModel, Start, StartKind, beginning
 from sysid.traces import Trace
+from sysid.units import in_unit
 
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
 BEYOND, LEAST = 5.0, 1e-3
@@ -89,8 +90,8 @@ def _of(model: AbstractModel, trace: Trace, start: Start) -> list[str]:
         level, most = float(np.sqrt(np.mean(later[:, j] ** 2))), float(off[:, j].max())
         if most > max(BEYOND * level, LEAST * float(ranges[j])):
             found.append(
-                f"{trace.name} does not begin {so}: over its first {n} samples the free run is up to {most:.3g} {unit} "
-                f"off, and afterwards, from an estimated state, "
-                f"{level:.3g} {unit}. For such a record write start: estimated."
+                f"{trace.name} does not begin {so}: over its first {n} samples the free run is up to "
+                f"{in_unit(f'{most:.3g}', unit)} off, and afterwards, from an estimated state, "
+                f"{in_unit(f'{level:.3g}', unit)}. For such a record write start: estimated."
             )
     return found

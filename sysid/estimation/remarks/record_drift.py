@@ -13,6 +13,7 @@ from sysid.estimation.nonparametric.remembered import remembered_response
 from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import AbstractModel, Mapping
 from sysid.traces import Trace
+from sysid.units import in_unit
 
 Array = NDArray[np.float64]
 
@@ -142,7 +143,7 @@ def drifts_told(model: AbstractModel, traces: Sequence[Trace], runs: Sequence[Fr
         found = _drifts([traces[j] for j in asked], mapping, spread) if asked else []
         if found:
             most = max(found, key=abs)
-            size = f"{abs(most):.3g} {model.ends.output_units[i]}".removesuffix(" 1")
+            size = in_unit(f"{abs(most):.3g}", model.ends.output_units[i])
             way, share = "rises" if most > 0.0 else "falls", 100 * abs(most) / spread
             told[i] = (
                 f"{mapping.output} drifts: it {way} by {size} ({share:.0f} % of its standard deviation) over a record, "

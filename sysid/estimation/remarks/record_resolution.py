@@ -9,6 +9,7 @@ import numpy as np
 from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import AbstractModel
 from sysid.traces.converter import converter_step
+from sysid.units import in_unit
 
 MATTERS, POOR = 0.02, 0.1
 """Part of the output's standard deviation that the error of the free run has where it is worth a word, and where the
@@ -42,7 +43,7 @@ def resolution_told(model: AbstractModel, runs: Sequence[FreeRun]) -> dict[int, 
         if step is None or not spread > 0.0:
             continue
         error, of_step = _size(output - simulated), step / np.sqrt(12.0)
-        steps = f"{name} comes in steps of {step:.3g} {model.ends.output_units[i]}".removesuffix(" 1")
+        steps = f"{name} comes in steps of {in_unit(f'{step:.3g}', model.ends.output_units[i])}"
         if not error > MATTERS * spread:
             continue
         if (share := (of_step / error) ** 2) > MOST:

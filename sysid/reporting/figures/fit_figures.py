@@ -19,7 +19,7 @@ from sysid.reporting.numbers import number
 from sysid.reporting.results import Results
 from sysid.reporting.signals import CaseSignals
 from sysid.reporting.worst_instants import Instant
-from sysid.units import squared
+from sysid.units import in_unit, squared
 
 _COLUMNS = 450
 LETTERS = 80
@@ -160,7 +160,7 @@ def instants_figure(
             axes.axvline(instant.time, color=PALETTE[1], linewidth=0.9, linestyle=DASHES[2])
             error = "diverged"
             if np.isfinite(instant.error):
-                error = f"{instant.error:+.3g} {unit}".removesuffix(" 1")
+                error = in_unit(f"{instant.error:+.3g}", unit)
             axes.set_title(f"{number + 1}. {instant.case}, {instant.time:g} s: {error}", fontsize=8.5)
             axes.set_xlabel("time [s]")
             axes.set_ylabel(f"{label} [{unit}]" if number % columns == 0 else "")

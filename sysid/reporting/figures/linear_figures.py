@@ -11,6 +11,7 @@ from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
 from sysid.reporting.linear_views import linear_views
+from sysid.units import in_unit
 
 if TYPE_CHECKING:
     from sysid.reporting.linear.responses import Bode, StepResponse
@@ -75,7 +76,7 @@ def step_figure(found: StepResponse) -> Figure:
                 room = max(float(np.ptp(y)), 1e-12)
                 ends = (np.clip(one[::every, j], y.min() - room, y.max() + room) for one in (found.low, found.high))
                 place.fill_between(time, *ends, color=BAND_COLOUR, label="95 %")
-            place.plot(time, y[::every], drawstyle=shape, color=PALETTE[0], label=f"{name}, 1 {u_unit}")
+            place.plot(time, y[::every], drawstyle=shape, color=PALETTE[0], label=f"{name}, {in_unit('1', u_unit)}")
             place.set_xlabel("time [s]")
             place.set_ylabel(f"{found.outputs[j]} [{y_unit}]")
             place.legend()

@@ -22,7 +22,7 @@ from sysid.ingest.reading import is_file_of_traces
 from sysid.models import Start, StartKind
 from sysid.names import distinct
 from sysid.traces import Trace
-from sysid.units import squared
+from sysid.units import in_unit, squared
 from sysid.validation.metrics import percent
 from sysid.workbench.commands.reader_options import as_typed, reading_options
 from sysid.workbench.runner.console import console
@@ -277,7 +277,7 @@ def _tell(simulation: Simulation, out: Path) -> None:
     for name, found in simulation.scored.items():
         first = simulation.firsts.get(name, 0)
         of = f"on the {len(simulation.trace) - first} samples after" if first else "on all samples"
-        error = f"{found.mse:.4g} {squared(found.unit)}".removesuffix(" 1")  # a pure number has no unit to name
+        error = in_unit(f"{found.mse:.4g}", squared(found.unit))
         text = f"fit {percent(found.nrmse_fit)} %, mean squared error {error}"
         console().print(f"against the measured {name}: {text}, {of}", soft_wrap=True, markup=False)
     for sentence in simulation.sentences:

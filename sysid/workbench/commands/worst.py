@@ -13,6 +13,7 @@ from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
 from sysid.ingest import DatasetDescription, find_dataset, read_description
+from sysid.units import in_unit
 from sysid.workbench.runner import events
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.screen import Screen
@@ -64,8 +65,9 @@ def worst_command(bundle: Path, *, like: str, case: str | None, seeds: str, outp
     write_bytes(file, f"# Made by:  {command}\n{text}".encode())
     figures = ", ".join(f"{100 * q:g} % at most {np.quantile(errors, q):.3g}" for q in QUANTILES)
     out = console()
-    out.print(f"{output} on {len(errors)} sequences: {figures}, the worst {errors.max():.3g} {unit}", soft_wrap=True)
-    out.print(f"{keep} of them, from {np.sort(errors)[-keep]:.3g} {unit} on, kept in {file}", soft_wrap=True)
+    worst, least = (in_unit(f"{error:.3g}", unit) for error in (errors.max(), np.sort(errors)[-keep]))
+    out.print(f"{output} on {len(errors)} sequences: {figures}, the worst {worst}", soft_wrap=True)
+    out.print(f"{keep} of them, from {least} on, kept in {file}", soft_wrap=True)
 
 
 def _searched(surrogate: Bundle, sequences: DatasetDescription, output: str, source: Path) -> NDArray[np.float64]:

@@ -34,7 +34,7 @@ from sysid.workbench.fits.record import (
     write_residuals,
     write_scores,
 )
-from sysid.workbench.fits.words import cases_told, fit_title, how_ended, in_unit, looked_told, worst_told
+from sysid.workbench.fits.words import cases_told, fit_title, how_ended, looked_told, worst_told
 from sysid.workbench.runner import events
 from sysid.workbench.runner.run import REPORT, Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
@@ -42,6 +42,7 @@ from sysid.workbench.runner.store import read_json, strict, write_json
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
+from sysid.units import in_unit
 from sysid.workbench.fits.fitted import Fitted, Scored
 
 LOOKING = Outlined(name="advice", title="Looking at the traces", estimate=Estimate(seconds=2.0, basis="typical"))

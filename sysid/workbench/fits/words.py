@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sysid.estimation import FitResult
-from sysid.units import squared
+from sysid.units import in_unit, squared
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
 from sysid.workbench.fits.data import Data
@@ -44,11 +44,6 @@ def worst_told(scores: steps.Scores) -> str:
     """How a fit came out, in a line."""
     worst = max(scores.evaluation.cases.values(), key=lambda case: case.free_run.mse)
     return f"free run at worst {in_unit(f'{worst.free_run.mse:.3g}', squared(worst.free_run.unit))} ({worst.case})"
-
-
-def in_unit(figure: str, unit: str) -> str:
-    """A figure in its unit; a pure number has none to be told."""
-    return figure if unit == "1" else f"{figure} {unit}"
 
 
 def looked_told(found: Sequence[Mapping[str, Any]]) -> str:

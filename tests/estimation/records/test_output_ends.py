@@ -7,7 +7,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import Status, Training, fit_narx
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.records.experiment import experiments_of
-from sysid.estimation.records.output_ends import found_ends
+from sysid.estimation.records.output_ends import found_ends, told
 from sysid.models import NARX, Mapping, Start
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Trace
@@ -82,3 +82,7 @@ def test_ends_that_are_to_be_found_and_are_not_there_are_refused():
     with pytest.raises(ConfigError, match="y stands at no end") as refused:
         fit_narx([slide(0)], SLIDE, network, Training(max_iterations=2))
     assert "limits: [low, high]" in str(refused.value)
+
+
+def test_a_pure_number_is_told_without_a_unit() -> None:
+    assert told((-0.4, None), "y", "1") == "The free run of y is held at -0.4 from below."
