@@ -15,6 +15,8 @@ from pathlib import Path
 import grimp
 import pytest
 
+from sysid.lazy_names import imported_when_asked
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "sysid"
 FILES = sorted(file for file in PACKAGE.rglob("*.py"))
@@ -79,6 +81,17 @@ def test_no_module_imports_itself_by_a_detour() -> None:
 def test_one_file_alone_imports(package: str) -> None:
     found = {name_of(file) for file in FILES if any(name.split(".")[0] == package for name in imports(file))}
     assert found <= {ONLY_IN[package]}
+
+
+LAZY = [file for file in FILES if file.name == "__init__.py" and "imported_when_asked(" in file.read_text("utf-8")]
+"""Packages whose public names are imported when they are asked for."""
+
+
+@pytest.mark.parametrize("package", LAZY, ids=lambda file: file.parent.name)
+def test_no_file_is_called_as_a_public_name_of_its_room(package: Path) -> None:
+    """To import the file would put it in the place of the name, which is looked for only while it is not there."""
+    _, names = imported_when_asked(str(package))
+    assert {entry.stem for entry in package.parent.iterdir()} & set(names) == set()
 
 
 def longer_than(limit: int) -> dict[str, int]:

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from sysid.export.bundle import BundleFile as BundleFile
     from sysid.export.command_table import CommandTable as CommandTable
     from sysid.export.command_table import read_command as read_command
+    from sysid.export.expected_runs import ParityCase as ParityCase
+    from sysid.export.expected_runs import parity_cases as parity_cases
+    from sysid.export.expected_runs import random_cases as random_cases
     from sysid.export.exporter import AbstractExporter as AbstractExporter
     from sysid.export.exporter import ExportedFile as ExportedFile
     from sysid.export.exporter import Kind as Kind
@@ -27,10 +30,7 @@ if TYPE_CHECKING:
     from sysid.export.jax_exporter import jax_run as jax_run
     from sysid.export.jax_exporter import jax_step as jax_step
     from sysid.export.parity import Parity as Parity
-    from sysid.export.parity import ParityCase as ParityCase
     from sysid.export.parity import check_parity as check_parity
-    from sysid.export.parity import parity_cases as parity_cases
-    from sysid.export.parity import random_cases as random_cases
     from sysid.export.reading import read_bundle as read_bundle
     from sysid.export.renewing import renew_bundle as renew_bundle
     from sysid.export.simulation import Simulation as Simulation

@@ -16,10 +16,11 @@ import numpy as np
 
 import sysid
 from sysid.estimation.results.result import FitResult
+from sysid.export.expected_runs import ParityCase
 from sysid.export.exporter import ExportedFile
 from sysid.export.forms.layout import HiddenState
 from sysid.export.forms.stage import Port, Stage
-from sysid.export.parity import Parity, ParityCase
+from sysid.export.parity import Parity
 from sysid.export.ranges import example_of, range_of
 from sysid.export.surrogate import Surrogate
 from sysid.extras import has

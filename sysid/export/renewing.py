@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import BundleError, ConfigError
 from sysid.export.bundle import Bundle
+from sysid.export.expected_runs import ParityCase, case_from_rest, parity_cases, random_cases
 from sysid.export.manifest import SCHEMA_VERSION, amplification, of_another, software
-from sysid.export.parity import ParityCase, case_from_rest, parity_cases, random_cases
 from sysid.export.reading import read_attachment, read_bundle
 from sysid.export.stability import WORST
 from sysid.export.surrogate import Surrogate

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from sysid.export.bundle import Bundle
+from sysid.export.expected_runs import random_cases
 from sysid.export.exporter import ExportedFile, Kind
 from sysid.export.exporters import exporter
-from sysid.export.parity import random_cases
 from sysid.export.surrogate import Surrogate
 
 SAMPLES = 20_000

@@ -11,7 +11,7 @@ import numpy as np
 from sysid.estimation.results.result import Status
 from sysid.estimation.stability.check import FreeRunCheck, StabilityOptions
 from sysid.estimation.stability.free_run import Stability
-from sysid.export.parity import ParityCase
+from sysid.export.expected_runs import ParityCase
 from sysid.export.verification import FOLDER
 from sysid.models import AbstractModel
 from sysid.traces import Role, TraceSet

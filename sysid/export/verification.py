@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.export.expected_runs import ParityCase
 from sysid.export.exporter import ExportedFile, Kind
 from sysid.export.flags import expected_flags
-from sysid.export.parity import Allowed, ParityCase
+from sysid.export.parity import Allowed
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import render
 from sysid.names import csv_cell

@@ -17,6 +17,7 @@ from sysid.export.archive import write_archive
 from sysid.export.bundle import Bundle, bundle_files
 from sysid.export.card import model_card
 from sysid.export.case_inputs import with_case_inputs
+from sysid.export.expected_runs import ParityCase, parity_cases, random_cases
 from sysid.export.exporters import exporter, usual_formats
 from sysid.export.manifest import (
     CARD,
@@ -33,7 +34,7 @@ from sysid.export.manifest import (
     sha256,
 )
 from sysid.export.own_figures import own_figures, side_by_side
-from sysid.export.parity import Allowed, ParityCase, check_parity, parity_cases, random_cases
+from sysid.export.parity import Allowed, check_parity
 from sysid.export.ranges import declared_ranges, first_inputs
 from sysid.export.stability import WORST, check_free_run, state_stability, state_unbounded
 from sysid.export.surrogate import Surrogate

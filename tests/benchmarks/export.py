@@ -23,7 +23,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from sysid.export import EXPORTERS, Surrogate
-from sysid.export.parity import largest_difference, random_cases
+from sysid.export.differences import largest_difference
+from sysid.export.expected_runs import random_cases
 from sysid.models import NARX, Cascade, Mapping, NARXModel, Scaling, parameter_count
 from tests.benchmarks._findings import found
 

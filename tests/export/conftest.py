@@ -21,7 +21,7 @@ from sysid.export import (
     Surrogate,
     export_bundle,
 )
-from sysid.export.parity import RANDOM_SEQUENCES, random_cases
+from sysid.export.expected_runs import RANDOM_SEQUENCES, random_cases
 from sysid.models import NARX, AbstractModel, Cascade, History, NARXModel, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.units import Reference

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sysid.export import EXPORTERS, Flag, expected_flags
-from sysid.export.parity import largest_difference
+from sysid.export.differences import largest_difference
 from sysid.models import NARX, History
 from tests.export.conftest import usable
 

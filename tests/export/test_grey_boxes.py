@@ -18,9 +18,9 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status
 from sysid.export import EXPORTERS, Surrogate, expected_flags, export_bundle, read_bundle
 from sysid.export.c.compiler import build_library
+from sysid.export.differences import largest_difference
 from sysid.export.forms.layout import layout_of
 from sysid.export.forms.operations import OPERATIONS
-from sysid.export.parity import largest_difference
 from sysid.kernels import register_machine as machine
 from sysid.models import NARX, Cascade, Limit, Mapping
 from sysid.traces import Role

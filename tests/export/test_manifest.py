@@ -12,8 +12,8 @@ import pytest
 
 from sysid.export import Surrogate, export_bundle, read_bundle
 from sysid.export.card import model_card
+from sysid.export.expected_runs import random_cases
 from sysid.export.manifest import SCHEMA, SCHEMA_VERSION, amplification, schema_text
-from sysid.export.parity import random_cases
 from sysid.models import NARX
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.export import Surrogate
+from sysid.export.differences import largest_difference
 from sysid.export.matlab_exporter import MatlabExporter, prefix_of
 from sysid.export.octave import OctaveError, session
-from sysid.export.parity import largest_difference
 from sysid.models import NARX, Mapping
 from tests.export.cascades import build_limited, wired_narx
 from tests.export.conftest import usable

@@ -13,8 +13,10 @@ from scipy import signal
 import sysid
 from sysid.errors import ParityError
 from sysid.export import EXPORTERS, Surrogate, check_parity, parity_cases, random_cases
+from sysid.export.differences import largest_difference
+from sysid.export.expected_runs import ParityCase
 from sysid.export.forms.stage import Port
-from sysid.export.parity import SHARES, Allowed, ParityCase, largest_difference
+from sysid.export.parity import SHARES, Allowed
 from sysid.export.stability import UnboundedRunWarning, state_unbounded
 from sysid.models import ARX, NARX, ARXModel, Mapping, Start, StartKind
 from tests.export.conftest import ROWS, usable

@@ -17,9 +17,9 @@ import pytest
 
 from sysid.estimation import FitResult, Loop, Status
 from sysid.export import EXPORTERS, Surrogate, expected_flags, export_bundle, read_bundle
+from sysid.export.differences import largest_difference
 from sysid.export.exporter import Runner
 from sysid.export.forms.layout import layout_of
-from sysid.export.parity import largest_difference
 from sysid.kernels.neurons import NEURONS
 from sysid.models import (
     BJ,

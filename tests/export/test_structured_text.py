@@ -11,8 +11,8 @@ import pytest
 
 from sysid.errors import ConfigError
 from sysid.export import Surrogate
+from sysid.export.differences import largest_difference
 from sysid.export.matiec import build
-from sysid.export.parity import largest_difference
 from sysid.export.st_exporter import StructuredTextExporter, block_of
 from sysid.export.templating import render
 from sysid.models import NARX, Mapping

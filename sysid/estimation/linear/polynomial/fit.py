@@ -21,7 +21,7 @@ from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.contained import has_common, next_smaller, parts_of, with_root
-from sysid.estimation.linear.polynomial.starts import LongARX, armax_start, box_jenkins_start, state_space_start
+from sysid.estimation.linear.polynomial.starts import LongARX, long_models, looked_at, of_state_space, starts_of
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors
@@ -35,9 +35,6 @@ from sysid.models.polynomial import PolynomialModel
 from sysid.models.polynomial_orders import AbstractPolynomial
 from sysid.models.typed_fields import TypedFields
 from sysid.traces import Trace
-
-SHORTEST = 4
-"""Samples in a row that a start is looked for in."""
 
 Array = NDArray[np.float64]
 
@@ -165,9 +162,12 @@ def _search(
     """Short runs from every start, and a long one from the best; what it contains first, all by the same clock."""
     pieces = [piece for segment in segments for piece in segment.pieces()]
     errors = _errors(segments, orders, training)
-    looked = _looked_at(pieces, orders)
-    longs = _longs(looked, orders)
-    starts = [*_starts(looked, orders, longs), np.zeros(orders.n_parameters)]  # the last is finite whatever the record
+    looked = looked_at(pieces, orders)
+    longs = long_models(looked, orders)
+    starts = [
+        *starts_of(looked, orders, longs),
+        np.zeros(orders.n_parameters),
+    ]  # the last is finite whatever the record
     known = {} if known is None else known
     straight = _straight(errors, starts, longs[0], training, until) if orders.noise else None
     # With denominators of their own there are as many smaller structures as products of theirs: too many to ask for.
@@ -176,7 +176,7 @@ def _search(
     fewer = _of_fewer(segments, orders, training, until, known)
     if straight is not None and straight.at.loss <= min(map(errors.loss, fewer), default=np.inf):
         return errors, straight
-    starts = [theta for theta in (*starts, *_of_state_space(looked, orders)) if np.isfinite(theta).all()]
+    starts = [theta for theta in (*starts, *of_state_space(looked, orders)) if np.isfinite(theta).all()]
     if not errors.stable or training.stable is not None:
         return errors, _minimum(errors, starts, training, until, fewer)
     lengths = [len(segment) for segment in errors.segments]
@@ -227,8 +227,8 @@ def _from_part(
     if errors.stable and training.stable is None:
         errors = replace(errors, largest=slow_poles.largest_pole([len(segment) for segment in errors.segments]))
     solution = _run(errors, found.theta, _within(training, until))
-    looked = _looked_at([piece for segment in segments for piece in segment.pieces()], orders)
-    rivals = [(errors.loss(theta), theta) for theta in _starts(looked, orders, _longs(looked, orders)[:1])]
+    looked = looked_at([piece for segment in segments for piece in segment.pieces()], orders)
+    rivals = [(errors.loss(theta), theta) for theta in starts_of(looked, orders, long_models(looked, orders)[:1])]
     short = replace(_within(training, until), max_iterations=min(SHORT, training.max_iterations))
     rival = _run(errors, min(rivals, key=lambda one: one[0])[1], short)
     return None if rival.at.loss < solution.at.loss * (1.0 - NEAR) else (errors, solution)
@@ -293,47 +293,6 @@ def _limits(training: PolynomialTraining) -> Termination:
     )
 
 
-def _looked_at(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Segment]:
-    """Pieces that a start is looked for in: of drifting noise their changes."""
-    looked = [_differenced(piece) for piece in pieces] if orders.drifts else list(pieces)
-    looked = [piece for piece in looked if len(piece) >= SHORTEST]
-    if not looked:
-        raise TraceError(
-            "no record is long enough to begin from",
-            expected=f"at least {SHORTEST} samples in a row that are not masked",
-            got=f"{max(map(len, pieces), default=0)} in a row at most",
-            remedy="fill short gaps, with repairs: {nan: interpolate}, use longer records, or fit what needs no past: "
-            "a transfer function or a neural state space",
-        )
-    return looked
-
-
-def _longs(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[LongARX]:
-    """Long ARX models: as long as the records ask for, and twice that."""
-    reach = [orders.order("na"), *(nb + nk for nb, nk in zip(orders.nb, orders.nk, strict=True))]
-    least = max(*reach, *orders.denominators, 1) if len(reach) + len(orders.denominators) > 0 else 1
-    return [LongARX.of(looked, least), LongARX.of(looked, least, more=2.0)]
-
-
-def _starts(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequence[LongARX]) -> list[Array]:
-    """Coefficients from long ARX models."""
-    if has_common(orders):
-        return [armax_start(looked, orders, long) for long in longs]
-    kinds = [(long, whitened) for long in longs for whitened in (False, True)]
-    return [box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
-
-
-def _of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
-    """Coefficients from a state space of the same order."""
-    same = None if has_common(orders) else LongARX.of_state_space(looked, orders)
-    if same is None:
-        return []
-    begun = [box_jenkins_start(looked, orders, same, whitened=False)]
-    # What is fitted to the state space keeps its poles inside the unit circle: its own are an integrator's, too.
-    itself = state_space_start(looked, orders, same)
-    return begun if itself is None else [*begun, itself]
-
-
 def _of_fewer(
     segments: Sequence[Segment],
     orders: AbstractPolynomial,
@@ -375,16 +334,6 @@ def _of_fewer(
             ]
             found.append(np.concatenate([*wider, parts[-1]]))
     return found
-
-
-def _differenced(piece: Segment) -> Segment:
-    """Changes from sample to sample, of which an integrated noise is an ordinary one."""
-    return replace(
-        piece,
-        inputs=np.diff(piece.inputs, axis=0),
-        outputs=np.diff(piece.outputs, axis=0),
-        root_weights=piece.root_weights[1:],
-    )
 
 
 def _uncertainty(

@@ -20,7 +20,8 @@ import scipy
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.errors import UserError
+from sysid.errors import TraceError, UserError
+from sysid.estimation.linear.polynomial.contained import has_common
 from sysid.estimation.linear.segments import Segment, delayed_inputs
 from sysid.estimation.linear.state_space.search import search
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
@@ -32,6 +33,9 @@ from sysid.models import LinearStateSpace
 from sysid.models.polynomial_orders import AbstractPolynomial
 
 Array = NDArray[np.float64]
+
+SHORTEST = 4
+"""Samples in a row that a start is looked for in."""
 
 LONGEST, ROUNDS, INSIDE, SETTLED = 40, 12, 0.98, 1e-3
 """Lags of a long ARX model at most; filtering rounds; how far inside the unit circle a root is put; and a change of
@@ -295,3 +299,54 @@ def _back(signal: Array, k: int) -> Array:
     """A signal some samples ago, zero before it begins."""
     k = min(k, len(signal))
     return np.concatenate([np.zeros(k), signal[: len(signal) - k]])
+
+
+def looked_at(pieces: Sequence[Segment], orders: AbstractPolynomial) -> list[Segment]:
+    """Pieces that a start is looked for in: of drifting noise their changes."""
+    looked = [_differenced(piece) for piece in pieces] if orders.drifts else list(pieces)
+    looked = [piece for piece in looked if len(piece) >= SHORTEST]
+    if not looked:
+        raise TraceError(
+            "no record is long enough to begin from",
+            expected=f"at least {SHORTEST} samples in a row that are not masked",
+            got=f"{max(map(len, pieces), default=0)} in a row at most",
+            remedy="fill short gaps, with repairs: {nan: interpolate}, use longer records, or fit what needs no past: "
+            "a transfer function or a neural state space",
+        )
+    return looked
+
+
+def long_models(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[LongARX]:
+    """Long ARX models: as long as the records ask for, and twice that."""
+    reach = [orders.order("na"), *(nb + nk for nb, nk in zip(orders.nb, orders.nk, strict=True))]
+    least = max(*reach, *orders.denominators, 1) if len(reach) + len(orders.denominators) > 0 else 1
+    return [LongARX.of(looked, least), LongARX.of(looked, least, more=2.0)]
+
+
+def starts_of(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequence[LongARX]) -> list[Array]:
+    """Coefficients from long ARX models."""
+    if has_common(orders):
+        return [armax_start(looked, orders, long) for long in longs]
+    kinds = [(long, whitened) for long in longs for whitened in (False, True)]
+    return [box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
+
+
+def of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
+    """Coefficients from a state space of the same order."""
+    same = None if has_common(orders) else LongARX.of_state_space(looked, orders)
+    if same is None:
+        return []
+    begun = [box_jenkins_start(looked, orders, same, whitened=False)]
+    # What is fitted to the state space keeps its poles inside the unit circle: its own are an integrator's, too.
+    itself = state_space_start(looked, orders, same)
+    return begun if itself is None else [*begun, itself]
+
+
+def _differenced(piece: Segment) -> Segment:
+    """Changes from sample to sample, of which an integrated noise is an ordinary one."""
+    return replace(
+        piece,
+        inputs=np.diff(piece.inputs, axis=0),
+        outputs=np.diff(piece.outputs, axis=0),
+        root_weights=piece.root_weights[1:],
+    )
