@@ -24,6 +24,8 @@ SHARE, SURE = 0.2, 1e-6
 """Part of the error that an input of the same sample must explain, and how improbable that is by chance."""
 SURE_OF_SIGNS = 0.1
 """How probable it may be at one lag where only the signs of moves count: five alike are enough, one jump is not."""
+FEW = 3
+"""Moves that may go together by chance; what is left without them says otherwise only where it nearly is the same."""
 ELSEWHERE, FIRST = 0.05, 0.25
 """Part that an input of another sample must explain; and part of the most from which it is said to begin."""
 NEARLY_ALL = 0.9
@@ -211,7 +213,7 @@ def _lag(
     # Levels that are held go back and forth: a change goes with the one before, and stands for it so long before.
     peak = int(shares.argmax())
     moved = np.concatenate([np.zeros(peak), new[: len(new) - peak]])
-    if by_chance_of_signs(left * moved) >= SURE_OF_SIGNS:
+    if not _many(left, moved):
         return 0, 0.0
     rest = _shares(left - moved * (moved @ left) / max(moved @ moved, SAME), new, peak)
     rest[but] = 0.0
@@ -244,10 +246,18 @@ def _share(error: NDArray[np.float64], inputs: NDArray[np.float64], j: int, usab
     if free < LEAST_SAMPLES or np.linalg.norm(new) <= SAME * np.linalg.norm(inputs[whole, j]):
         return 0.0
     # Of length 1 first: the square of a free run that grows without bound is no number.
-    together = _direction(left) * _direction(new)
-    share = float(together.sum()) ** 2
-    sure = by_chance(share, 1, free) < SURE and by_chance_of_signs(together) < SURE_OF_SIGNS
-    return share if share > SHARE and sure else 0.0
+    left, new = _direction(left), _direction(new)
+    share = float(left @ new) ** 2
+    return share if share > SHARE and by_chance(share, 1, free) < SURE and _many(left, new) else 0.0
+
+
+def _many(left: NDArray[np.float64], moved: NDArray[np.float64]) -> bool:
+    """Whether signals move together more often than a few jumps may by chance, or all but these by the same part."""
+    together = left * moved
+    if by_chance_of_signs(together) < SURE_OF_SIGNS:
+        return True
+    rest = np.argsort(np.abs(together))[:-FEW]
+    return float(_direction(left[rest]) @ _direction(moved[rest])) ** 2 > NEARLY_ALL
 
 
 def _direction(x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -250,6 +250,15 @@ def test_no_dead_time_is_told_where_something_else_is_wrong(plant: str) -> None:
         assert not [note for note in sysid.fit(traces, "u -> y", structure).warnings if "dead time is too" in note]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_few_steps_that_all_say_the_same_are_enough(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(0.0, 4.0, 10), 15)
+    y = np.convolve(u, 0.1 * 0.9 ** np.arange(150))[:150] + 0.002 * rng.standard_normal(150)
+    fit = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.OE(nb=1, nf=1, nk=1))
+    assert [note for note in fit.warnings if "moves with u of the same sample" in note]
+
+
 @pytest.mark.parametrize("jumps", [(200,), (100, 260)])
 @pytest.mark.parametrize("shift", [0, 3])
 def test_no_dead_time_is_read_from_a_few_jumps_of_another_cause(jumps: tuple[int, ...], shift: int) -> None:
