@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.kernels.neurons import NEURONS
 from sysid.models import Cascade, Ends, GreyBoxModel, History, Limit, Member, NeuralForm, Recursion
-from sysid.models.equation_reference import MemberTwin
+from sysid.models.grey_box.equation_reference import MemberTwin
 
 
 def step(form: Recursion, inputs: NDArray[np.float64], outputs: NDArray[np.float64]) -> float:

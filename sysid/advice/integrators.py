@@ -14,7 +14,7 @@ from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.neural.start import linear_start
 from sysid.estimation.records.experiment import experiments_of, unit_range
 from sysid.models import Mapping, NeuralForm, Start, StartKind
-from sysid.models.neural_sizes import Sizes
+from sysid.models.networks.neural_sizes import Sizes
 from sysid.traces import Trace
 
 STATES = (2, 3)

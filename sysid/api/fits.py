@@ -20,8 +20,8 @@ from sysid.estimation.records.experiment import Experiment
 from sysid.ingest.memory.run_inputs import inputs_of
 from sysid.ingest.memory.run_records import before_a_run, level_of, measured_of
 from sysid.models import History, Start
-from sysid.models.curve_values import curve_values
-from sysid.models.form import unheeded
+from sysid.models.blocks.curve_values import curve_values
+from sysid.models.contract.form import unheeded
 from sysid.traces import Role, TraceSet
 
 if TYPE_CHECKING:

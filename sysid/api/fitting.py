@@ -15,7 +15,7 @@ from sysid.ingest import load_dataset
 from sysid.ingest.inspecting.undescribed import load_file
 from sysid.ingest.reading import is_file_of_traces
 from sysid.models import AbstractStructure, Mapping, Start, StartLike
-from sysid.models.rest_levels import levels_at_rest
+from sysid.models.channels.rest_levels import levels_at_rest
 from sysid.traces import Role, TraceSet
 
 

@@ -21,7 +21,7 @@ from sysid.estimation.nonparametric.spectra import SpectralMethod
 from sysid.excitation import AbstractExcitation, excitation
 from sysid.ingest.writers import write_trace
 from sysid.models import Mapping
-from sysid.models.typed_fields import plain_values
+from sysid.models.orders.typed_fields import plain_values
 from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.advice.words import lines
 from sysid.traces import Role, TraceSet

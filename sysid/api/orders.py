@@ -22,7 +22,7 @@ from sysid.estimation.nonparametric.dead_time import longest_dead_time, shares
 from sysid.estimation.nonparametric.feedback import feedback_of
 from sysid.extras import need
 from sysid.models import ARX, Mapping, Start, StartLike
-from sysid.models.lags import whole
+from sysid.models.orders.lags import whole
 from sysid.reporting.numbers import pole
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.metrics import percent

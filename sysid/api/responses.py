@@ -10,7 +10,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.export.own_figures import side_by_side
 from sysid.models import AbstractModel, Cascade
-from sysid.models.typed_fields import plain_values
+from sysid.models.orders.typed_fields import plain_values
 from sysid.reporting.linear.computing import bode_of, check_linear, poles_of, step_of
 from sysid.reporting.linear.responses import Bode, Known, Poles, StepResponse
 

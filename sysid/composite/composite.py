@@ -16,8 +16,8 @@ from sysid.composite.parameters import check_names, declared
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, Training, estimators
 from sysid.models import NARX, AbstractStructure, Limit, Mapping
-from sysid.models.cascade_run import Level
-from sysid.models.declared import Parameter
+from sysid.models.cascades.cascade_run import Level
+from sysid.models.grey_box.declared import Parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from sysid.composite.fixed.member import FixedMember, Standing
 from sysid.errors import ConfigError
 from sysid.estimation.parameters.named import check_alike
 from sysid.models import Cascade, GreyBoxModel
-from sysid.models.declared import Parameter
+from sysid.models.grey_box.declared import Parameter
 
 
 def declared(fixed: Sequence[FixedMember], more: Iterable[Parameter] = ()) -> dict[str, Parameter]:

@@ -22,7 +22,7 @@ from sysid.models import (
     TransferFunctionModel,
     VectorStateSpaceModel,
 )
-from sysid.models.polynomial import PolynomialModel
+from sysid.models.linear.polynomial import PolynomialModel
 from sysid.traces import Trace
 
 GROWTH = 1e-6
@@ -125,7 +125,7 @@ def transfer_function_posterior(fit: FitResult, traces: Sequence[Trace], start: 
 
 
 def _polynomial_names(model: TransferFunctionModel) -> list[str]:
-    """What :attr:`sysid.models.polynomial_moves.Polynomials.vector` holds, as a fit's uncertainty calls it."""
+    """What :attr:`sysid.models.linear.polynomial_moves.Polynomials.vector` holds, as a fit's uncertainty calls it."""
     found = []
     for j, name in enumerate(model.mapping.inputs):
         n = len(model.denominator(j)) - 1

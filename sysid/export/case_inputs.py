@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sysid.models import AbstractModel, Start, beginning
-from sysid.models.grey_box_model import EquationModel
+from sysid.models.grey_box.grey_box_model import EquationModel
 from sysid.traces import Channel, Trace, TraceSet
 
 if TYPE_CHECKING:

@@ -1,8 +1,8 @@
 """A free run that goes on from measured samples, of one model or of several wired together.
 
-Each model begins by its own outputs, as :mod:`sysid.models.beginning` has it for every model: what it reads of the
-others is what they compute. Models that read each other, or outputs held at limits that were declared for the whole,
-have no such beginning; they begin at rest, and it is said why.
+Each model begins by its own outputs, as :mod:`sysid.models.contract.beginning` has it for every model: what it reads of
+the others is what they compute. Models that read each other, or outputs held at limits that were declared for the
+whole, have no such beginning; they begin at rest, and it is said why.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from sysid.export.reading import read_bundle
 from sysid.export.surrogate import Surrogate
 from sysid.ingest.memory.run_records import record_of
 from sysid.models import Start, StartKind, StartLike
-from sysid.models.ends import check_record
+from sysid.models.channels.ends import check_record
 from sysid.traces import Channel, Trace
 from sysid.validation.metrics import Figures, figures
 

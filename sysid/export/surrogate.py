@@ -23,10 +23,10 @@ from sysid.export.forms.lagged import lowered_form
 from sysid.export.forms.layout import DelayLine, HiddenState
 from sysid.export.forms.stage import Late, Level, Port, Range, Stage, stages_of
 from sysid.models import AbstractModel, Cascade
-from sysid.models.form import unheeded
-from sysid.models.history import known_inputs
-from sysid.models.rest_levels import leaders, resting
-from sysid.models.wiring import Wiring
+from sysid.models.cascades.wiring import Wiring
+from sysid.models.channels.history import known_inputs
+from sysid.models.channels.rest_levels import leaders, resting
+from sysid.models.contract.form import unheeded
 from sysid.names import c_identifier, distinct, written_side
 from sysid.traces import Trace
 

@@ -40,7 +40,7 @@ from sysid.export.stability import WORST, check_free_run, state_stability, state
 from sysid.export.surrogate import Surrogate
 from sysid.export.verification import write_verification
 from sysid.models import AbstractModel, Cascade, Start
-from sysid.models.wiring import Member, Wiring
+from sysid.models.cascades.wiring import Member, Wiring
 from sysid.traces import TraceSet
 
 EXTRA = {WORST: "the random sequence on which the free run did worst"}

@@ -1,7 +1,7 @@
 """Linear systems in other forms: sampled, continuous, slower, smaller, canonical; on objects of python-control.
 
 A model becomes such an object by its ``to_control()``, or with its states by
-:func:`sysid.models.to_control.state_space`. The package is imported when a function is called.
+:func:`sysid.models.converting.to_control.state_space`. The package is imported when a function is called.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.models.continuous import rates
-from sysid.models.realisation import Ratios, observer_row
+from sysid.models.converting.continuous import rates
+from sysid.models.converting.realisation import Ratios, observer_row
 
 Array = NDArray[np.float64]
 

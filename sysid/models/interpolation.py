@@ -25,9 +25,9 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError
-from sysid.models.cascade import Cascade
-from sysid.models.cascade_run import CascadeRun
-from sysid.models.ends import check_record
+from sysid.models.cascades.cascade import Cascade
+from sysid.models.cascades.cascade_run import CascadeRun
+from sysid.models.channels.ends import check_record
 from sysid.models.store import cascade_from_dict
 from sysid.traces import Trace
 

@@ -6,31 +6,31 @@ from collections.abc import Mapping as Dict
 from typing import Any
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.arx import ARX, ARXModel
-from sysid.models.base import AbstractModel
-from sysid.models.built_model import BUILT, BuiltModel
-from sysid.models.cascade import Cascade
-from sysid.models.cascade_program import Limit
-from sysid.models.grey_box import GreyBox, VectorGreyBox
-from sysid.models.grey_box_model import GreyBoxModel, VectorGreyBoxModel
-from sysid.models.linear_state_space import (
+from sysid.models.blocks.built_model import BUILT, BuiltModel
+from sysid.models.cascades.cascade import Cascade
+from sysid.models.contract.base import AbstractModel
+from sysid.models.grey_box.grey_box import GreyBox, VectorGreyBox
+from sysid.models.grey_box.grey_box_model import GreyBoxModel, VectorGreyBoxModel
+from sysid.models.lagged.cascade_program import Limit
+from sysid.models.linear.arx import ARX, ARXModel
+from sysid.models.linear.linear_state_space import (
     LinearStateSpace,
     LinearStateSpaceModel,
     VectorStateSpace,
     VectorStateSpaceModel,
 )
-from sysid.models.narx import NARX, NARXModel
-from sysid.models.neural_state_space import (
+from sysid.models.linear.polynomial import PolynomialModel
+from sysid.models.linear.polynomial_orders import POLYNOMIALS
+from sysid.models.linear.transfer_function import TransferFunction, TransferFunctionModel
+from sysid.models.networks.narx import NARX, NARXModel
+from sysid.models.networks.neural_state_space import (
     NeuralStateSpace,
     NeuralStateSpaceModel,
     VectorNeuralStateSpace,
     VectorNeuralStateSpaceModel,
 )
-from sysid.models.polynomial import PolynomialModel
-from sysid.models.polynomial_orders import POLYNOMIALS
-from sysid.models.structure import AbstractStructure
-from sysid.models.transfer_function import TransferFunction, TransferFunctionModel
-from sysid.models.vector_narx import VectorNARX, VectorNARXModel
+from sysid.models.networks.vector_narx import VectorNARX, VectorNARXModel
+from sysid.models.orders.structure import AbstractStructure
 
 _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
     (ARX, ARXModel),

@@ -8,7 +8,7 @@ from typing import Final, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from sysid.models.curve_values import CurvePoints
+from sysid.models.blocks.curve_values import CurvePoints
 from sysid.reporting.records import Number, parse_record, read_document
 
 CURVES_FILE: Final = "curves.json"

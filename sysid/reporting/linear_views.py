@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel
-from sysid.models.ratio import Ratio
+from sysid.models.contract.ratio import Ratio
 
 DRAWS = 200
 """Parameters drawn from their distribution for a band."""

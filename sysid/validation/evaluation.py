@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from sysid.estimation import Posterior
 from sysid.estimation.records.experiment import Experiment
-from sysid.models import AbstractModel, Start, beginning, gaps
+from sysid.models import AbstractModel, Start, beginning
+from sysid.models.contract import gaps
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.intervals import CaseIntervals, case_intervals
 from sysid.validation.metrics import Figures, figures, none

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Posterior
 from sysid.estimation.records.experiment import Experiment
-from sysid.models import AbstractModel, Start, gaps
+from sysid.models import AbstractModel, Start
+from sysid.models.contract import gaps
 from sysid.traces import Trace
 
 LEVEL = 0.95

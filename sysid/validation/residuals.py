@@ -23,7 +23,8 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.errors import TraceError
-from sysid.models import AbstractModel, Start, beginning, gaps
+from sysid.models import AbstractModel, Start, beginning
+from sysid.models.contract import gaps
 from sysid.traces import Trace
 
 REACH = 20

@@ -13,7 +13,8 @@ from sysid.estimation.estimators import fit
 from sysid.estimation.linear.order_search import Criterion, OrderLosses, weighed
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import FitResult
-from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, TransferFunction, gaps
+from sysid.models import ARMAX, BJ, OE, AbstractStructure, LinearStateSpace, Mapping, Start, TransferFunction
+from sysid.models.contract import gaps
 from sysid.traces import Trace
 from sysid.validation.order_finalists import Finalist, finalist_of
 

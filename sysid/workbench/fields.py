@@ -23,7 +23,7 @@ from sysid.estimation.estimators import ESTIMATORS, estimator_of
 from sysid.export.exporters import ELSEWHERE, EXPORTERS
 from sysid.field_checks import FieldError
 from sysid.models import AbstractStructure, Mapping, Start, structure_from_dict
-from sysid.models.lags import LagSpec, parse_lags
+from sysid.models.orders.lags import LagSpec, parse_lags
 from sysid.workbench.old_words import JOINT_TRAINING, STRICT, TRAINING, TRAINING_VALUES, Words, with_new_words
 
 STRUCTURES: dict[str, type[AbstractStructure]] = {kind: row.structure for kind, row in ESTIMATORS.items()}

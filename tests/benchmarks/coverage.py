@@ -41,10 +41,10 @@ from sysid.models import (
     TransferFunction,
     VectorStateSpace,
 )
-from sysid.models.innovations import Innovations
-from sysid.models.linear_state_space import polynomials
-from sysid.models.polynomial_orders import AbstractPolynomial
-from sysid.models.ratio import Ratio
+from sysid.models.contract.ratio import Ratio
+from sysid.models.linear.innovations import Innovations
+from sysid.models.linear.linear_state_space import polynomials
+from sysid.models.linear.polynomial_orders import AbstractPolynomial
 from sysid.reporting.linear.step_responses import band
 from sysid.reporting.linear_views import LinearView, linear_views
 from sysid.traces import Channel, Trace

@@ -15,7 +15,8 @@ from unittest import mock
 
 import numpy as np
 
-from sysid.models import NARX, Cascade, Mapping, NARXModel, Scaling, cascade_batch, parameter_count
+from sysid.models import NARX, Cascade, Mapping, NARXModel, Scaling, parameter_count
+from sysid.models.cascades import cascade_batch
 from sysid.reporting.numbers import number
 from tests.benchmarks._findings import found
 

@@ -10,7 +10,7 @@ from sysid.composite import Composite, FixedMember, Member
 from sysid.estimation import Training
 from sysid.models import NARX, Limit, Mapping, NARXModel
 from sysid.traces import Channel, Trace
-from tests.models.cascades import network
+from tests.models.cascades.cascades import network
 from tests.traces.made import trace_of
 
 THREE = NARX(input_delays=[0, 1, 3], output_delays=2, neurons=3)

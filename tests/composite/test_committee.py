@@ -14,7 +14,7 @@ from sysid.models import Cascade, Limit
 from sysid.models.store import cascade_from_dict
 from sysid.testing import simulate_cascade
 from sysid.traces import Channel, Trace
-from tests.models.cascades import network
+from tests.models.cascades.cascades import network
 
 
 def whole(seed: int) -> Cascade:

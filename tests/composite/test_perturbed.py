@@ -11,7 +11,7 @@ from sysid.export import Flag, Surrogate, expected_flags
 from sysid.models import Cascade, Limit
 from sysid.testing import simulate_cascade
 from sysid.traces import Channel, Trace
-from tests.models.cascades import network
+from tests.models.cascades.cascades import network
 
 LIKE = Trace(
     name="like", sample_time=0.1, channels=tuple(Channel(name=name, unit="psi") for name in ("u", "R", "y")),

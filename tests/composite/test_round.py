@@ -17,7 +17,7 @@ from sysid.estimation import JointTraining, fit_cascade
 from sysid.models import Cascade
 from sysid.traces import Channel, Trace
 from tests.composite.composites import member
-from tests.models.cascades import command, network, service
+from tests.models.cascades.cascades import command, network, service
 
 CHAIN = Composite(members=(member("STP -> BP"), member("BP -> AR"), member("BP+AR -> BC")))
 

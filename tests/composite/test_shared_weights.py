@@ -20,7 +20,7 @@ from sysid.estimation import JointTraining
 from sysid.models import Cascade, Limit, Mapping
 from sysid.traces import Channel, Trace
 from tests.composite.composites import fixed, member
-from tests.models.cascades import network
+from tests.models.cascades.cascades import network
 
 ROUND = RoundPlan(
     members=("AR", "BC"),

@@ -14,7 +14,7 @@ from sysid.errors import ConfigError
 from sysid.models import Cascade, NARXModel
 from sysid.traces import Trace
 from tests.composite.composites import models, pipe, trace
-from tests.models.cascades import network
+from tests.models.cascades.cascades import network
 
 
 def whole() -> Cascade:

@@ -15,7 +15,7 @@ from sysid.estimation.estimators import fit
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import Loop
 from sysid.models import ARMAX, ARX, LinearStateSpace, Mapping, Start, TransferFunction
-from sysid.models.transfer_function import TransferFunctionModel
+from sysid.models.linear.transfer_function import TransferFunctionModel
 from sysid.validation import predict_interval
 from tests.benchmarks.interval_coverage import BOTH, ESTIMATED, STRUCTURES, record, shares
 from tests.estimation.linear_systems import trace_of

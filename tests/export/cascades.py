@@ -24,7 +24,7 @@ from sysid.models import (
     VectorScaling,
     parameter_count,
 )
-from sysid.models.transfer_function import TransferFunctionModel
+from sysid.models.linear.transfer_function import TransferFunctionModel
 
 
 def wired_narx(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) -> NARXModel:

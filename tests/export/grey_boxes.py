@@ -10,7 +10,7 @@ import numpy as np
 from sysid.equations import ROSENBROCK, RUNGE_KUTTA
 from sysid.models import GreyBox, GreyBoxModel, Scaling, VectorGreyBox, VectorGreyBoxModel, VectorScaling
 from sysid.models import Mapping as Channels
-from sysid.models.grey_box import lowered
+from sysid.models.grey_box.grey_box import lowered
 
 Model = GreyBoxModel | VectorGreyBoxModel
 

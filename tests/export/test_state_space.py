@@ -44,8 +44,8 @@ from sysid.models import (
     VectorStateSpace,
     VectorStateSpaceModel,
 )
-from sysid.models.polynomial_orders import AbstractPolynomial
-from sysid.models.transfer_function import TransferFunctionModel
+from sysid.models.linear.polynomial_orders import AbstractPolynomial
+from sysid.models.linear.transfer_function import TransferFunctionModel
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
 from tests.export.conftest import WRAPPED

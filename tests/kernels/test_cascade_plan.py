@@ -14,8 +14,8 @@ from sysid.kernels import cascade_layout as layout
 from sysid.kernels.cascade_layout import FREE, HIGH, LOST, LOW, SUM_HEAD, Program
 from sysid.kernels.cascade_plan import Plan
 from sysid.kernels.held_sums import bounded, limited
-from sysid.models.cascade_stages import CompiledStage
-from tests.models.cascades import CASCADES, command
+from sysid.models.cascades.cascade_stages import CompiledStage
+from tests.models.cascades.cascades import CASCADES, command
 
 NUMBERS = st.integers(-3, 3).map(float)
 PAIRS = st.tuples(NUMBERS, NUMBERS).map(sorted)

@@ -13,8 +13,8 @@ from sysid.equations import ROSENBROCK, Terms, lowering
 from sysid.equations.slopes import jacobian
 from sysid.kernels import register_machine as machine
 from sysid.models import GreyBox, GreyBoxModel, Mapping, Scaling
-from sysid.models.equation_reference import EquationTwin
-from sysid.models.grey_box import lowered
+from sysid.models.grey_box.equation_reference import EquationTwin
+from sysid.models.grey_box.grey_box import lowered
 
 PARAMETERS = {"a": 0.7, "b": 0.4, "c": {"start": 1.3, "fixed": True}}
 

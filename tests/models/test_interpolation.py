@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from sysid.errors import ChannelError, ConfigError
 from sysid.models import Cascade, Interpolation, Limit, Mapping
 from sysid.traces import Channel, Trace
-from tests.models.cascades import network
+from tests.models.cascades.cascades import network
 
 KNOTS = {"BP": 1.0, "BP10": 10.0, "BP25": 25.0, "BP50": 50.0}
 

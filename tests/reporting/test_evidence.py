@@ -14,7 +14,7 @@ from scipy import signal
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, fit_arx
 from sysid.models import ARX, Mapping
-from sysid.models.curve_values import CurvePoints
+from sysid.models.blocks.curve_values import CurvePoints
 from sysid.reporting import read_results, write_report
 from sysid.reporting.curves import read_curves
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure

@@ -13,7 +13,7 @@ from sysid.errors import ChannelError
 from sysid.models import Cascade, Limit, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.validation import evaluate, evaluate_cascade
-from tests.models.cascades import CASCADES, command, network, service
+from tests.models.cascades.cascades import CASCADES, command, network, service
 
 NOISE = 0.3
 

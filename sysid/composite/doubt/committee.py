@@ -29,8 +29,8 @@ import numpy as np
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.models import NARX, AbstractModel, Cascade, Limit, Mapping, NARXModel, Scaling
-from sysid.models.cascade_run import Level
-from sysid.models.wiring import Member
+from sysid.models.cascades.cascade_run import Level
+from sysid.models.cascades.wiring import Member
 
 APART = "_apart"
 """Behind the name of an output: the channel of its difference."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid.composite.doubt.committee import APART, committee
 from sysid.errors import ConfigError
 from sysid.models import AbstractModel, Cascade, Limit
-from sysid.models.cascade_run import Level
+from sysid.models.cascades.cascade_run import Level
 from sysid.traces import Trace
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from sysid.composite.doubt.committee import renamed
 from sysid.errors import ChannelError, ConfigError
 from sysid.models import NARX, AbstractModel, Cascade, Mapping, NARXModel, Scaling
-from sysid.models.ends import Ends
+from sysid.models.channels.ends import Ends
 
 SEEN = "_seen"
 """Behind the name of a channel: what its readers see of it."""

@@ -34,7 +34,7 @@ from sysid.equations.syntax import (
 from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.models import Mapping
-from sysid.models.declared import Parameter
+from sysid.models.grey_box.declared import Parameter
 
 _SWITCH = (0.0, 1.0)
 """Bounds of a switch: off, on and how far between."""

@@ -14,7 +14,7 @@ from sysid.equations.syntax import Delayed, Name, nodes_of
 from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.models import Limit
-from sysid.models.declared import Parameter
+from sysid.models.grey_box.declared import Parameter
 
 
 def named_limits(

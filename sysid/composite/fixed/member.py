@@ -13,8 +13,8 @@ from sysid.equations.syntax import Call, Delayed, nodes_of
 from sysid.equations.system import written_name
 from sysid.errors import ConfigError
 from sysid.models import GreyBox, Mapping
-from sysid.models.declared import Parameter, parameters_from
-from sysid.models.grey_box import Table, lowered
+from sysid.models.grey_box.declared import Parameter, parameters_from
+from sysid.models.grey_box.grey_box import Table, lowered
 from sysid.traces import Trace
 
 

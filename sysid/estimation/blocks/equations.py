@@ -13,7 +13,7 @@ from sysid.equations.system import written_name
 from sysid.estimation.blocks.linear_start import LinearStart
 from sysid.estimation.blocks.sections import Block, Pair
 from sysid.models import GreyBox, HammersteinWiener, Mapping, WienerHammerstein
-from sysid.models.curves import NONE, Curve, Text, number, sizeable
+from sysid.models.blocks.curves import NONE, Curve, Text, number, sizeable
 
 
 def hammerstein_wiener(

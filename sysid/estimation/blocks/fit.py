@@ -27,8 +27,8 @@ from sysid.estimation.networks.training import FitProgress, Training, check_hidd
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import FitResult
 from sysid.models import BuiltModel, GreyBox, HammersteinWiener, Mapping, Start, WienerHammerstein
-from sysid.models.block_oriented import BlockStructure
-from sysid.models.curves import Text
+from sysid.models.blocks.block_oriented import BlockStructure
+from sysid.models.blocks.curves import Text
 from sysid.traces import Trace
 
 STARTS = 4

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from collections.abc import Mapping as Dict
 
 from sysid.models import HammersteinWiener, WienerHammerstein
-from sysid.models.block_oriented import BlockStructure
+from sysid.models.blocks.block_oriented import BlockStructure
 
 Name = Callable[[str], str]
 

@@ -23,8 +23,8 @@ from sysid.estimation.networks.training import FitProgress, Training, check_hidd
 from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.results.result import FitResult
 from sysid.models import BuiltModel, GreyBox, Lags, Mapping, PolynomialNARX, Start
-from sysid.models.curves import Text, number
-from sysid.models.polynomial_narx import Term
+from sysid.models.blocks.curves import Text, number
+from sysid.models.blocks.polynomial_narx import Term
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]

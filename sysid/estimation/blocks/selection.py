@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from sysid.estimation.clock import now
-from sysid.models.polynomial_narx import Term
+from sysid.models.blocks.polynomial_narx import Term
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.records.output_ends import found_ends
-from sysid.models.output_limits import Between
+from sysid.models.orders.output_limits import Between
 
 Array = NDArray[np.float64]
 Records = Sequence[tuple[Array, Array]]

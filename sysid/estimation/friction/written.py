@@ -15,7 +15,7 @@ from typing import Any
 from sysid.equations.system import written_name
 from sysid.estimation.friction.found import Beside, Friction
 from sysid.models import Mapping, VectorGreyBox
-from sysid.models.curves import Text
+from sysid.models.blocks.curves import Text
 
 STEPS = 5
 """From sample to sample."""

@@ -20,8 +20,8 @@ from sysid.estimation.parameters.named import named_of
 from sysid.estimation.records.experiment import experiments_of
 from sysid.estimation.results.result import FitResult
 from sysid.models import Start
-from sysid.models.grey_box import PROFILE
-from sysid.models.grey_box_model import EquationModel
+from sysid.models.grey_box.grey_box import PROFILE
+from sysid.models.grey_box.grey_box_model import EquationModel
 from sysid.traces import Trace
 
 ROUNDS = 3

@@ -13,8 +13,8 @@ from sysid.estimation.parameters.named import named_of
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import FitResult
 from sysid.models import Start
-from sysid.models.case_values import case_of, cases_among
-from sysid.models.grey_box_model import EquationModel
+from sysid.models.grey_box.case_values import case_of, cases_among
+from sysid.models.grey_box.grey_box_model import EquationModel
 from sysid.traces import Trace
 
 _ModelT = TypeVar("_ModelT", bound=EquationModel)

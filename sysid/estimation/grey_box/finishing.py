@@ -20,7 +20,7 @@ from sysid.estimation.networks.training import Training
 from sysid.estimation.parameters.findings import with_evidence
 from sysid.estimation.parameters.named import Named, named_of
 from sysid.estimation.results.result import Status
-from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
+from sysid.models.grey_box.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 
 Array = NDArray[np.float64]
 

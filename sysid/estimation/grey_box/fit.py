@@ -42,9 +42,9 @@ from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.results.result import FitResult
 from sysid.models import History, Mapping, Start, beginning
-from sysid.models.built_model import BuiltModel
-from sysid.models.grey_box import GreyBox
-from sysid.models.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
+from sysid.models.blocks.built_model import BuiltModel
+from sysid.models.grey_box.grey_box import GreyBox
+from sysid.models.grey_box.grey_box_model import EquationModel, GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.grey_box.stepping import STEPPED
 from sysid.estimation.parameters.named import named_of
-from sysid.models.equation_form import EquationForm
-from sysid.models.grey_box_model import EquationModel
+from sysid.models.grey_box.equation_form import EquationForm
+from sysid.models.grey_box.grey_box_model import EquationModel
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.records.first_samples import is_another, moves_of_shown
 from sysid.kernels.arrays import forget_what_has_died_away
-from sysid.models.equation_form import EquationForm
+from sysid.models.grey_box.equation_form import EquationForm
 
 Array = NDArray[np.float64]
 

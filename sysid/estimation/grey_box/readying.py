@@ -22,9 +22,9 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.parameters.named import named_of
 from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range
 from sysid.models import AbstractStructure, Mapping, Start
-from sysid.models.built_model import BuiltModel
-from sysid.models.grey_box import GreyBox, lowered
-from sysid.models.grey_box_model import GreyBoxModel, VectorGreyBoxModel
+from sysid.models.blocks.built_model import BuiltModel
+from sysid.models.grey_box.grey_box import GreyBox, lowered
+from sysid.models.grey_box.grey_box_model import GreyBoxModel, VectorGreyBoxModel
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]

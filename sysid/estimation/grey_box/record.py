@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.records.experiment import Experiment
-from sysid.models.equation_form import EquationForm
+from sysid.models.grey_box.equation_form import EquationForm
 
 Array = NDArray[np.float64]
 

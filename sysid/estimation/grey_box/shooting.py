@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.least_squares.provider import Linearisation
-from sysid.models.equation_form import EquationForm
+from sysid.models.grey_box.equation_form import EquationForm
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from sysid.estimation.networks.starts.multistart import Candidate, Multistart
 from sysid.estimation.networks.training import Training
 from sysid.estimation.parameters.named import FLAT_ALPHA, Named
 from sysid.estimation.results.result import FitResult
-from sysid.models.built_model import BuiltModel
-from sysid.models.grey_box_model import EquationModel
+from sysid.models.blocks.built_model import BuiltModel
+from sysid.models.grey_box.grey_box_model import EquationModel
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from sysid.equations import MOST_STATES_IMPLICIT, ROSENBROCK, RUNGE_KUTTA, Lowered
 from sysid.estimation.grey_box.provider import EquationProvider
-from sysid.models import intersample
-from sysid.models.equation_form import EquationForm
-from sysid.models.grey_box_model import EquationModel
+from sysid.models.grey_box.equation_form import EquationForm
+from sysid.models.grey_box.grey_box_model import EquationModel
+from sysid.models.orders import intersample
 
 Array = NDArray[np.float64]
 

@@ -18,8 +18,8 @@ from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.records.first_samples import shown_note
 from sysid.estimation.results.result import FitResult, Status
 from sysid.models import Start
-from sysid.models.built_model import BuiltModel
-from sysid.models.grey_box import PROFILE
+from sysid.models.blocks.built_model import BuiltModel
+from sysid.models.grey_box.grey_box import PROFILE
 from sysid.traces import Trace
 
 

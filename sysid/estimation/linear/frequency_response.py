@@ -20,7 +20,7 @@ from sysid.estimation.linear.transfer_function_training import Terms, TransferFu
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.results.result import FitResult
 from sysid.models import Mapping, Scaling, TransferFunction
-from sysid.models.orthonormal_basis import Domain
+from sysid.models.converting.orthonormal_basis import Domain
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

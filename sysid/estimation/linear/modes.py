@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel
-from sysid.models.continuous import NEGATIVE
-from sysid.models.ratio import Ratio
+from sysid.models.contract.ratio import Ratio
+from sysid.models.converting.continuous import NEGATIVE
 
 AT_ONE = 1e-9
 """Distance of a discrete pole from 1 below which it is an integrator's."""

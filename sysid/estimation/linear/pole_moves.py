@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid.estimation.linear.poles import sections_of
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.models import TransferFunction
-from sysid.models.orthonormal_basis import Domain, section_poles
+from sysid.models.converting.orthonormal_basis import Domain, section_poles
 
 FASTEST = 30.0
 """Rate, times the sample time, of a pole that is there for no sample to see."""

@@ -19,8 +19,8 @@ from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.nonparametric.segments import columns_of_lags
-from sysid.models.orthonormal_basis import Domain, basis_of
-from sysid.models.realisation import realise
+from sysid.models.converting.orthonormal_basis import Domain, basis_of
+from sysid.models.converting.realisation import realise
 
 BLOCK = 2**14
 """Rows of the long ARX model that are laid side by side at a time."""

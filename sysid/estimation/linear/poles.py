@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models.orthonormal_basis import Domain, section_orders
+from sysid.models.converting.orthonormal_basis import Domain, section_orders
 
 _EDGE = 1e-6
 """How far inside the stable region a reflected pole comes to lie at least (relative in the s plane)."""

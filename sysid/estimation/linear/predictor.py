@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.kernels import linear as kernel
-from sysid.models.realisation import Realisation
+from sysid.models.converting.realisation import Realisation
 
 GROWTH = 1e4
 """By how much a mode may grow over a record and its free run still be computed as it is."""

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.linear.predictor import MirroredPredictor
-from sysid.models.orthonormal_basis import BasisSection, Domain, basis_of
+from sysid.models.converting.orthonormal_basis import BasisSection, Domain, basis_of
 
 Bases = tuple[tuple[BasisSection, ...], ...]
 """The basis of each input."""

@@ -27,8 +27,8 @@ from sysid.estimation.linear.poles import sections_of, stabilised
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.kernels import linear as kernel
-from sysid.models.orthonormal_basis import Domain, basis_of
-from sysid.models.realisation import realise
+from sysid.models.converting.orthonormal_basis import Domain, basis_of
+from sysid.models.converting.realisation import realise
 
 PLAIN_ITERATIONS = 3
 """Least-squares iterations before instruments are used: a model's output is one as soon as it resembles the data."""

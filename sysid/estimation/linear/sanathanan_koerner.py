@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.linear.poles import sections_of, stabilised
-from sysid.models.orthonormal_basis import Domain, basis_of, responses
-from sysid.models.realisation import realise
+from sysid.models.converting.orthonormal_basis import Domain, basis_of, responses
+from sysid.models.converting.realisation import realise
 
 MAX_ITERATIONS = 20
 """As in the estimators of the field (MATLAB's ``tfest``)."""

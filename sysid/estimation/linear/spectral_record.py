@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.linear.records import AbstractRecord, Bases, tap_slices
-from sysid.models.orthonormal_basis import BasisSection, Domain, responses
+from sysid.models.converting.orthonormal_basis import BasisSection, Domain, responses
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -15,8 +15,8 @@ from sysid.estimation.linear.predictor import MirroredPredictor
 from sysid.estimation.linear.records import AbstractRecord, Bases, full, tap_slices
 from sysid.kernels import linear as kernel
 from sysid.kernels.arrays import GONE, forget_what_has_died_away
-from sysid.models.orthonormal_basis import BasisSection, Domain
-from sysid.models.realisation import Realisation, realise
+from sysid.models.converting.orthonormal_basis import BasisSection, Domain
+from sysid.models.converting.realisation import Realisation, realise
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

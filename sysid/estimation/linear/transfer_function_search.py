@@ -30,8 +30,9 @@ from sysid.estimation.linear.variable_projection import PoleParameters, Sections
 from sysid.estimation.nonparametric.dead_time import descend
 from sysid.estimation.results.result import FitResult, Loop
 from sysid.estimation.results.uncertainty import Uncertainty
-from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel, intersample
-from sysid.models.orthonormal_basis import Domain
+from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel
+from sysid.models.converting.orthonormal_basis import Domain
+from sysid.models.orders import intersample
 
 NEAR_BEST = 1.1
 """Loss, relative to the least, up to which a minimum may be chosen by selection traces."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sysid.errors import ConfigError
 from sysid.models import Mapping
-from sysid.models.typed_fields import TypedFields
+from sysid.models.orders.typed_fields import TypedFields
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,8 @@ from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import SeparableProvider, Separated
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import TransferFunctionModel
-from sysid.models import orthonormal_basis as bases
-from sysid.models.orthonormal_basis import Domain
+from sysid.models.converting import orthonormal_basis as bases
+from sysid.models.converting.orthonormal_basis import Domain
 
 
 def transfer_function_uncertainty(

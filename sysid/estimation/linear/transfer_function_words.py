@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.transfer_function_runs import Candidate
 from sysid.models import TransferFunctionModel
-from sysid.models.orthonormal_basis import Domain
+from sysid.models.converting.orthonormal_basis import Domain
 
 AT_EDGE = (
     "The slowest pole stands at the end of its range, a time constant of five records: the plant may integrate, and "

@@ -21,7 +21,7 @@ from scipy import linalg
 
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.linear.records import AbstractRecord, Bases
-from sysid.models.orthonormal_basis import Domain, basis_of, section_orders
+from sysid.models.converting.orthonormal_basis import Domain, basis_of, section_orders
 
 RANK_TOLERANCE = 1e-11
 """Singular values of the unit columns below this part of the largest are directions that the data do not show."""

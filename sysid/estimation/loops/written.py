@@ -9,7 +9,7 @@ from sysid.equations.system import written_name
 from sysid.estimation.loops.loop import Found, Loop, Scaled
 from sysid.kernels.loop import DEAD_ZONE, RELAY, TINY, WAITS
 from sysid.models import Mapping, VectorGreyBox
-from sysid.models.curves import Text
+from sysid.models.blocks.curves import Text
 
 
 def grey_box_of(found: Found, mapping: Mapping) -> VectorGreyBox:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.models import GreyBox, Member
-from sysid.models.declared import Parameter
+from sysid.models.grey_box.declared import Parameter
 
 
 @dataclass(frozen=True, kw_only=True)

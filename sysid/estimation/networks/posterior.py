@@ -57,8 +57,9 @@ from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.nonparametric.noise import persistence
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import Evidence, Loop
-from sysid.models import AbstractModel, Recursion, gaps
-from sysid.models.innovation_moves import prediction_moves
+from sysid.models import AbstractModel, Recursion
+from sysid.models.contract import gaps
+from sysid.models.linear.innovation_moves import prediction_moves
 
 CALIBRATED_AT = 0.95
 """The level at which the spread is found."""

@@ -31,7 +31,7 @@ from sysid.estimation.networks.trained_members import TrainedMembers
 from sysid.kernels import cascade as kernel
 from sysid.kernels.cascade_layout import Program
 from sysid.kernels.cascade_sensitivities import rows_for, sensitivities
-from sysid.models.lagged_form import NOT_KEPT
+from sysid.models.lagged.lagged_form import NOT_KEPT
 
 Array = NDArray[np.float64]
 _Found = TypeVar("_Found")

@@ -41,7 +41,7 @@ from sysid.estimation.networks.program_provider import ProgramProvider
 from sysid.estimation.networks.trained_members import TrainedMembers
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import Recursion
-from sysid.models.lagged_form import opened, side_by_side
+from sysid.models.lagged.lagged_form import opened, side_by_side
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

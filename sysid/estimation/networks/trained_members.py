@@ -14,8 +14,8 @@ from sysid.kernels.arrays import read_only
 from sysid.kernels.cascade_layout import Program
 from sysid.kernels.cascade_plan import Plan
 from sysid.models import Cascade, Ends, Member
-from sysid.models.cascade_program import program_of
-from sysid.models.column_recursion import ColumnRecursion
+from sysid.models.contract.column_recursion import ColumnRecursion
+from sysid.models.lagged.cascade_program import program_of
 
 
 @dataclass(frozen=True, eq=False)

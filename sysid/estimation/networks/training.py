@@ -9,7 +9,7 @@ from typing import Any
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.results.result import Loop
-from sysid.models.typed_fields import TypedFields
+from sysid.models.orders.typed_fields import TypedFields
 
 CHOICES = {
     "choose_by": ("selection", "evidence"),

@@ -32,7 +32,7 @@ from sysid.models import (
     VectorScaling,
     beginning,
 )
-from sysid.models.column_recursion import ColumnRecursion
+from sysid.models.contract.column_recursion import ColumnRecursion
 from sysid.traces import Trace
 
 DEFAULT = JointTraining(max_iterations=500, patience=50)

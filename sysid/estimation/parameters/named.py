@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sysid.errors import ConfigError
-from sysid.models.declared import Parameter
-from sysid.models.grey_box import GreyBox
+from sysid.models.grey_box.declared import Parameter
+from sysid.models.grey_box.grey_box import GreyBox
 
 FLAT_ALPHA = 1e-10
 """Precision of what nothing is known of, in scaled numbers: a hundred thousand times its scale is ordinary."""

@@ -11,7 +11,7 @@ import numpy as np
 from sysid.equations.system import written_name
 from sysid.estimation.play.found import Array, Play, Records, monomials, played
 from sysid.models import Mapping, VectorGreyBox
-from sysid.models.curves import Text
+from sysid.models.blocks.curves import Text
 
 DEGREES, MOST_TERMS = (5, 3), 260
 """Of the polynomials, the likeliest first, and their terms at most, all outputs together."""

@@ -21,8 +21,8 @@ from sysid.models import (
     VectorScaling,
     beginning,
 )
-from sysid.models.beginning import window
-from sysid.models.history import bridged
+from sysid.models.channels.history import bridged
+from sysid.models.contract.beginning import window
 from sysid.traces import Trace
 
 

@@ -1,9 +1,9 @@
 r"""Where a fit begins a record that is scored from the state which its first samples show.
 
-A free run is scored from the state that the first samples of its record show (:mod:`sysid.models.beginning`). A fit
-estimates that state with the parameters, over the whole record. Both come to the same where a state is forgotten, and
-where the model is the plant's. What integrates keeps an error of its first state for ever: a model that is nearly the
-plant's is then trained to begin where the rest of the record is met best, which the first samples deny, and the run
+A free run is scored from the state that the first samples of its record show (:mod:`sysid.models.contract.beginning`).
+A fit estimates that state with the parameters, over the whole record. Both come to the same where a state is forgotten,
+and where the model is the plant's. What integrates keeps an error of its first state for ever: a model that is nearly
+the plant's is then trained to begin where the rest of the record is met best, which the first samples deny, and the run
 that is scored is another one. Where that is so, the fit is made as it is scored: the state is the one that the first
 samples show, a function :math:`x_0(\theta)` of the parameters, and these samples do not count. With the outputs
 :math:`y(\theta, x_0)` over them,

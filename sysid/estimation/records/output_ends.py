@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.records.experiment import Experiment
-from sysid.models.output_limits import FOUND, Between, Named
+from sysid.models.orders.output_limits import FOUND, Between, Named
 from sysid.units import in_unit
 
 Array = NDArray[np.float64]

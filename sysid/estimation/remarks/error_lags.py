@@ -11,8 +11,8 @@ from sysid.estimation.least_squares.correlation import products
 from sysid.estimation.records.informative import SAME, by_chance, by_chance_of_signs, informative, unit, with_past
 from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import AbstractModel, GreyBox, TransferFunction
-from sysid.models.intersample import MOVING
-from sysid.models.orthonormal_basis import Domain
+from sysid.models.converting.orthonormal_basis import Domain
+from sysid.models.orders.intersample import MOVING
 
 LAGS = 5
 """Past errors and inputs that are taken out of the error, before the input of one sample is looked at; and lags after

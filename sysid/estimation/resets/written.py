@@ -11,7 +11,7 @@ import numpy as np
 from sysid.equations.system import written_name
 from sysid.estimation.resets.reset_map import Array, Guard, ResetMap, Rest
 from sysid.models import Mapping, VectorGreyBox
-from sysid.models.curves import Text
+from sysid.models.blocks.curves import Text
 
 DIGITS = 13
 """Of a number: what is behind them is rounding."""

@@ -21,8 +21,8 @@ from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability
 from sysid.estimation.stability.sequences import AbstractSequences, InputSequence, TraceSequences
 from sysid.models import ARX, AbstractModel, Mapping, Start, StartKind, beginning
-from sysid.models.lags import whole
-from sysid.models.typed_fields import TypedFields
+from sysid.models.orders.lags import whole
+from sysid.models.orders.typed_fields import TypedFields
 from sysid.traces import Trace
 
 STILL_S = 20.0

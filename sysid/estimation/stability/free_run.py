@@ -26,7 +26,7 @@ SEQUENCES = 1000
 SEED = 20
 REACH = 1.0
 """How far beyond the range that its output has in the records a run may go, in widths of that range, and still count as
-bounded: networks are held there (``sysid.models.narx.CLAMP``), and a run that is held has lost its way."""
+bounded: networks are held there (``sysid.models.networks.narx.CLAMP``), and a run that is held has lost its way."""
 
 TOLERANCE = 0.1
 """How far from its plateau a run may settle, as a share of the output's range in the records."""

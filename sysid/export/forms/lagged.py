@@ -13,10 +13,10 @@ from sysid.export.forms.programs import ProgramForm
 from sysid.export.forms.state_space import StateSpaceForm
 from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import NeuralEnsemble, NeuralForm, StateSpace
-from sysid.models.column_recursion import ColumnRecursion
-from sysid.models.ends import Ends
-from sysid.models.equation_form import EquationForm
-from sysid.models.wiring import Member
+from sysid.models.cascades.wiring import Member
+from sysid.models.channels.ends import Ends
+from sysid.models.contract.column_recursion import ColumnRecursion
+from sysid.models.grey_box.equation_form import EquationForm
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,7 +17,7 @@ from sysid.export.forms.lagged import LaggedForm, lowered_form
 from sysid.export.forms.programs import ProgramForm
 from sysid.export.forms.state_space import StateSpaceForm
 from sysid.models import History
-from sysid.models.wiring import Member
+from sysid.models.cascades.wiring import Member
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,8 +14,8 @@ from sysid.equations.graph import Program, computed
 from sysid.export.forms.operations import OPERATIONS, Operation
 from sysid.kernels import register_machine as machine
 from sysid.models import History, VectorScaling
-from sysid.models.ends import Ends
-from sysid.models.equation_form import EquationForm
+from sysid.models.channels.ends import Ends
+from sysid.models.grey_box.equation_form import EquationForm
 
 STATE, INPUT, VALUE = "x", "u", "v"
 

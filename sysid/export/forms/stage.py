@@ -16,7 +16,7 @@ from sysid.export.forms.programs import ProgramForm
 from sysid.export.forms.state_space import StateSpaceForm
 from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import Limit
-from sysid.models.wiring import Member, Wiring
+from sysid.models.cascades.wiring import Member, Wiring
 
 Range = tuple[float, float]
 """Least and greatest value, in the channel's unit."""

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from sysid.kernels.neurons import NEURONS, Neuron
 from sysid.models import History, NeuralEnsemble, NeuralForm, Scaling, StateSpace, VectorScaling
-from sysid.models.activations import PLAIN
-from sysid.models.ends import Ends
+from sysid.models.channels.ends import Ends
+from sysid.models.orders.activations import PLAIN
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

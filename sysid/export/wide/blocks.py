@@ -20,7 +20,7 @@ from sysid.export.forms.state_space import StateSpaceForm
 from sysid.export.surrogate import Surrogate
 from sysid.export.wide.terms import BlockTerms, InputTerm, Now, Past, Reading, affine
 from sysid.kernels.neurons import NEURONS, Neuron
-from sysid.models.activations import PLAIN
+from sysid.models.orders.activations import PLAIN
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

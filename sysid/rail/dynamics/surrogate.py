@@ -14,7 +14,7 @@ from sysid.airbrake.variant import USUAL, Variant
 from sysid.errors import ConfigError
 from sysid.kernels.cascade_plan import planned
 from sysid.models import AbstractModel, Ends, Recursion, Wiring
-from sysid.models.lagged_form import side_by_side, walk
+from sysid.models.lagged.lagged_form import side_by_side, walk
 from sysid.rail.dynamics.brake import AbstractBrake, BrakeOutput, Signal, valve_of_vehicle
 from sysid.rail.dynamics.equalising import equalising_from_handle
 from sysid.units import PSI_IN_PA, STANDARD_ATMOSPHERE_PA

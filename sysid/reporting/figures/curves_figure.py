@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from sysid.models.curve_values import CurvePoints
+from sysid.models.blocks.curve_values import CurvePoints
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
 
 

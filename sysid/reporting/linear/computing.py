@@ -12,8 +12,8 @@ from sysid.errors import ConfigError
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.linear.modes import modes
 from sysid.models import AbstractModel
-from sysid.models.intersample import HELD
-from sysid.models.to_control import Linear
+from sysid.models.converting.to_control import Linear
+from sysid.models.orders.intersample import HELD
 from sysid.reporting.linear.responses import Bode, Known, Matrix, Poles, StepResponse
 from sysid.reporting.linear.step_responses import (
     band,

@@ -8,7 +8,7 @@ import numpy as np
 
 from sysid.estimation import FitResult
 from sysid.estimation.results.uncertainty import Uncertainty
-from sysid.models.grey_box_model import EquationModel
+from sysid.models.grey_box.grey_box_model import EquationModel
 from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.numbers import number
 from sysid.reporting.tables import Cell, Table, figure_cell

@@ -10,7 +10,7 @@ from sysid.composite import Composite, Member, TrainingPlan
 from sysid.errors import ConfigError
 from sysid.field_checks import FieldError, FolderName
 from sysid.models import Limit
-from sysid.models.declared import Parameter, parameters_from
+from sysid.models.grey_box.declared import Parameter, parameters_from
 from sysid.workbench.assembly.extending import extending_schema
 from sysid.workbench.assembly.member_config import FixedConfig, MemberConfig, ParametersField, StandingConfig
 from sysid.workbench.assembly.proof_config import (

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sysid.errors import ConfigError
 from sysid.models import Cascade, Interpolation
-from sysid.models.ends import Ends
+from sysid.models.channels.ends import Ends
 from sysid.workbench.runner.store import LINE, read_json
 
 

@@ -20,8 +20,8 @@ from sysid.models import (
     VectorNARX,
     WienerHammerstein,
 )
-from sysid.models.curves import NONE
-from sysid.models.output_limits import FOUND
+from sysid.models.blocks.curves import NONE
+from sysid.models.orders.output_limits import FOUND
 from sysid.workbench.auto.look import Looked
 
 CURVE = "piecewise 6"

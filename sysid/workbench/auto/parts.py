@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.models import Start, StartKind
-from sysid.models.beginning import LONGEST_WINDOW, SHARE_OF_RECORD
+from sysid.models.contract.beginning import LONGEST_WINDOW, SHARE_OF_RECORD
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.fits.data import Data
 

@@ -18,7 +18,7 @@ from sysid.errors import ConfigError
 from sysid.extras import need
 from sysid.field_checks import check
 from sysid.models import Mapping, Start, StartKind, StartLike
-from sysid.models.rest_levels import levels_at_rest
+from sysid.models.channels.rest_levels import levels_at_rest
 from sysid.names import slug
 from sysid.reporting.sweep_record import FIGURES, SweepRecord
 from sysid.traces import TraceSet

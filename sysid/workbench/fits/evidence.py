@@ -10,7 +10,7 @@ from sysid.errors import TraceError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.records.experiment import Experiment
-from sysid.models.curve_values import curve_values, has_curves
+from sysid.models.blocks.curve_values import curve_values, has_curves
 from sysid.traces import Role
 from sysid.validation import Linearity, analyse_residuals, judge_linearity
 from sysid.workbench.fits.config import PipelineConfig

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from sysid.estimation.results.tolerance import spans_of
-from sysid.models import AbstractModel, Start, beginning, gaps
+from sysid.models import AbstractModel, Start, beginning
+from sysid.models.contract import gaps
 from sysid.traces import Trace, TraceSet
 from sysid.validation.resolution import parts_of
 from sysid.workbench.fits.data import Data

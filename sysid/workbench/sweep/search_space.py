@@ -17,7 +17,7 @@ from sysid.estimation.estimator import Estimator
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.field_checks import check
 from sysid.models import AbstractStructure
-from sysid.models.ranges import WORD, AbstractRange, declared_ranges, parse_range
+from sysid.models.orders.ranges import WORD, AbstractRange, declared_ranges, parse_range
 from sysid.workbench.fields import StructureField, given_options, options_of
 from sysid.workbench.old_words import STRICT
 from sysid.workbench.runner.store import digest

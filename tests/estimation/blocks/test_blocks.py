@@ -31,8 +31,8 @@ from sysid.models import (
     WienerHammerstein,
     model_from_dict,
 )
-from sysid.models.curve_values import curve_values, has_curves
-from sysid.models.curves import Curve
+from sysid.models.blocks.curve_values import curve_values, has_curves
+from sysid.models.blocks.curves import Curve
 from sysid.traces import Trace
 from tests.traces.made import trace_of
 

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from sysid.estimation.blocks.first_block import searched
 from sysid.estimation.blocks.sections import Block, Pair
-from sysid.models.curves import Curve
+from sysid.models.blocks.curves import Curve
 
 BEFORE, BEHIND = [1.0, -1.2, 0.45], [1.0, -0.6, 0.0]
 

@@ -19,8 +19,8 @@ from sysid.estimation.grey_box.layout import renormed
 from sysid.estimation.grey_box.readying import built_template
 from sysid.estimation.networks.training import Training
 from sysid.models import BuiltModel, HammersteinWiener, Mapping, Scaling, Start, WienerHammerstein
-from sysid.models.block_oriented import BlockStructure
-from sysid.models.curves import Curve
+from sysid.models.blocks.block_oriented import BlockStructure
+from sysid.models.blocks.curves import Curve
 from sysid.traces import Channel, Trace
 
 FIRST, SECOND = ([0.0, 0.05, 0.04], np.poly([0.85 * np.exp(0.2j), 0.85 * np.exp(-0.2j)]).real), ([0.3], [1.0, -0.7])

@@ -10,8 +10,8 @@ from sysid.estimation import fit_polynomial, fit_state_space, fit_transfer_funct
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.results.result import FitResult
 from sysid.models import OE, History, LinearStateSpace, Mapping, Scaling, Start, StartKind, TransferFunction
-from sysid.models.innovations import Innovations
-from sysid.models.state_space import StateSpace
+from sysid.models.linear.innovations import Innovations
+from sysid.models.linear.state_space import StateSpace
 from sysid.traces import Trace
 from tests.estimation.linear_systems import steps, trace_of
 

@@ -17,7 +17,7 @@ from sysid.estimation.linear.stretches import KEPT, LONG, SHORTEST, stretches
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.records.experiment import experiments_of
 from sysid.models import ARMAX, OE, Mapping, Start, StartKind, TransferFunction
-from sysid.models.orthonormal_basis import Domain
+from sysid.models.converting.orthonormal_basis import Domain
 from sysid.traces import Trace
 from tests.estimation.linear_systems import trace_of
 

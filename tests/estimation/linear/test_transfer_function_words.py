@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sysid.estimation.linear.transfer_function_words import of_speed, of_stability
-from sysid.models.orthonormal_basis import Domain
+from sysid.models.converting.orthonormal_basis import Domain
 
 
 def model(*poles: complex, domain: Domain = Domain.CONTINUOUS) -> Any:

@@ -9,7 +9,7 @@ from sysid.estimation.linear.records import AbstractRecord
 from sysid.estimation.linear.spectral_record import SpectralRecord
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
-from sysid.models.orthonormal_basis import Domain
+from sysid.models.converting.orthonormal_basis import Domain
 
 DOMAINS = pytest.mark.parametrize("domain", list(Domain), ids=lambda d: d.value)
 ORDERS = pytest.mark.parametrize(

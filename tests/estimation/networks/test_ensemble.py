@@ -13,7 +13,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import Loop, Status, Training, fit_narx
 from sysid.estimation.networks.ensemble import ELIGIBLE, WORTH, elect, united
 from sysid.models import NARX, Mapping, NARXModel, Scaling
-from sysid.models.recursion import parameter_count
+from sysid.models.lagged.recursion import parameter_count
 from sysid.validation import predict_interval
 from tests.estimation.tank import TANK
 from tests.estimation.tank import tank as record

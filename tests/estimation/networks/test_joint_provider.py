@@ -16,7 +16,7 @@ from sysid.estimation.networks.together.training import unit_errors
 from sysid.models import Cascade, Limit
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Trace
-from tests.models.cascades import CASCADES, command, equation, lag, linear, network, service
+from tests.models.cascades.cascades import CASCADES, command, equation, lag, linear, network, service
 
 
 def trace(cascade: Cascade, n: int = 60, seed: int = 0, *, usable=None) -> Trace:

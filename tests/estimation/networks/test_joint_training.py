@@ -15,7 +15,7 @@ from sysid.estimation.networks.together.leading_windows import lengths
 from sysid.estimation.networks.together.provider import CascadeProvider
 from sysid.estimation.networks.training import FitProgress
 from sysid.models import Cascade
-from tests.models.cascades import command, linear, network, service
+from tests.models.cascades.cascades import command, linear, network, service
 
 TRUTH = service()
 TRAINING = JointTraining(max_iterations=20, checkpoints=4, windows=())

@@ -19,10 +19,10 @@ from sysid.models import (
     Scaling,
     Start,
     StartKind,
-    low_rank,
     structure_from_dict,
 )
-from sysid.models.neural_sizes import Sizes
+from sysid.models.networks import low_rank
+from sysid.models.networks.neural_sizes import Sizes
 from sysid.traces import Channel, Trace
 
 MAPPING = Mapping.parse("u -> y")

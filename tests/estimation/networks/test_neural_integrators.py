@@ -23,7 +23,7 @@ from sysid.models import (
     StartKind,
     structure_from_dict,
 )
-from sysid.models.neural_sizes import Sizes
+from sysid.models.networks.neural_sizes import Sizes
 from sysid.traces import Trace
 from tests.traces.made import trace_of
 

@@ -14,13 +14,13 @@ from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.together.member_layout import MemberLayout
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import Cascade, History, Mapping, Start, StartKind, VectorNARX, beginning
-from sysid.models.column_recursion import ColumnRecursion
+from sysid.models.contract.column_recursion import ColumnRecursion
 from sysid.models.store import model_from_dict
 from sysid.testing import finite_difference_jacobian
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.validation.evaluation import evaluate_outputs
 from sysid.validation.intervals import predict_interval
-from tests.models.cascades import block, command, network
+from tests.models.cascades.cascades import block, command, network
 from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> x+y")

@@ -12,7 +12,7 @@ from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.parameters.findings import TOGETHER, Findings, _lost
 from sysid.estimation.parameters.named import Named
 from sysid.estimation.results.result import Status
-from sysid.models.declared import Parameter
+from sysid.models.grey_box.declared import Parameter
 
 FLAT = 1e-8
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.linear.state_space.coordinates import Directions
-from sysid.models.innovations import Innovations
-from sysid.models.polynomial_orders import AbstractPolynomial
+from sysid.models.linear.innovations import Innovations
+from sysid.models.linear.polynomial_orders import AbstractPolynomial
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.models.polynomial_orders import AbstractPolynomial
+from sysid.models.linear.polynomial_orders import AbstractPolynomial
 
 Array = NDArray[np.float64]
 

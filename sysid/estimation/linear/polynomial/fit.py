@@ -31,9 +31,9 @@ from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import Mapping, Start
-from sysid.models.polynomial import PolynomialModel
-from sysid.models.polynomial_orders import AbstractPolynomial
-from sysid.models.typed_fields import TypedFields
+from sysid.models.linear.polynomial import PolynomialModel
+from sysid.models.linear.polynomial_orders import AbstractPolynomial
+from sysid.models.orders.typed_fields import TypedFields
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]

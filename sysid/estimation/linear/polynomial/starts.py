@@ -30,7 +30,7 @@ from sysid.estimation.linear.subspace.system import EDGE
 from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.subspace.yardstick import Yardstick
 from sysid.models import LinearStateSpace
-from sysid.models.polynomial_orders import AbstractPolynomial
+from sysid.models.linear.polynomial_orders import AbstractPolynomial
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.models.innovations import Innovations
+from sysid.models.linear.innovations import Innovations
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from sysid.estimation.linear.subspace.starts import ENOUGH
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import History, LinearStateSpace
-from sysid.models.linear_state_space import AUTO
+from sysid.models.linear.linear_state_space import AUTO
 
 
 def behind_dead_times(

@@ -151,7 +151,7 @@ def matrices_root(
         start: What stands before each.
 
     Returns:
-        Shape ``(n_entries, n_directions)``, entries as :attr:`sysid.models.innovations.Innovations.entries`.
+        Shape ``(n_entries, n_directions)``, entries as :attr:`sysid.models.linear.innovations.Innovations.entries`.
     """
     rests = tuple(float(rest) for rest in model.ends.rest_outputs)
     _, segments, _ = records_of(traces, model.mapping, model.orders, start=start, rests=rests)

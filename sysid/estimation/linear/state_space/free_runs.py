@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from sysid.estimation.linear.segments import Segment
 from sysid.models import Scaling, VectorScaling
-from sysid.models.beginning import window
-from sysid.models.history import History
-from sysid.models.innovations import Innovations
-from sysid.models.state_space import StateSpace
+from sysid.models.channels.history import History
+from sysid.models.contract.beginning import window
+from sysid.models.linear.innovations import Innovations
+from sysid.models.linear.state_space import StateSpace
 
 Array = NDArray[np.float64]
 

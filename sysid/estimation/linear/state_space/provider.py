@@ -22,7 +22,7 @@ from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import AbstractChart, Directions
 from sysid.estimation.linear.subspace.system import EDGE
 from sysid.kernels import innovations as kernel
-from sysid.models.innovations import Innovations, spectral_radius
+from sysid.models.linear.innovations import Innovations, spectral_radius
 
 Array = NDArray[np.float64]
 

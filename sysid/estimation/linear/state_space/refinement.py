@@ -31,7 +31,7 @@ from sysid.estimation.linear.subspace.system import EDGE, stabilised
 from sysid.estimation.linear.subspace.yardstick import beyond_chance
 from sysid.estimation.results.result import Status
 from sysid.models import LinearStateSpace
-from sysid.models.innovations import Innovations
+from sysid.models.linear.innovations import Innovations
 
 Array = NDArray[np.float64]
 

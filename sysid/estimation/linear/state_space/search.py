@@ -18,7 +18,7 @@ from sysid.estimation.linear.state_space.training import BEST, METHODS, StateSpa
 from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import Subspace
 from sysid.models import LinearStateSpace
-from sysid.models.innovations import Innovations
+from sysid.models.linear.innovations import Innovations
 
 QUICK = 4
 """Steps after which dead times are compared, from one subspace estimate: that which feedback does not bias."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sysid.errors import ConfigError
 from sysid.estimation.linear.subspace.projections import Weighting
-from sysid.models.typed_fields import TypedFields
+from sysid.models.orders.typed_fields import TypedFields
 
 METHODS = ("prediction-error", "subspace")
 

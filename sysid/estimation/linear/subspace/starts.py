@@ -14,7 +14,7 @@ from sysid.estimation.linear.subspace.projections import Weighting, arx_orders, 
 from sysid.estimation.linear.subspace.system import realise
 from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.subspace.yardstick import Yardstick
-from sysid.models.innovations import Innovations
+from sysid.models.linear.innovations import Innovations
 
 Array = NDArray[np.float64]
 

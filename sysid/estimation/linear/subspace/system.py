@@ -8,7 +8,7 @@ from scipy import linalg
 
 from sysid.estimation.linear.subspace.projections import Projection, regress
 from sysid.estimation.linear.subspace.windows import Windows
-from sysid.models.innovations import Innovations, spectral_radius
+from sysid.models.linear.innovations import Innovations, spectral_radius
 
 Array = NDArray[np.float64]
 

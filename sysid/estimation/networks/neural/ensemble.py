@@ -40,7 +40,7 @@ from sysid.estimation.networks.starts.advancing import judged
 from sysid.estimation.networks.starts.choosing import Choice, choose, rank, refusal
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import NeuralEnsemble, NeuralStateSpaceModel, VectorNeuralStateSpaceModel, beginning
-from sysid.models.neural_sizes import Sizes
+from sysid.models.networks.neural_sizes import Sizes
 from sysid.traces import Trace
 
 ALONE = 1.5

@@ -23,7 +23,7 @@ from scipy import linalg
 
 from sysid.kernels.neurons import NEURONS
 from sysid.models import Mapping, NeuralForm
-from sysid.models.neural_sizes import Sizes
+from sysid.models.networks.neural_sizes import Sizes
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]

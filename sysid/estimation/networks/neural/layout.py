@@ -12,7 +12,7 @@ from scipy import linalg
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.neural.start import FLAT_ALPHA, LARGEST_POLE
-from sysid.models.neural_sizes import Sizes
+from sysid.models.networks.neural_sizes import Sizes
 
 READOUT_SPREAD = 1e-4
 """Standard deviation of the readouts of the first start: so small that its free run is the linear model's, even where a

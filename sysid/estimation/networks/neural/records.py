@@ -15,7 +15,7 @@ from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.records.first_samples import is_another, moves_of_shown
 from sysid.kernels import neural_state_space as kernel
 from sysid.models import NeuralForm
-from sysid.models.neural_form import Seen
+from sysid.models.networks.neural_form import Seen
 
 
 @dataclass(frozen=True, eq=False)

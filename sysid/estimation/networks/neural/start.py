@@ -22,8 +22,8 @@ from sysid.estimation.networks.neural.integrators import summed
 from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.kernels import linear as linear_kernel
 from sysid.models import Lags, LinearStateSpace, NeuralForm
-from sysid.models.linear_state_space import MOST_STATES
-from sysid.models.neural_sizes import Sizes
+from sysid.models.linear.linear_state_space import MOST_STATES
+from sysid.models.networks.neural_sizes import Sizes
 
 ARX_ORDERS = (2, 4, 10)
 """Orders of the regressions whose impulse responses are realised: a regression suits noise in the equation, which a

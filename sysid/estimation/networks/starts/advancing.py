@@ -20,10 +20,8 @@ from sysid.estimation.networks.starts.multistart import INITIAL_ALPHA, SETTLED, 
 from sysid.estimation.networks.training import Training
 from sysid.estimation.results.result import Loop, Status
 from sysid.estimation.results.tolerance import outside, spans_of
-from sysid.models import (
-    beginning,
-    gaps,
-)
+from sysid.models import beginning
+from sysid.models.contract import gaps
 
 PRETRAINED = 0.4
 """Share of a fit's time that its starts may take one step ahead."""

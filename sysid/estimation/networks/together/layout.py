@@ -14,8 +14,8 @@ from sysid.estimation.networks.equation_layout import EquationLayout
 from sysid.estimation.networks.together.member_layout import MemberLayout, basis_of
 from sysid.estimation.parameters.named import Named, check_alike, precision_of
 from sysid.models import Member
-from sysid.models.column_recursion import ColumnRecursion
-from sysid.models.declared import Parameter
+from sysid.models.contract.column_recursion import ColumnRecursion
+from sysid.models.grey_box.declared import Parameter
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]

@@ -16,7 +16,7 @@ from sysid.estimation.least_squares.evidence import Group
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.models import Ends, Lags, Member
-from sysid.models.column_recursion import ColumnRecursion
+from sysid.models.contract.column_recursion import ColumnRecursion
 
 MAX_ROWS = 50_000
 """Samples that the basis is scaled to; more say nothing new about the range of a regressor."""

@@ -13,7 +13,7 @@ from sysid.estimation.networks.together.provider import CascadeProvider
 from sysid.estimation.networks.training import check_choice
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import Cascade
-from sysid.models.typed_fields import TypedFields
+from sysid.models.orders.typed_fields import TypedFields
 from sysid.traces import Trace
 
 AUTO: Literal["auto"] = "auto"

@@ -16,7 +16,7 @@ from sysid.estimation.linear.polynomial.starts import inside
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.models import ARMAX, ARX, BJ, OE, Mapping, Start
-from sysid.models.polynomial_orders import AbstractPolynomial
+from sysid.models.linear.polynomial_orders import AbstractPolynomial
 from tests.estimation.linear_systems import trace_of
 
 TWO, FREE = Mapping.parse("u1+u2 -> y"), Start(kind="estimated")

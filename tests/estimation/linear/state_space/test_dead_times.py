@@ -13,7 +13,7 @@ import sysid
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import StateSpaceTraining, fit_state_space
 from sysid.models import History, LinearStateSpace, Mapping, Start, model_from_dict
-from sysid.models.to_control import state_space
+from sysid.models.converting.to_control import state_space
 from sysid.traces import Trace
 from tests.estimation.linear_systems import trace_of
 

@@ -15,7 +15,7 @@ from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.state_space.search import search
 from sysid.models import LinearStateSpace, Mapping, Start, VectorStateSpace, model_from_dict
-from sysid.models.innovations import Innovations
+from sysid.models.linear.innovations import Innovations
 from sysid.traces import Channel, Trace
 from tests.estimation.linear.subspace.test_subspace import TRUE, poles, segment
 from tests.estimation.linear.subspace.test_subspace import C as C_TRUE

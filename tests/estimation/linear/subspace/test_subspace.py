@@ -10,7 +10,7 @@ from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import Subspace
 from sysid.estimation.linear.subspace.windows import Windows
-from sysid.models.innovations import Innovations
+from sysid.models.linear.innovations import Innovations
 
 A = np.array([[0.9, 0.3, 0.0], [-0.3, 0.9, 0.1], [0.0, 0.0, 0.6]])
 B = np.array([[1.0, 0.0], [0.5, 1.0], [1.0, -1.0]])

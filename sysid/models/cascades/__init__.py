@@ -1,0 +1,1 @@
+"""Models wired output to input, and how they run as one."""

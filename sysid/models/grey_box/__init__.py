@@ -1,0 +1,1 @@
+"""Models of equations: what somebody wrote, what is known of its parameters, how it runs, and where it begins."""

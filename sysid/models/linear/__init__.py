@@ -1,0 +1,1 @@
+"""Linear models: ARX, polynomial models, transfer functions, state spaces."""

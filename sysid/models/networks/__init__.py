@@ -1,0 +1,1 @@
+"""Models with neurons: NARX and neural state spaces."""
