@@ -1,12 +1,13 @@
 """Neurons that read and move a few directions beside neurons that read everything, at the same starts and iterations.
 
-    SYSID_DATA=<folder> python -m tests.benchmarks directions [--only=drives,curves] [--seeds=0,1,2]
+    SYSID_DATA=<folder> python -m tests.benchmarks directions [--only=drives,curves] [--seeds=0,1,2] [--first=0]
 
 *Drives*: both records of the Coupled Electric Drives (``ced/DATAUNIF.csv`` in the folder), 400 samples of each to fit
 and the last 100 to test, from 10 and from 4 measured samples; nothing is declared of their sensor, which gives the
 absolute value of a speed. *Curves*: six simulated plants, a static curve between two linear blocks of order 3, 1,000
-samples with noise of 1 % to fit and 3,000 without noise to test. Every structure has six starts, chosen by the
-evidence; a network in few directions begins from one with free neurons, and its time is that of both.
+samples with noise of 1 % to fit and 3,000 without noise to test; ``--first=6`` draws six others. Every structure has
+six starts, chosen by the evidence; a network in few directions begins from one with free neurons, and its time is that
+of both.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ def beside(
             found(f"{what}{name}: {network.label}", median(each), unit, note=note)
 
 
-def drives(seeds: list[int]) -> None:
+def drives(seeds: list[int], _: int) -> None:
     """Both records at once."""
     data = np.genfromtxt(checked("ced/DATAUNIF.csv"), delimiter=",", names=True)
     whole = {n: (data[f"u1{n}"], data[f"z1{n}"]) for n in "12"}
@@ -117,9 +118,9 @@ def curved(plant: int) -> Callable[[Array], Array]:
     return run
 
 
-def curves(seeds: list[int]) -> None:
+def curves(seeds: list[int], first: int) -> None:
     """A static curve between linear blocks."""
-    for plant in range(6):
+    for plant in range(first, first + 6):
         run, rng = curved(plant), np.random.default_rng(1000 + plant)
         u, v = (np.repeat(rng.standard_normal(n // 5), 5) for n in (1000, 3000))
         y, w = run(u), run(v)
@@ -141,4 +142,4 @@ if __name__ == "__main__":
     options = dict(argument.lstrip("-").split("=") for argument in sys.argv[1:] if "=" in argument)
     every = {"drives": drives, "curves": curves}
     for name in options.get("only", ",".join(every)).split(","):
-        every[name]([int(seed) for seed in options.get("seeds", "0,1,2").split(",")])
+        every[name]([int(seed) for seed in options.get("seeds", "0,1,2").split(",")], int(options.get("first", "0")))

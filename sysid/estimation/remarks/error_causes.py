@@ -252,7 +252,9 @@ def _drift(groups: dict[str, list[Array]], y: Array, usable: Mask, name: str) ->
     *_, without = _pursued(columns, target)
     flat = target - line * (line @ target)
     along = np.array([line @ column for column in columns])
-    chosen, weights, within = _pursued([one - line * part for one, part in zip(columns, along, strict=True)], flat)
+    for column, part in zip(columns, along, strict=True):
+        np.subtract(column, line * part, out=column)  # together they are many
+    chosen, weights, within = _pursued(columns, flat)
     if not within @ within < STRAIGHT * (without @ without) or not np.std(without) > WORTH:
         return ""
     slope = float(line @ target - along[chosen] @ weights) * float(np.ptp(line))

@@ -56,7 +56,7 @@ def in_few_directions(given: Mapping[str, Any], training: Training, one: Callabl
     found = one(**given, training=later, initial=first)
     note = f"Begun from {first.model.label}, whose neurons read everything: what bends there gave the directions."
     seconds = first.train_time_s + found.train_time_s
-    return replace(found, notes=(*first.notes, note, *found.notes), train_time_s=seconds)
+    return replace(found, notes=(note, *found.notes), train_time_s=seconds)
 
 
 def run_name(initial: FitResult, network: AbstractStructure) -> str:
