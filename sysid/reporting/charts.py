@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from sysid.reporting.figures.style import MARKERS, PALETTE, TARGET, new_figure, series_style, styled
+from sysid.reporting.figures.style import MARKERS, PALETTE, TARGET, logarithmic, new_figure, series_style, styled
 from sysid.reporting.parts import Picture, picture
 
 
@@ -92,9 +92,9 @@ def chart_figure(chart: Chart) -> Figure:
         for index, line in enumerate(chart.lines):
             _draw(axes, line, index)
         if "x" in chart.logarithmic:
-            axes.set_xscale("log")
+            logarithmic(axes, across=True)
         if "y" in chart.logarithmic:
-            axes.set_yscale("log")
+            logarithmic(axes)
         axes.set_xlabel(chart.x)
         axes.set_ylabel(chart.y)
         if chart.lines:

@@ -129,7 +129,7 @@ def _mse_picture(mapping: str, fits: list[FitRecord], name: str) -> Picture:
     if published:
         series.append(figures.Series(name="published", values=published, published=True))
     figure = figures.cases_figure(series, cases, quantity=f"free-run mse [{squared(fits[0].unit)}]")
-    caption = f"Free-run mse by case and fit, {mapping}; logarithmic, lower is better. A fit without a mark diverges."
+    caption = figures.cases_caption(series, f"Free-run mse by case and fit, {mapping}", "fit")
     return picture(figure, f"Free-run mse by case, {mapping}", caption, name)
 
 

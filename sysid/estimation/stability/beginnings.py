@@ -24,6 +24,10 @@ TWICE = 100
 APART = 0.25
 """Share of the output's range, as a root mean square over the last third, from which on two runs have not met."""
 
+NEARER = 0.75
+"""Share of how far apart they were over the first third that two runs of a slow system are at most over the last half:
+these come together, and are only not there yet."""
+
 SOME = 0.02
 """Share of the sequences on which they may be apart: a joint may be such that no system would pass it. Fits of plants
 that forget came to none in 100."""
@@ -55,8 +59,8 @@ class Beginnings:
         return (
             f"What the free run puts out hangs on where it began, on {self.apart} of {self.sequences} random "
             f"sequences: a second run over the same inputs, begun later, stays more than {100.0 * APART:g} % of the "
-            "output's range away. A plant that rings for long, that locks or swings by itself, is so. Of any other, "
-            "take another start or structure: this one may swing where the plant does not."
+            "output's range away. A plant that is slow or rings for long, that locks or swings by itself, is so. Of "
+            "any other, take another start or structure: this one may swing where the plant does not."
         )
 
 
@@ -75,9 +79,10 @@ def compare_beginnings(
     """
     apart = 0
     for (_, first), (sequence, second) in zip(begun, runs([_later(one) for one, _ in begun]), strict=True):
-        last = len(sequence.inputs) // 2
-        away = (second.reshape(len(second), -1) - first[len(first) - len(second) :])[last:] / width
-        apart += not bool(np.all(np.sqrt(np.mean(away**2, axis=0)) <= APART))  # NaN counts as apart
+        n = len(sequence.inputs)
+        away = (second.reshape(n, -1) - first[len(first) - n :]) / width
+        early, late = (np.sqrt(np.mean(part**2, axis=0)) for part in (away[: n // 3], away[n // 2 :]))
+        apart += not bool(np.all((late <= APART) | (late <= NEARER * early)))  # NaN counts as apart
     return Beginnings(sequences=len(begun), apart=apart)
 
 

@@ -19,7 +19,7 @@ from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.stability.beginnings import TWICE, Beginnings, compare_beginnings
 from sysid.estimation.stability.sequences import AbstractSequences, InputSequence
-from sysid.models import AbstractModel
+from sysid.models import AbstractModel, Beginning, Start, StartKind, beginning
 from sysid.names import csv_cell
 
 SEQUENCES = 1000
@@ -203,7 +203,8 @@ def check_stability(
     largest = np.nan
     worst: tuple[tuple[bool, float], InputSequence, NDArray[np.float64]] | None = None
     begun: list[tuple[InputSequence, NDArray[np.float64]]] = []
-    for sequence, output in free_runs(model, _in_time(sequences.draw(count, seed), until)):
+    runs = partial(free_runs, model, within=(low, high))
+    for sequence, output in runs(_in_time(sequences.draw(count, seed), until)):
         drawn += 1
         outputs = output.reshape(len(sequence.inputs), -1)
         begun += [(sequence, outputs)] if drawn <= TWICE else []
@@ -238,7 +239,7 @@ def check_stability(
         beyond=further,
         asked=sequences.available(count),
         # What runs away is not asked whether it forgets.
-        beginnings=None if unbounded or unsettled else compare_beginnings(partial(free_runs, model), begun, width),
+        beginnings=None if unbounded or unsettled else compare_beginnings(runs, begun, width),
     )
 
 
@@ -280,7 +281,10 @@ def _says_nothing(
 
 
 def free_runs(
-    model: AbstractModel | Run, sequences: Iterable[InputSequence]
+    model: AbstractModel | Run,
+    sequences: Iterable[InputSequence],
+    *,
+    within: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> Iterator[tuple[InputSequence, NDArray[np.float64]]]:
     """Each sequence with the run over it, in order; a model's kernels leave the interpreter to a second thread.
 
@@ -289,6 +293,8 @@ def free_runs(
     Args:
         model: A model of the sequences' outputs, or a function that runs anything over a sequence.
         sequences: What is run.
+        within: Least and greatest output of the records. A model with a state begins where nothing changes at the first
+            inputs, which a slow system may never have come near: it then begins by the first outputs of the sequence.
 
     Yields:
         A sequence, and the outputs: shape ``(n_samples,)`` or ``(n_samples, n_outputs)``.
@@ -297,9 +303,19 @@ def free_runs(
         yield from ((sequence, model(sequence)) for sequence in sequences)
         return
     several, dealt = model.structure.several_outputs, model.variants
+    begun: dict[tuple[int, bytes], Beginning] = {}
 
     def run(one: InputSequence, variant: AbstractModel) -> NDArray[np.float64]:
-        return variant.simulate(one.inputs, one.history(several=several))
+        outputs = variant.simulate(one.inputs, one.history(several=several))
+        if within is None or not _lost(outputs.reshape(len(one.inputs), -1)[:1], *within):
+            return outputs
+        targets = one.targets if several else one.targets[:, 0]
+        # Sequences of one record begin alike, but for how fast they run; to look for a state takes longer than a run.
+        key = id(variant), np.concatenate([one.inputs[0], one.targets[0]]).tobytes()
+        if key not in begun:
+            begun[key] = beginning(variant, one.inputs, targets, Start(kind=StartKind.ESTIMATED))
+        at = begun[key]
+        return np.concatenate([targets[: at.first], variant.simulate(one.inputs[at.first :], at.history)])
 
     waiting, turns = iter(sequences), cycle(dealt)
     with ThreadPoolExecutor(2) as pool:

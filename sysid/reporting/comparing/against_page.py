@@ -189,7 +189,7 @@ def _cases(found: Comparison, output: str) -> Section:
         for side, name in (("ours", first), ("theirs", second))
     ]
     drawing = figures.cases_figure(series, [c.case for c in contests], quantity=f"free-run mse [{squared(one.unit)}]")
-    caption = "Free-run mse by case; logarithmic, lower is better. A run without a mark diverges."
+    caption = figures.cases_caption(series, "Free-run mse by case", "run")
     name = identifier(output) if several else ""
     return Section(
         anchor=f"cases-{name}" if several else "cases",

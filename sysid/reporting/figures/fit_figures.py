@@ -12,7 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sysid.reporting.figures.style import DASHES, PALETTE, PUBLISHED, TARGET, new_figure, series_style, styled
+from sysid.reporting.figures.style import (
+    DASHES,
+    PALETTE,
+    PUBLISHED,
+    TARGET,
+    logarithmic,
+    new_figure,
+    series_style,
+    styled,
+)
 from sysid.reporting.figures.thinning import distinct_points, thin
 from sysid.reporting.fit_records import CaseRecord, LearningCurve
 from sysid.reporting.numbers import number
@@ -226,7 +235,7 @@ def learning_figure(curves: Dict[str, LearningCurve | None], *, unit: str) -> Fi
             mse = np.array(curve.mse, dtype=np.float64)
             x, y = thin(np.array(curve.iteration, dtype=np.float64), np.where(mse > 0.0, mse, np.nan), _COLUMNS)
             axes.plot(x, y, **style, markevery=max(1, len(x) // 8), markersize=4, label=name)
-        axes.set_yscale("log")
+        logarithmic(axes)
         axes.set_xlabel("iteration")
         axes.set_ylabel(f"mse on the estimation records [{unit}]")
         axes.legend(loc="upper right")
@@ -256,13 +265,29 @@ def cases_figure(series: Sequence[Series], cases: Sequence[str], *, quantity: st
             if row.published:
                 style = {"color": PUBLISHED, "marker": "_", "markersize": 13, "markeredgewidth": 2.4}
             axes.plot(x, values, **{"markersize": 6, **style, "linestyle": "none"}, label=row.name)
-        axes.set_yscale("log")
+        logarithmic(axes)
         axes.set_xticks(place, list(cases), rotation=90 if sum(map(len, cases)) > LETTERS else 0)
         axes.set_xlim(-0.5, len(cases) - 0.5)
         axes.grid(visible=False, axis="x")
         axes.set_ylabel(quantity)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
         return figure
+
+
+def cases_caption(series: Sequence[Series], drawn: str, what: str) -> str:
+    """What stands below :func:`cases_figure`.
+
+    Args:
+        series: Its rows.
+        drawn: What it shows.
+        what: What a row is: ``"fit"`` or ``"run"``.
+
+    Returns:
+        The caption.
+    """
+    exact = any(value == 0.0 for row in series for value in row.values.values())
+    without = "diverges, or has an error of 0" if exact else "diverges"
+    return f"{drawn}; logarithmic, lower is better. A {what} without a mark {without}."
 
 
 def run_time_figure(seconds: Dict[str, float], *, quantity: str) -> Figure:
@@ -311,7 +336,7 @@ def size_figure(results: Results) -> Figure:
             effective = 0.0 if fit.evidence is None else sum(fit.evidence.effective_parameters.values())
             if 0.0 < effective < fit.n_parameters:
                 axes.plot([effective, fit.n_parameters], [error, error], color=style["color"], linewidth=1.0)
-        axes.set_yscale("log")
+        logarithmic(axes)
         axes.set_xlabel("parameters (the line reaches to the effective ones)")
         axes.set_ylabel(f"free-run mse [{squared(results.fits[0].unit)}]")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

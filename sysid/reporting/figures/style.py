@@ -9,6 +9,8 @@ from contextlib import AbstractContextManager
 from typing import Any, Final
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.text import Text
@@ -69,6 +71,18 @@ def series_style(index: int) -> dict[str, Any]:
 def styled() -> AbstractContextManager[None]:
     """A context inside which figures are made, drawn on and saved in the style of the reports."""
     return mpl.rc_context(_STYLE)
+
+
+def logarithmic(axes: Axes, *, across: bool = False) -> None:
+    """A logarithmic axis, where anything that is drawn has a logarithm: what never changes may have no error.
+
+    Args:
+        axes: With its lines.
+        across: Whether it is the axis of ``x``.
+    """
+    drawn = (np.asarray(line.get_xdata() if across else line.get_ydata(), float) for line in axes.get_lines())
+    if any((values > 0.0).any() for values in drawn):
+        (axes.set_xscale if across else axes.set_yscale)("log")
 
 
 class Drawing(Figure):

@@ -112,7 +112,9 @@ def bode_of(known: Known, *, frequency: Any = None, points: int = 200, seed: int
         none = np.full((2, len(w)), np.nan)
         gains.append(band(np.abs(drawn)) if len(drawn) else none)
         phase = np.unwrap(np.angle(shown))
-        phases.append(np.degrees(band(phase + np.angle(drawn / shown))) if len(drawn) else none)
+        # By the angle between them: of what is 0 throughout no quotient is a number.
+        turned = drawn * np.exp(-1j * np.angle(shown))
+        phases.append(np.degrees(band(phase + np.angle(turned))) if len(drawn) else none)
     bands = {"gain": gains, "phase": phases}
     ends: dict[str, Any] = {
         f"{name}_{end}": np.column_stack([one[side] for one in found])

@@ -194,6 +194,9 @@ class Bode(_Response):
     def __str__(self) -> str:
         lines = []
         for k, (name, (y, u)) in enumerate(zip(self.names, self.units, strict=True)):
+            if not self.gain[:, k].any():
+                lines.append(f"{name}: no effect in the model")
+                continue
             at = int(np.argmax(self.gain[:, k]))
             peak = _with_interval(self.gain[at, k], self.gain_low[at, k], self.gain_high[at, k], _over(y, u))
             lines.append(f"{name}: largest gain {peak} at {quantity(float(self.frequency[at]), 'rad/s')}")

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sysid.names import output_side
-from sysid.reporting.figures.style import PALETTE, new_figure, styled
+from sysid.reporting.figures.style import PALETTE, logarithmic, new_figure, styled
 from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, picture
@@ -145,8 +145,7 @@ def amplitude_figure(found: list[Band], *, label: str, unit: str) -> Figure:
             ([band.rms for band in found], "s", PALETTE[0], "rms error"),
         ):
             axes.plot(middle, values, mark, color=color, markersize=6, label=name)
-        if any(band.largest > 0.0 for band in found):
-            axes.set_yscale("log")
+        logarithmic(axes)
         axes.set_xlabel(f"target {label} [{unit}]")
         axes.set_ylabel(f"error [{unit}]")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)

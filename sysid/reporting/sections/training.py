@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sysid.estimation.estimators import ESTIMATORS
-from sysid.reporting.figures.style import MARKERS, PALETTE, new_figure, styled
+from sysid.reporting.figures.style import MARKERS, PALETTE, logarithmic, new_figure, styled
 from sysid.reporting.fit_records import AttemptRecord, CaseRecord, FitRecord
 from sysid.reporting.numbers import number
 from sysid.reporting.parts import Part, Section, identifier, picture
@@ -238,7 +238,7 @@ def attempts_figure(fit: FitRecord) -> Figure:
         panels = figure.subplots(1, 2 if both else 1, squeeze=False)[0]
         if both:
             _scatter(panels[0], fit, [a.estimation_mse for a in fit.attempts], chosen_by)
-            panels[0].set_xscale("log")
+            logarithmic(panels[0], across=True)
             panels[0].set_xlabel(f"mse on the estimation records [{error_unit(fit)}]")
             panels[0].set_ylabel(f"mse on the selection traces [{error_unit(fit)}]")
         errors = chosen_by if both else [attempt.estimation_mse for attempt in fit.attempts]
@@ -262,7 +262,7 @@ def _scatter(axes: Axes, fit: FitRecord, across: list[float], up: list[float]) -
         axes.plot(
             x[points], y[points], linestyle="none", marker=marker, color=colour, markersize=size, alpha=0.8, label=label
         )
-    axes.set_yscale("log")
+    logarithmic(axes)
 
 
 def groups_table(fit: FitRecord) -> Table:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import sysid
 from sysid.errors import TraceError
 from sysid.estimation.stability import excursions as module
 from sysid.models import ARX, ARXModel, Mapping
@@ -257,3 +258,24 @@ def test_inputs_go_beyond_what_was_recorded_and_no_plateau_is_judged_there():
     parameter = replace(record(), values=record().values * [1.0, 0.0, 1.0] + [0.0, 2.0, 0.0])
     sequence = next(Excursions.of([parameter], ["a", "b"], ["y"], 1.5).draw(1, 1))
     assert set(sequence.inputs[:, 1]) == {2.0}  # what does not move in a record is a parameter
+
+
+@pytest.mark.parametrize(("pole", "stable"), [(0.995, True), (1.01, False)])
+def test_a_slow_plant_begins_where_its_record_does_and_not_at_an_equilibrium_it_never_saw(
+    pole: float, stable: bool
+) -> None:
+    """A battery warms with the square of its current: at rest under the first one it is far above the record."""
+    current = np.concatenate([[3.0] * 20, np.repeat(np.random.default_rng(0).uniform(-3.0, 3.0, 49), 20)])
+    warm = np.zeros(1000)
+    for k in range(999):
+        warm[k + 1] = 0.995 * warm[k] + 0.02 * current[k] ** 2
+    (record,) = sysid.data((current, warm + 0.02 * np.random.default_rng(1).standard_normal(1000)), sample_time=1.0)
+    equations = sysid.GreyBox(
+        equations=f"x[k+1] = {pole}*x + g*u^2\ny = x", parameters={"g": {"start": 0.02, "fixed": True}}
+    )
+    model = sysid.fit([record], "u -> y", equations, stability=sysid.StabilityOptions(count=0)).model
+    found = check_stability(model, Excursions.of([record], ["u"], ["y"]), count=50)
+    assert found.stable is stable
+    if stable:
+        assert found.forgets  # two runs come nearer to each other, and are not there yet
+        assert model.simulate(current[:1, np.newaxis])[0] > 2.0 * warm.max()  # from rest

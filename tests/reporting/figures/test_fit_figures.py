@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from sysid.reporting.figures.fit_figures import Series, case_figure, cases_figure, learning_figure
+from sysid.reporting.figures.fit_figures import Series, case_figure, cases_caption, cases_figure, learning_figure
 from sysid.reporting.figures.style import DASHES, MARKERS, PALETTE, series_style
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.fit_records import LearningCurve
@@ -101,3 +101,14 @@ def test_what_cannot_stand_on_a_logarithmic_axis_is_left_out() -> None:
     assert drawn == [1, 0]
     curve = LearningCurve(iteration=[0.0, 1.0, 2.0], mse=[1.0, float("nan"), 0.0])
     assert learning_figure({"a": curve}, unit="psi²").axes[0].get_yscale() == "log"
+
+
+def test_what_has_no_error_has_no_logarithm_and_the_caption_says_so() -> None:
+    """Of an output that never changes every fit is exact; matplotlib warned on the screen."""
+    exact = [Series(name="a", values={"A": 0.0, "B": 0.0})]
+    axes = cases_figure(exact, ["A", "B"], quantity="mse").axes[0]
+    assert axes.get_yscale() == "linear"
+    assert cases_caption(exact, "Free-run mse", "fit").endswith("A fit without a mark diverges, or has an error of 0.")
+    some = [*exact, Series(name="b", values={"A": 1.0, "B": 2.0})]
+    assert cases_figure(some, ["A", "B"], quantity="mse").axes[0].get_yscale() == "log"
+    assert cases_caption(some[1:], "Free-run mse", "fit").endswith("A fit without a mark diverges.")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+import sysid
 from sysid.estimation import FitResult, TransferFunctionTraining, fit_transfer_function
 from sysid.models import Mapping, TransferFunction
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
@@ -88,3 +89,16 @@ def test_a_zero_far_off_is_counted_and_does_not_shrink_the_circle() -> None:
     axes = pole_zero_figure(far, None).axes[0]
     assert axes.get_xlim() == (-1.5, 1.5)
     assert "zeros (1 outside)" in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def test_an_output_without_any_response_has_a_bode_diagram_and_no_warning() -> None:
+    """Its coefficients are 0 with a deviation: the draws' phases were told by a quotient of 0."""
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 50), 8)
+    y = np.convolve(u, 0.1 * 0.9 ** np.arange(400))[:400] + 0.01 * rng.standard_normal(400)
+    traces = sysid.data((u, np.column_stack([y, np.full(400, 3.0)])), sample_time=1.0)
+    fit = sysid.fit(traces, "u -> y1+y2", sysid.LinearStateSpace(states=1))
+    found = fit.bode()
+    assert np.all(found.values[:, 1] == 0.0)
+    assert "y2 from u: no effect in the model" in str(found)
+    assert np.all(found.phase_low[:, 0] <= found.phase[:, 0]) and np.all(found.phase[:, 0] <= found.phase_high[:, 0])
