@@ -30,7 +30,7 @@ def test_every_file_of_every_exporter_is_in_this_contract(rows, narx, declared, 
 
 def test_output_equals_the_models_free_run(exported, inputs, past):
     model, history = exported.model, past(exported.model)
-    for n_samples in (1, 7, 500):
+    for n_samples in (1, 7, 200):
         u = inputs(n_samples, len(model.mapping.inputs))
         run = exported.run(u[:, np.newaxis], exported.layout.from_history(history)[np.newaxis])
         assert run.output.shape == (n_samples, 1, 1)
