@@ -43,8 +43,8 @@ from sysid.models import (
 )
 from sysid.models.contract.ratio import Ratio
 from sysid.models.linear.innovations import Innovations
-from sysid.models.linear.linear_state_space import polynomials
 from sysid.models.linear.polynomial_orders import AbstractPolynomial
+from sysid.models.linear.state_space_polynomials import polynomials
 from sysid.reporting.linear.step_responses import band
 from sysid.reporting.linear_views import LinearView, linear_views
 from sysid.traces import Channel, Trace

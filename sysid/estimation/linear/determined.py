@@ -15,9 +15,9 @@ from sysid.estimation.records.informative import informative
 from sysid.estimation.results.result import FitResult
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import Domain, Mapping, Scaling, TransferFunction, TransferFunctionModel
-from sysid.models.linear.linear_state_space import state_space_names
 from sysid.models.linear.polynomial import PolynomialModel
 from sysid.models.linear.polynomial_orders import AbstractPolynomial
+from sysid.models.linear.state_space_polynomials import state_space_names
 from sysid.models.orders.structure import AbstractStructure
 
 S = TypeVar("S", bound=AbstractStructure)

@@ -24,6 +24,7 @@ from sysid.models.linear.innovation_moves import InnovationModel
 from sysid.models.linear.innovations import Innovations
 from sysid.models.linear.linear_forms import LinearForms
 from sysid.models.linear.state_space import Filter, StateSpace
+from sysid.models.linear.state_space_polynomials import polynomials
 from sysid.models.orders.lags import MOST, per_input, whole
 from sysid.models.orders.ranges import IntRange
 from sysid.models.orders.structure import AbstractStructure
@@ -359,55 +360,3 @@ def continuous_form(model: _StateSpaceModel) -> ContinuousStateSpace:
         A=A, B=B, C=gain * system.C, D=gain * system.D / np.array(model.scaling.input_scale),
         delays=tuple(k * model.sample_time for k in late), mapping=model.mapping,
     )  # fmt: skip
-
-
-def state_space_names(orders: LinearStateSpace, mapping: Mapping) -> tuple[str, ...]:
-    """What the coefficients of a state space's polynomials are called.
-
-    Args:
-        orders: The structure, with its dead times.
-        mapping: Its channels.
-
-    Returns:
-        ``B(input, lag)``, ``F(lag)``, ``C(lag)`` of the innovations and ``constant``; of several outputs
-        ``B(output, input, lag)``, ``F(lag)``, ``C(output, innovation, lag)`` and ``constant(output)``.
-    """
-    outputs, first, n = mapping.outputs, orders.shortest, orders.states
-    of = [""] if len(outputs) == 1 else [f"{name}, " for name in outputs]
-    late = zip(mapping.inputs, orders.shifts(len(mapping.inputs)), strict=True)
-    lags = {u: range(first + k, n + 1 + k) for u, k in late}
-    names = [f"B({o}{u}, {lag})" for o in of for u, at in lags.items() for lag in at]
-    names += [f"F({lag})" for lag in range(1, n + 1)]
-    names += [f"C({o}{e}{lag})" for o in of for e in of for lag in range(1, n + 1)] * orders.noise
-    single = len(outputs) == 1
-    return (*names, *(["constant"] if single else [f"constant({name})" for name in outputs]) * orders.intercept)
-
-
-def polynomials(system: Innovations) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    r"""A state space as polynomials in ``1/z``, by Faddeev and LeVerrier.
-
-    :math:`\det(I - A q^{-1})` and :math:`C\,\mathrm{adj}(I - A q^{-1})\,B q^{-1} + D \det` come out of one
-    recursion of products and sums, so that complex steps give exact derivatives.
-
-    Args:
-        system: The system.
-
-    Returns:
-        The denominator, shape ``(n + 1,)``; the numerators of inputs, shape ``(n_outputs, n_inputs, n + 1)``; and those
-        of innovations, shape ``(n_outputs, n_outputs, n + 1)``.
-    """
-    A, n = system.A, system.n_state
-    drive = np.concatenate([system.B, system.K], axis=1)
-    direct = np.concatenate([system.D, np.eye(system.n_outputs)], axis=1)
-    F = np.zeros(n + 1, dtype=A.dtype)
-    F[0] = 1.0
-    rows = np.zeros((system.n_outputs, drive.shape[1], n + 1), dtype=A.dtype)
-    M = np.eye(n, dtype=A.dtype)
-    for k in range(1, n + 1):
-        rows[:, :, k] = system.C @ M @ drive
-        AM = A @ M
-        F[k] = -np.trace(AM) / k
-        M = AM + F[k] * np.eye(n)
-    rows += direct[:, :, np.newaxis] * F
-    m = system.n_inputs
-    return F, rows[:, :m], rows[:, m:]

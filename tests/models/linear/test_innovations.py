@@ -9,7 +9,7 @@ from scipy import signal
 import sysid
 from sysid.models import History
 from sysid.models.linear.innovations import Innovations
-from sysid.models.linear.linear_state_space import polynomials
+from sysid.models.linear.state_space_polynomials import polynomials
 
 
 def system(n: int = 3, m: int = 2, p: int = 2) -> Innovations:

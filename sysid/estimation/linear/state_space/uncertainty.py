@@ -13,7 +13,7 @@ from sysid.estimation.linear.state_space.refinement import Found
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import LinearStateSpaceModel, VectorStateSpaceModel
 from sysid.models.linear.innovations import Innovations
-from sysid.models.linear.linear_state_space import polynomials, state_space_names
+from sysid.models.linear.state_space_polynomials import polynomials, state_space_names
 
 Array = NDArray[np.float64]
 
