@@ -12,9 +12,23 @@ from numpy.typing import NDArray
 from sysid.api.abstract_fit import AbstractFit
 from sysid.api.fits import Fit, check_outputs
 from sysid.errors import ChannelError
+from sysid.estimation.results.result import Status
 from sysid.ingest.memory.run_records import before_a_run, measured_of
 from sysid.models import Cascade, Start
 from sysid.traces import TraceSet
+
+TRUSTED_LEAST = (
+    Status.UNSTABLE,
+    Status.NOT_IMPROVED,
+    Status.INTERRUPTED,
+    Status.STALLED,
+    Status.TIME_LIMIT,
+    Status.MAX_ITERATIONS,
+    Status.STOPPED_EARLY,
+    Status.CONVERGED,
+    Status.EXACT,
+)
+"""How fits end, that first of which a system is trusted no more than its worst part."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -44,6 +58,21 @@ class SystemFit(AbstractFit):
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs, in the mapping's order."""
         return tuple(self.fits)
+
+    @property
+    def status(self) -> Status:
+        """How its fits ended: that of the one to be trusted least."""
+        return min((fit.status for fit in self.fits.values()), key=TRUSTED_LEAST.index)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is told of its fits, behind the name of each output."""
+        return tuple(f"{name}: {note}" for name, fit in self.fits.items() for note in fit.notes)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Of these, what asks to be looked at."""
+        return tuple(f"{name}: {note}" for name, fit in self.fits.items() for note in fit.warnings)
 
     def __getitem__(self, output: str) -> Fit:
         if output not in self.fits:

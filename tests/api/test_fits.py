@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 import sysid
+from sysid.api.system_fit import TRUSTED_LEAST
 from sysid.errors import ChannelError, ConfigError, TraceError, UserError
+from sysid.estimation import Status
 from sysid.models import History
 
 U = np.repeat([0.0, 1.0, -1.0, 0.5, 0.0], 20)
@@ -372,3 +375,18 @@ def test_a_level_that_a_model_happens_to_rest_at_is_no_level_to_begin_at(first: 
         assert_allclose(one.simulate(held, initial=first), held, atol=1e-6)
     arx = sysid.fit(traces, "u -> y", ORDERS)
     assert_allclose(arx.simulate(u, initial=first)[0], 0.8 * first + 0.1, atol=1e-9)
+
+
+def test_a_fit_of_several_outputs_says_how_it_ended_as_any_other() -> None:
+    """A loop over structures asked each fit for its status, and that of several models had none."""
+    assert set(TRUSTED_LEAST) == set(Status)
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 30), 10)
+    y = np.convolve(u, 0.1 * 0.9 ** np.arange(300))[:300] + 0.01 * rng.standard_normal(300)
+    traces = sysid.data((u, np.column_stack([y, np.full(300, 2.0)])), sample_time=1.0)
+    fit = sysid.fit(traces, "u -> y1+y2", sysid.ARX(na=1, nb=1, nk=1))
+    assert isinstance(fit, sysid.SystemFit)
+    assert fit.status is Status.EXACT
+    assert any(note.startswith("y2: y2 never changes") for note in fit.warnings)
+    worse = replace(fit["y1"], status=Status.UNSTABLE)
+    assert sysid.SystemFit.of({"y1": worse, "y2": fit["y2"]}).status is Status.UNSTABLE
