@@ -80,9 +80,10 @@ def compare_beginnings(
     apart = 0
     for (_, first), (sequence, second) in zip(begun, runs([_later(one) for one, _ in begun]), strict=True):
         n = len(sequence.inputs)
-        away = (second.reshape(n, -1) - first[len(first) - n :]) / width
-        early, late = (np.sqrt(np.mean(part**2, axis=0)) for part in (away[: n // 3], away[n // 2 :]))
-        apart += not bool(np.all((late <= APART) | (late <= NEARER * early)))  # NaN counts as apart
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that explodes is apart, as NaN is
+            away = (second.reshape(n, -1) - first[len(first) - n :]) / width
+            early, late = (np.sqrt(np.mean(part**2, axis=0)) for part in (away[: n // 3], away[n // 2 :]))
+            apart += not bool(np.all((late <= APART) | (np.isfinite(late) & (late <= NEARER * early))))
     return Beginnings(sequences=len(begun), apart=apart)
 
 

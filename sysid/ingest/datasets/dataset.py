@@ -28,15 +28,17 @@ Progress = Callable[[str, int, int], None]
 def _check_text(path: Path) -> None:
     """Refuse a file that is no description but something else, such as a record of a kind that no reader knows."""
     with path.open("rb") as file:
-        if b"\0" in file.read(4096):
-            choose_reader(path, READERS)  # says which kinds there are, or
-            raise ConfigError(
-                "the file is no description of a data set",
-                where=path,
-                expected="a YAML file, or a name or a file of traces",
-                got="a file that is no text",
-                remedy="sysid ingest FILE looks into a file of traces",
-            )
+        is_text = b"\0" not in file.read(4096)
+    if is_text and path.suffix.lower() in {".yaml", ".yml"}:
+        return
+    choose_reader(path, READERS)  # says which kinds there are, or
+    raise ConfigError(
+        "the file is no description of a data set",
+        where=path,
+        expected="a YAML file, or a name or a file of traces",
+        got=f"a name that ends in {path.suffix}" if is_text and path.suffix else "a file that is no text",
+        remedy="sysid ingest FILE looks into a file of traces",
+    )
 
 
 def find_dataset(name_or_path: str | Path, *, search: Sequence[Path] | None = None) -> Path:

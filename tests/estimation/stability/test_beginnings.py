@@ -9,7 +9,7 @@ import pytest
 
 from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.estimation.stability import StabilityOptions
-from sysid.estimation.stability.beginnings import Beginnings
+from sysid.estimation.stability.beginnings import Beginnings, compare_beginnings
 from sysid.estimation.stability.check import FreeRunCheck
 from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import Run, check_stability
@@ -56,6 +56,16 @@ def test_a_run_that_swings_by_itself_does_not_forget_where_it_began(run: Run | A
     assert found.beginnings.sequences == 100
     assert found.forgets is forgets
     assert found.to_dict().get("apart", 0) == (0 if forgets else found.beginnings.apart)
+
+
+@pytest.mark.parametrize("far", [1e200, np.inf, np.nan])
+def test_a_second_run_that_explodes_is_apart_and_warns_of_nothing(far: float) -> None:
+    sequence = InputSequence(name="a", inputs=np.zeros((30, 1)), targets=np.zeros(30), judged=np.ones(30, dtype=bool))
+    found = compare_beginnings(
+        lambda some: ((one, np.full((len(one.inputs), 1), far)) for one in some), [(sequence, np.zeros((30, 1)))],
+        np.ones(1),
+    )  # fmt: skip
+    assert (found.sequences, found.apart) == (1, 1)
 
 
 def test_what_leaves_its_bounds_is_not_asked() -> None:

@@ -303,3 +303,17 @@ def test_only_what_a_generator_makes_is_still_to_be_made(
     lacking = unmade(write("dataset.yaml", MIXED))
     assert lacking is not None
     assert lacking.cases == 1
+
+
+@pytest.mark.parametrize("name", ["page.html", "sheet.pdf", "record"])
+def test_a_text_of_another_kind_is_no_description(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("<html><body>a page</body></html>", encoding="utf-8")
+    with pytest.raises(ReaderError, match="no reader knows this kind of file"):
+        find_dataset(tmp_path / name)
+
+
+def test_a_record_is_no_description(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("t,u,y\n0,1,2\n1,2,3\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="no description of a data set") as refused:
+        find_dataset(tmp_path / "run.csv")
+    assert ".csv" in str(refused.value)
