@@ -28,6 +28,9 @@ Out = Annotated[Path | None, typer.Option(help="Folder for the table (.csv) and 
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Read everything, say what would be done, and do nothing.")]
 
 
+MISSED = 10.0
+"""Metres from a stop beyond which a train has not stopped there (ours)."""
+
 FARTHEST = 100_000.0
 """Metres ahead that anything here is asked for."""
 
@@ -179,11 +182,17 @@ def drive(
     stands = "stands" if run.speed[-1] <= 0.01 else "is"
     typer.echo(
         f"{stands} at {run.position[-1]:.2f} m after {run.motion.time[-1]:.1f} s; "
-        f"{run.notch_changes} changes of notch, {run.traction_work / 3.6e6:.2f} kWh of traction, "
+        f"{run.notch_changes} {'change' if run.notch_changes == 1 else 'changes'} of notch, "
+        f"{run.traction_work / 3.6e6:.2f} kWh of traction, "
         + (f"{3.6 * over:.1f} km/h over a limit" if over > 0.0 else "no limit passed")
     )
     if stands == "is":
         typer.echo(f"note: it has not stopped within {longest:g} s")
+    elif abs(missed := float(run.position[-1]) - stop) > MISSED:
+        typer.echo(
+            f"note: it stands {abs(missed):.0f} m {'past' if missed > 0.0 else 'before'} the stop"
+            + (": begin the automatic stop earlier (--point)" if missed > 0.0 else "")
+        )
     if out is not None:
         columns = {
             "time_s": run.motion.time, "position_m": run.position, "speed_m_s": run.speed, "limit_m_s": limits,

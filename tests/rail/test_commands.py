@@ -193,3 +193,9 @@ def test_cylinders_that_still_rise_at_the_end_are_told(seconds: int, told: bool)
     """Nine tenths of what they have by then is a time that means nothing."""
     said = run(["eot", "--pairs", "5", "--handle", "0", "--seconds", str(seconds)])
     assert (f"at {seconds} s cylinders still rise, the valve is open" in said) is told
+
+
+@pytest.mark.parametrize(("point", "told"), [(990.0, True), (700.0, False)])
+def test_a_stop_that_is_missed_is_told(point: float, told: bool) -> None:
+    said = run([*DRIVE, "--point", str(point)])
+    assert ("past the stop: begin the automatic stop earlier (--point)" in said) is told

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.estimation import Training
 from sysid.estimation.estimator import Estimator
 from sysid.estimation.estimators import ESTIMATORS
@@ -269,7 +270,30 @@ class _Wrapped(BaseModel):
 
 
 def _checked(fields: Mapping[str, Any], where: str) -> AbstractStructure:
-    return check(_Wrapped, {"structure": dict(fields)}, where=where).structure
+    try:
+        return check(_Wrapped, {"structure": dict(fields)}, where=where).structure
+    except ConfigError as error:
+        # A list, or two numbers with a colon, where one number stands: several were meant to be tried.
+        meant = next(
+            (name for name, value in fields.items() if error.got == shortened(value) and _several(value)), None
+        )
+        if meant is None:
+            raise
+        raise ConfigError(
+            error.what,
+            where=f"{error.where}, {meant}",
+            expected=f"{error.expected}, or a range",
+            got=error.got,
+            remedy=f"to try each, write {meant}: {_several(fields[meant])}",
+        ) from None
+
+
+def _several(value: object) -> str:
+    """The range that was meant; empty where none can be."""
+    if isinstance(value, list) and value and all(isinstance(one, int | float | str) for one in value):
+        return f"{{among: {value}}}"
+    ends = re.fullmatch(r"\s*(\d+)\s*(?::|\.\.|-)\s*(\d+)\s*", value) if isinstance(value, str) else None
+    return f"{{from: {ends[1]}, to: {ends[2]}}}" if ends else ""
 
 
 def _many(value: object) -> typing.TypeGuard[list[Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+import yaml
 
 from sysid.errors import ConfigError
 from sysid.field_checks import check
@@ -169,3 +170,28 @@ def test_the_built_in_sweeps_try_five_hundred_networks(name: str) -> None:
     config = read_sweep_file(find_pipeline(name)).config
     assert len(config.space().points()) == 500
     assert (config.choose.on == "cases") == (config.reproduces is not None)
+
+
+@pytest.mark.parametrize(
+    ("fields", "name", "points"),
+    [
+        ({"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": [2, 5]}, "neurons", 2),
+        ({"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": "2:5"}, "neurons", 4),
+        ({"kind": "HammersteinWiener", "states": [1, 2, 3]}, "states", 3),
+        ({"kind": "SS", "states": "1..2"}, "states", 2),
+        ({"kind": "PolynomialNARX", "terms": [3, 5]}, "terms", 2),
+    ],
+)
+def test_several_values_where_one_stands_are_refused_with_the_range_that_was_meant(
+    fields: dict[str, Any], name: str, points: int
+) -> None:
+    with pytest.raises(ConfigError) as refused:
+        parse_space([fields], {}, 2).points()
+    meant = yaml.safe_load(str(refused.value.remedy).removeprefix("to try each, write "))
+    assert set(meant) == {name}
+    assert len(parse_space([{**fields, **meant}], {}, 2).points()) == points
+
+
+def test_a_number_that_is_none_keeps_its_own_remedy() -> None:
+    with pytest.raises(ConfigError, match="neurons: 20"):
+        parse_space([{"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": -3}], {}, 2).points()
