@@ -181,7 +181,7 @@ def test_a_study_that_was_killed_goes_on_and_runs_nothing_twice(tmp_path: Path) 
     log.touch()
     environment = {**os.environ, "SYSID_TEST_COUNT": str(log)}
     command = [sys.executable, "-c", KILLED, reference("counted").model_dump_json(), str(tmp_path / "kept")]
-    kills = 10
+    kills = 5
     for _ in range(kills):
         begun = len(log.read_text().splitlines())
         study = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE)
