@@ -167,10 +167,11 @@ def _around_neural(one: Try, looked: Looked) -> list[Try]:
     network = cast("NeuralStateSpace", one.structure)
     wider = {"neurons": round(1.6 * network.neurons) + 1}
     narrower = {"neurons": max(1, round(0.6 * network.neurons))}
-    # A curve in a linear plant acts in one direction; on the output too, where the block behind it answers at once.
-    few = network.directions
-    fewer = {"directions": 1, "output_neurons": network.neurons} if few is None else {"directions": few + 1}
-    moves: list[dict[str, Any]] = [{"states": network.states + 1}, wider, fewer]
+    moves: list[dict[str, Any]] = [{"states": network.states + 1}, wider]
+    if network.neurons:
+        # A curve in a linear plant acts in one direction; on the output too, where the block behind it answers at once.
+        few = network.directions
+        moves.append({"directions": 1, "output_neurons": network.neurons} if few is None else {"directions": few + 1})
     if network.integrators:
         moves.insert(0, {"integrators_seen": not network.integrators_seen})
     elif looked.never_negative:

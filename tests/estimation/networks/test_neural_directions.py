@@ -153,6 +153,13 @@ def test_a_plant_with_one_curve_is_found_with_one_direction() -> None:
     assert np.isfinite(fit.posterior.factor).all()
 
 
+def test_without_neurons_there_are_none_to_seek() -> None:
+    network = NeuralStateSpace(states=2, neurons=0, directions=1)
+    fit = fit_neural_state_space([spring(0)], MAPPING, network, Training(max_iterations=5, starts=1), start=MEASURED)
+    assert fit.model.n_parameters == NeuralStateSpace(states=2, neurons=0).sizes(1).free
+    assert not any("Begun from" in note for note in fit.notes)
+
+
 @pytest.mark.parametrize("directions", [0, -1, 1.5, True, "1"])
 def test_other_numbers_are_refused(directions: object) -> None:
     with pytest.raises(ConfigError, match="not a number of directions"):

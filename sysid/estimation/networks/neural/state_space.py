@@ -132,7 +132,7 @@ def fit_neural_state_space(
     named, begun = dict(zip(mapping.outputs, rests, strict=True)), start or Start()
     given: dict[str, Any] = {"mapping": mapping, "network": network, "start": begun, "rest_output": named, "vet": vet}
     given |= {"traces": traces, "selection": selection, "on_progress": on_progress}
-    if network.directions is not None and initial is None:
+    if initial is None and network.directions is not None and network.neurons + network.output_neurons:
         return in_few_directions(given, training or Training(), fit_neural_state_space)
     sparse = None if initial is not None else Thinned.of(given, training or Training())
     if sparse is not None:
