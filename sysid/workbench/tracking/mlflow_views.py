@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
+from bisect import bisect_left
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -67,14 +68,14 @@ def view_tag(cases: Sequence[str], created_ms: int) -> str:
     Returns:
         Text; cases are left out from the end until it fits into a tag.
     """
-    shown = list(cases)
-    while True:
-        state = json.dumps(_state(shown), separators=(",", ":")).encode()
+
+    def shown(count: int) -> str:
+        state = json.dumps(_state(cases[:count]), separators=(",", ":")).encode()
         packed = "deflate;" + base64.b64encode(zlib.compress(state, 9)).decode()
-        value = json.dumps({"name": TITLE, "createdAt": created_ms, "state": packed})
-        if len(value) <= TAG_LIMIT or not shown:
-            return value
-        shown.pop()
+        return json.dumps({"name": TITLE, "createdAt": created_ms, "state": packed})
+
+    # The first count behind which one more case is too many.
+    return shown(bisect_left(range(len(cases)), True, key=lambda count: len(shown(count + 1)) > TAG_LIMIT))
 
 
 def column(kind: str, name: str) -> str:
