@@ -303,21 +303,29 @@ def free_runs(
         yield from ((sequence, model(sequence)) for sequence in sequences)
         return
     several, dealt = model.structure.several_outputs, model.variants
-    begun: dict[tuple[int, bytes], Beginning] = {}
+    begun: dict[tuple[int, bytes], Beginning | None] = {}
 
-    def run(one: InputSequence, variant: AbstractModel) -> NDArray[np.float64]:
-        outputs = variant.simulate(one.inputs, one.history(several=several))
-        if within is None or not _lost(outputs.reshape(len(one.inputs), -1)[:1], *within):
-            return outputs
-        targets = one.targets if several else one.targets[:, 0]
-        # Sequences of one record begin alike, but for how fast they run; to look for a state takes longer than a run.
+    def begins(one: InputSequence, variant: AbstractModel) -> Beginning | None:
+        """Where a run begins that would not begin within the records; sequences of one record begin alike."""
+        if within is None:
+            return None
         key = id(variant), np.concatenate([one.inputs[0], one.targets[0]]).tobytes()
         if key not in begun:
-            begun[key] = beginning(variant, one.inputs, targets, Start(kind=StartKind.ESTIMATED))
-        at = begun[key]
-        return np.concatenate([targets[: at.first], variant.simulate(one.inputs[at.first :], at.history)])
+            first = variant.simulate(one.inputs[:1], one.history(several=several)).reshape(1, -1)
+            targets = one.targets if several else one.targets[:, 0]
+            lost = _lost(first, *within)
+            begun[key] = beginning(variant, one.inputs, targets, Start(kind=StartKind.ESTIMATED)) if lost else None
+        return begun[key]
+
+    def run(one: InputSequence, variant: AbstractModel, at: Beginning | None) -> NDArray[np.float64]:
+        if at is None:
+            return variant.simulate(one.inputs, one.history(several=several))
+        before = one.targets[: at.first] if several else one.targets[: at.first, 0]
+        return np.concatenate([before, variant.simulate(one.inputs[at.first :], at.history)])
 
     waiting, turns = iter(sequences), cycle(dealt)
     with ThreadPoolExecutor(2) as pool:
         while some := list(islice(waiting, AT_ONCE)):
-            yield from zip(some, pool.map(run, some, islice(turns, len(some))), strict=True)
+            variants = list(islice(turns, len(some)))
+            places = [begins(one, variant) for one, variant in zip(some, variants, strict=True)]
+            yield from zip(some, pool.map(run, some, variants, places), strict=True)
