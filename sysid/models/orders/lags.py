@@ -110,7 +110,9 @@ def parse_lags(spec: LagSpec, *, first: int, where: str) -> tuple[int, ...]:
             expected=f"a number n for 1 to n, a range such as {first}:4, or increasing lags from {first} on; "
             f"none above {MOST:,}",
             got=shortened(spec),
-            remedy="list each lag once, smallest first",
+            remedy=f"write [{first}] for the lag {first} alone"
+            if whole(spec) and spec == 0
+            else "list each lag once, smallest first",
         )
     return lags
 

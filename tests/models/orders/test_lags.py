@@ -1,7 +1,8 @@
 """Orders and lags: whole numbers within bounds, refused by name before they take memory."""
 
-from __future__ import annotations
+from __future__ import re
 
+import json
 from typing import Any
 
 import pytest
@@ -48,3 +49,11 @@ def test_the_largest_range_is_taken() -> None:
 def test_one_number_is_the_order_of_one_input() -> None:
     assert ARX(na=1, nb=2, nk=0) == ARX(na=1, nb=(2,), nk=(0,))  # type: ignore[arg-type]  # as a pipeline writes it
     assert TransferFunction(poles=2, zeros=1, delays=3) == TransferFunction(poles=(2,), zeros=(1,), delays=(3,))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_number_of_no_lags_is_refused_with_the_lag_that_can_be_written(first: int) -> None:
+    with pytest.raises(ConfigError) as refused:
+        parse_lags(0, first=first, where="delays")
+    (written,) = re.findall(r"\[\d+\]", str(refused.value.remedy))
+    assert parse_lags(json.loads(written), first=first, where="delays") == (first,)
