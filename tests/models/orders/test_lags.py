@@ -1,8 +1,9 @@
 """Orders and lags: whole numbers within bounds, refused by name before they take memory."""
 
-from __future__ import re
+from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import pytest
