@@ -156,7 +156,6 @@ FLAT = 1e-8
 NOTHING_LEFT = 1e-24
 """Mean squared error over the output's scale that is rounding."""
 
-
 STANDS = 1e-6
 """Over the loss of one sample: what a Newton step would take away where it would move no parameter by more than a
 thousandth of its standard deviation."""
