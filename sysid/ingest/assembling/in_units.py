@@ -16,7 +16,7 @@ from sysid.ingest.tables.options import ColumnOptions, FileOptions
 from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import time_unit
 from sysid.traces import Channel
-from sysid.units import Reference, convert
+from sysid.units import Reference, convert, is_same_unit
 
 T = TypeVar("T", str, Reference)
 
@@ -177,7 +177,8 @@ def in_unit(
     if declared and column.unit and declared != column.unit:
         notes.append(f"taken as {declared} although the file says {column.unit}")
     origin, target = reference or Reference.NONE, channel.reference
-    if (unit, origin) != (channel.unit, target):
+    is_named_alike = "1" not in {unit, channel.unit} and is_same_unit(unit, channel.unit)  # of "1" any is the same
+    if origin is not target or not (unit == channel.unit or is_named_alike):
         notes.append(f"converted from {_label(unit, origin)} to {_label(channel.unit, target)}")
     return values, f"{channel.name}: {', '.join(notes)}" if notes else None
 

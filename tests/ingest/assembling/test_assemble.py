@@ -148,6 +148,15 @@ def test_what_is_asked_for_is_done_and_told(
     check_done(tmp_path, arguments, values, masked, told)
 
 
+@pytest.mark.parametrize(
+    ("unit", "wanted", "told"),
+    [("volt", "V", []), ("percent", "%", []), ("%", "1", ["u: converted from % to 1"])],
+)
+def test_a_unit_by_another_name_is_no_conversion(tmp_path: Path, unit: str, wanted: str, told: list[str]) -> None:
+    provenance = make(tmp_path, unit=unit, channel=Channel(name="u", unit=wanted)).provenance
+    assert [one for one in provenance if "converted" in one] == told
+
+
 def test_clean_samples_pass_unchanged(tmp_path: Path) -> None:
     values = np.random.default_rng(1).normal(size=N).tolist()
     trace = make(tmp_path, values=values)
