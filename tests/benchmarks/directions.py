@@ -1,13 +1,14 @@
 """Neurons that read and move a few directions beside neurons that read everything, at the same starts and iterations.
 
-    SYSID_DATA=<folder> python -m tests.benchmarks directions [--only=drives,curves] [--seeds=0,1,2] [--first=0]
+    SYSID_DATA=<folder> python -m tests.benchmarks directions [--only=drives,tanks,curves] [--seeds=0,1,2] [--first=0]
 
 *Drives*: both records of the Coupled Electric Drives (``ced/DATAUNIF.csv`` in the folder), 400 samples of each to fit
 and the last 100 to test, from 10 and from 4 measured samples; nothing is declared of their sensor, which gives the
-absolute value of a speed. *Curves*: six simulated plants, a static curve between two linear blocks of order 3, 1,000
-samples with noise of 1 % to fit and 3,000 without noise to test; ``--first=6`` draws six others. Every structure has
-six starts, chosen by the evidence; a network in few directions begins from one with free neurons, and its time is that
-of both.
+absolute value of a speed. *Tanks*: one record of the Cascaded Tanks (``cascaded_tanks/dataBenchmark.csv``) to fit, the
+other to test, from 50 measured samples. *Curves*: six simulated plants, a static curve between two linear blocks of
+order 3, 1,000 samples with noise of 1 % to fit and 3,000 without noise to test; ``--first=6`` draws six others. Every
+structure has six starts, chosen by the evidence; a network in few directions begins from one with free neurons, and its
+time is that of both.
 """
 
 from __future__ import annotations
@@ -95,6 +96,15 @@ def drives(seeds: list[int], _: int) -> None:
     )
 
 
+def tanks(seeds: list[int], _: int) -> None:
+    """The estimation record, and the other."""
+    data = np.genfromtxt(checked("cascaded_tanks/dataBenchmark.csv"), delimiter=",", names=True)
+    fitted, unseen = (trace(name, data[f"u{name}"], data[f"y{name}"]) for name in ("Est", "Val"))
+    beside(
+        "Cascaded Tanks", "V", 2, lambda network, seed: errors([fitted], {"": (unseen, 50)}, network, seed, 50), seeds
+    )
+
+
 def blocks(seed: int) -> Iterator[tuple[Array, Array]]:
     """Two linear blocks of order 3 and gain 1, each a pair that swings and a pole."""
     rng = np.random.default_rng(seed)
@@ -140,6 +150,6 @@ def curves(seeds: list[int], first: int) -> None:
 
 if __name__ == "__main__":
     options = dict(argument.lstrip("-").split("=") for argument in sys.argv[1:] if "=" in argument)
-    every = {"drives": drives, "curves": curves}
+    every = {"drives": drives, "tanks": tanks, "curves": curves}
     for name in options.get("only", ",".join(every)).split(","):
         every[name]([int(seed) for seed in options.get("seeds", "0,1,2").split(",")], int(options.get("first", "0")))

@@ -24,25 +24,36 @@ def nearest(matrix: Array, rank: int) -> Array:
     return np.asarray((left[:, :rank] * values[:rank]) @ right[:rank])
 
 
-def normal(matrix: Array, rank: int) -> Array:
-    r"""The projector on what leaves the matrices of a rank at once.
-
-    At :math:`X = U S Q^T` these are the :math:`(1 - U U^T) Z (1 - Q Q^T)` (Absil, Mahony and Sepulchre 2008, section
-    3.5). Any other move keeps the rank to first order, and :func:`nearest` then leads back to it.
+def spaces(matrix: Array, rank: int) -> tuple[Array, Array]:
+    """Orthonormal bases of the column space and of the row space of a matrix of some rank.
 
     Args:
-        matrix: One of that rank, shape ``(n, m)``.
-        rank: The rank.
+        matrix: The matrix, shape ``(n, m)``.
+        rank: The rank, at most ``n`` and ``m``.
 
     Returns:
-        Shape ``(n * m, n * m)``, for matrices whose rows stand one after the other; zero where any rank is that.
+        Shapes ``(n, rank)`` and ``(m, rank)``.
     """
-    n, m = matrix.shape
-    if rank >= min(n, m):
-        return np.zeros((n * m, n * m))
     left, _, right = np.linalg.svd(matrix, full_matrices=False)
-    U, Q = left[:, :rank], right[:rank].T
-    return np.kron(np.eye(n) - U @ U.T, np.eye(m) - Q @ Q.T)
+    return left[:, :rank], right[:rank].T
+
+
+def leaving(moves: Array, spaces: tuple[Array, Array]) -> Array:
+    r"""What of some moves from a matrix leaves the matrices of its rank at once.
+
+    At :math:`X = U S Q^T` that is :math:`(1 - U U^T) Z (1 - Q Q^T)` of a move :math:`Z` (Absil, Mahony and Sepulchre
+    2008, section 3.5). What is left keeps the rank to first order, and :func:`nearest` then leads back to it.
+
+    Args:
+        moves: Shape ``(..., n, m)``.
+        spaces: :func:`spaces` of the matrix.
+
+    Returns:
+        The same shape as the moves.
+    """
+    U, Q = spaces
+    off = moves - U @ (U.T @ moves)
+    return np.asarray(off - (off @ Q) @ Q.T)
 
 
 def dimension(shape: tuple[int, int], rank: int) -> int:

@@ -171,11 +171,11 @@ class Sizes:
             theta: Flat parameters that the sizes allow, those of records' initial states behind them or not.
             arrays: Each of shape ``(..., n_parameters)``, changed: gradients, or rows of a Jacobian.
         """
-        bound = [(at.ravel(), low_rank.normal(theta[at], self.directions or 0)) for at in self._ranked]
+        bound = [(at, low_rank.spaces(theta[at], self.directions or 0)) for at in self._ranked]
         for array in arrays:
             array[..., self.held] = 0.0
-            for at, out in bound:
-                array[..., at] -= array[..., at] @ out
+            for at, spaces in bound:
+                array[..., at] -= low_rank.leaving(array[..., at], spaces)
 
     @property
     def count(self) -> int:

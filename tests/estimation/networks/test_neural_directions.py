@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.estimation import Training, fit_neural_state_space
-from sysid.estimation.networks.neural.directions import narrowed
+from sysid.estimation import FitResult, Status, Training, fit_neural_state_space
+from sysid.estimation.networks.neural.directions import in_few_directions, narrowed
 from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.records.experiment import experiments_of
 from sysid.models import (
@@ -118,7 +118,14 @@ def test_the_nearest_matrix_is_as_far_as_the_singular_values_that_it_lacks() -> 
     values = np.linalg.svd(matrix, compute_uv=False)
     assert np.linalg.norm(matrix - low_rank.nearest(matrix, 2)) == pytest.approx(np.hypot(*values[2:]))
     assert low_rank.nearest(matrix, 4) is matrix
-    assert not low_rank.normal(matrix, 4).any()
+
+
+def test_what_leaves_a_rank_is_what_the_projectors_take() -> None:
+    rng = np.random.default_rng(6)
+    matrix, moves = low_rank.nearest(rng.standard_normal((6, 4)), 2), rng.standard_normal((3, 6, 4))
+    U, _, Q = np.linalg.svd(matrix)
+    slow = np.stack([U[:, 2:] @ U[:, 2:].T @ one @ Q[2:].T @ Q[2:] for one in moves])
+    np.testing.assert_allclose(low_rank.leaving(moves, low_rank.spaces(matrix, 2)), slow, atol=1e-12)
 
 
 @pytest.mark.parametrize("output_neurons", [0, 3])
@@ -151,6 +158,22 @@ def test_a_plant_with_one_curve_is_found_with_one_direction() -> None:
     assert np.sqrt(np.mean((run - y[20:]) ** 2)) < 0.03 * y.std()
     assert fit.posterior is not None
     assert np.isfinite(fit.posterior.factor).all()
+
+
+def test_who_stops_it_while_neurons_are_free_has_a_model_of_few_directions_at_once() -> None:
+    network = NeuralStateSpace(states=3, neurons=6, directions=1)
+    asked = list[Training]()
+
+    def fit(*, training: Training, **given: Any) -> FitResult:
+        asked.append(training)
+        found = fit_neural_state_space(**given, training=training)
+        return replace(found, status=Status.INTERRUPTED) if len(asked) == 1 else found
+
+    given = {"traces": [spring(0)], "mapping": MAPPING, "network": network, "start": MEASURED}
+    found = in_few_directions(given, Training(max_iterations=20, starts=2, workers=1), fit)
+    assert [one.max_time_s for one in asked] == [np.inf, 0.0]
+    assert found.status is Status.INTERRUPTED
+    assert found.model.structure == network
 
 
 def test_without_neurons_there_are_none_to_seek() -> None:

@@ -5,7 +5,7 @@ Which combinations of states and inputs bend is hidden in a network with free ne
 directions that bend: the leading eigenvectors of :math:`\sum_t (J_t - \bar J)^T (J_t - \bar J)` (active subspaces,
 Constantine 2015), measured by how far the record goes in each. What neurons read outside of them becomes linear with
 the mean slope; what they move outside of a few directions becomes its regression on state and input. From random
-directions alone fits end in other minima: of six simulated plants with a curve between linear blocks two did.
+directions alone more fits end in other minima.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scipy import linalg
 from sysid.estimation.networks.neural.finer import evened
 from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.training import Training
-from sysid.estimation.results.result import FitResult
+from sysid.estimation.results.result import FitResult, Status
 from sysid.kernels.neurons import NEURONS
 from sysid.models import AbstractStructure, NeuralEnsemble, NeuralForm, NeuralStateSpace
 
@@ -52,8 +52,10 @@ def in_few_directions(given: Mapping[str, Any], training: Training, one: Callabl
     network: NeuralStateSpace = given["network"]
     free = {**given, "network": replace(network, directions=None), "vet": None}
     first = one(**free, training=replace(training, ensemble=1, max_time_s=0.5 * training.max_time_s))
-    later = replace(training, max_time_s=max(training.max_time_s - first.train_time_s, 0.0))
-    found = one(**given, training=later, initial=first)
+    interrupted = first.status is Status.INTERRUPTED
+    left = 0.0 if interrupted else max(training.max_time_s - first.train_time_s, 0.0)
+    found = one(**given, training=replace(training, max_time_s=left), initial=first)
+    found = replace(found, status=Status.INTERRUPTED) if interrupted else found
     note = f"Begun from {first.model.label}, whose neurons read everything: what bends there gave the directions."
     seconds = first.train_time_s + found.train_time_s
     return replace(found, notes=(note, *found.notes), train_time_s=seconds)
@@ -88,8 +90,13 @@ def begun_from(initial: FitResult, provider: NeuralProvider) -> Array:
     if first.sizes == sizes or sizes.directions is None:
         return first.numbers
     own = replace(provider, template=first)
-    paths, inputs = own.states(own.begun(first.theta)), [u for u, _ in own.signals]
-    return narrowed(first, np.column_stack([np.concatenate(paths), np.concatenate(inputs)]), sizes.directions).numbers
+    every = max(1, sum(len(u) for u, _ in own.signals) // SEEN)  # the states of a long record are not kept together
+    visited = [
+        np.column_stack([path, u[rows]])[::every]
+        for (u, _), blocks in zip(own.signals, own.paths(own.begun(first.theta)), strict=True)
+        for rows, path in blocks
+    ]
+    return narrowed(first, np.concatenate(visited), sizes.directions).numbers
 
 
 def narrowed(form: NeuralForm, z: Array, directions: int) -> NeuralForm:
@@ -105,7 +112,6 @@ def narrowed(form: NeuralForm, z: Array, directions: int) -> NeuralForm:
     """
     s = replace(form.sizes, directions=directions)
     theta = form.theta.copy()
-    z = z[:: max(1, len(z) // SEEN)]
     _read_few(form, theta, z, directions)
     _move_few(form, theta, z, directions)
     return replace(form, sizes=s, theta=s.hold(evened(theta, s, z[:, : s.states])))
@@ -114,20 +120,22 @@ def narrowed(form: NeuralForm, z: Array, directions: int) -> NeuralForm:
 def _read_few(form: NeuralForm, theta: Array, z: Array, directions: int) -> None:
     """Change ``theta``: its neurons read the directions that bend; what they do along the others is linear."""
     s, slope = form.sizes, NEURONS[form.activation].slope
-    parts = ((s.hidden, s.readout, s.linear), (s.output_hidden, s.output_readout, s.output_linear))
-    middle = z.mean(axis=0)
-    root, back = _roots(np.cov(z.T).reshape(s.row - 1, s.row - 1))
-    means, spread = [], np.zeros_like(root)
-    for hidden, readout, linear in parts:
-        W, V = theta[hidden].reshape(-1, s.row), theta[readout].reshape(len(theta[linear]) // s.row, -1)
-        slopes = np.einsum("ij,tj,jk->tik", V, slope(z @ W[:, :-1].T + W[:, -1]), W[:, :-1])
-        means.append(slopes.mean(axis=0))
-        apart = (slopes - means[-1]) @ root
-        spread += np.einsum("tij,tik->jk", apart, apart)
+    middle, root, back = z.mean(axis=0), *_roots(np.cov(z.T).reshape(s.row - 1, s.row - 1))
+    parts, spread = list[tuple[Array, Array, Array]](), np.zeros_like(root)
+    for hidden, readout, linear in (
+        (s.hidden, s.readout, s.linear), (s.output_hidden, s.output_readout, s.output_linear),
+    ):  # fmt: skip
+        W, M = theta[hidden].reshape(-1, s.row), theta[linear].reshape(-1, s.row)  # views
+        V = theta[readout].reshape(len(M), -1)
+        slopes = slope(z @ W[:, :-1].T + W[:, -1])
+        mean = slopes.mean(axis=0)
+        # The sum of (J - mean J)^T (J - mean J), without a J for every sample.
+        apart, read = slopes - mean, W[:, :-1] @ root
+        spread += read.T @ ((V.T @ V) * (apart.T @ apart)) @ read
+        parts.append((W, M, (V * mean) @ W[:, :-1]))
     Q = linalg.eigh(spread)[1][:, -directions:]
     left = np.eye(s.row - 1) - root @ Q @ Q.T @ back
-    for (hidden, _, linear), mean in zip(parts, means, strict=True):
-        W, M = theta[hidden].reshape(-1, s.row), theta[linear].reshape(-1, s.row)  # views
+    for W, M, mean in parts:
         W[:, -1] += W[:, :-1] @ left @ middle
         W[:, :-1] -= W[:, :-1] @ left
         M[:, :-1] += mean @ left
