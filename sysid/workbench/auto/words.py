@@ -10,7 +10,8 @@ from sysid.estimation.estimators import ESTIMATORS
 from sysid.reporting.numbers import number, quantity
 from sysid.reporting.sweep_record import Trial
 from sysid.validation.resolution import tied
-from sysid.workbench.auto.plan import ALIKE, RIVAL
+from sysid.workbench.auto.ledger import ALIKE
+from sysid.workbench.auto.plan import RIVAL
 from sysid.workbench.auto.worth import ranked_by
 from sysid.workbench.sweep.trial import FAILED
 
@@ -68,7 +69,7 @@ def choose(
         trials: All of them; at least one can be used.
         error: What chooses, as a mean square.
         first_stable: The first of some whose free run is stable, and how many were passed over.
-        tolerance: As for :func:`~sysid.workbench.auto.plan.ranked_by`.
+        tolerance: As for :func:`~sysid.workbench.auto.worth.ranked_by`.
         goes_on: Whether a trial's training goes on once it is chosen. A network that few iterations have brought far
             ahead of all that is stable is not passed over for what those few iterations have left in it.
         beyond: How far its models are from the middle of all on other commands where they stand alone, a mean square:

@@ -151,7 +151,7 @@ def test_the_page_of_a_search_is_made_once_and_has_the_proof(tmp_path: Path, mon
     """Its pictures take longer than all else after a short search."""
     monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
     lag = Family(kind="ARX", linear=True, first=lambda _: [Try(structure=sysid.ARX(na=1, nb=(1,), nk=(0,)))])
-    monkeypatch.setattr("sysid.workbench.auto.plan.FAMILIES", (lag,))
+    monkeypatch.setattr("sysid.workbench.auto.ledger.FAMILIES", (lag,))
     monkeypatch.setattr("sysid.workbench.auto.plan.suggested", lambda *_, **__: [])
     made_of: list[Path] = []
     monkeypatch.setattr(report, "write_report", lambda folder: made_of.append(folder) or write_report(folder))
@@ -189,7 +189,7 @@ def test_a_surrogate_that_was_killed_again_and_again_goes_on_and_runs_nothing_tw
 ) -> None:
     """Each time a step further on; experiments that are killed half-way are tested where they are run."""
     lag = Family(kind="ARX", linear=True, first=lambda _: [Try(structure=sysid.ARX(na=1, nb=(1,), nk=(0,)))])
-    monkeypatch.setattr("sysid.workbench.auto.plan.FAMILIES", (lag,))
+    monkeypatch.setattr("sysid.workbench.auto.ledger.FAMILIES", (lag,))
     monkeypatch.setattr("sysid.workbench.auto.plan.suggested", lambda *_, **__: [])
     text = """
 def lag(time, inputs, parameters):
