@@ -15,7 +15,8 @@ from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import scattered, sections_of, stabilised
 from sysid.estimation.linear.sanathanan_koerner import sk_poles
 from sysid.estimation.linear.spectral_record import SpectralRecord
-from sysid.estimation.linear.transfer_function_search import AbstractProblem
+from sysid.estimation.linear.transfer_function_problem import AbstractProblem
+from sysid.estimation.linear.transfer_function_search import solve
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.results.result import FitResult
@@ -154,7 +155,7 @@ def fit_spectra(
             rest_output=rest_output,
         ),
     )
-    return problem.solve(began, on_iteration, None)
+    return solve(problem, began, on_iteration, None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

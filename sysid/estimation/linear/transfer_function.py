@@ -20,8 +20,9 @@ from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_star
 from sysid.estimation.linear.segments import delayed_inputs, scaling_of
 from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.linear.time_record import TimeRecord
+from sysid.estimation.linear.transfer_function_problem import AbstractProblem, Score
 from sysid.estimation.linear.transfer_function_runs import End
-from sysid.estimation.linear.transfer_function_search import AbstractProblem, Score
+from sysid.estimation.linear.transfer_function_search import solve
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
@@ -117,7 +118,7 @@ def fit_transfer_function(
     # BLAS threads that wake for matrices of some ten columns cost more than they give: beside one other process on two
     # cores a fit took four times as long with them.
     with one_blas_thread():
-        fit = problem.solve(began, on_iteration, score if selection else None)
+        fit = solve(problem, began, on_iteration, score if selection else None)
     return replace(fit, model=of_all_inputs(fit.model))
 
 
