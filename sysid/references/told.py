@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import re
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from sysid.references.runs import Outcome, ReferenceRuns
 
+NUMBER = re.compile(r"(?<!\w)(?<!line )(?<!code )[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+"""In a reason: at another sample, or by another value, it is the same; of another line or exit code it is not."""
 REPEATS = 1e-9
 """Share of an output's size to which a run repeats itself: threads may add in another order."""
 
 
 def reasons_of(outcomes: Iterable[Outcome], most: int = 3) -> str:
-    """Why some experiments gave no record, the most frequent reason first.
+    """Why some experiments gave no record, the most frequent reason first; those that differ in numbers alone are one.
 
     Args:
         outcomes: What came of them; those that gave one say nothing.
@@ -23,9 +25,19 @@ def reasons_of(outcomes: Iterable[Outcome], most: int = 3) -> str:
     Returns:
         In words; empty where all gave one.
     """
-    counts = Counter(one.reason for one in outcomes if one.reason is not None).most_common()
-    told = [reason if n == 1 else f"{reason} ({n} times)" for reason, n in counts[:most]]
-    return "; ".join([*told, *([f"and {len(counts) - most} other reasons"] if len(counts) > most else [])])
+    alike: dict[str, list[str]] = {}
+    for one in outcomes:
+        if one.reason is not None:
+            alike.setdefault(NUMBER.sub("#", one.reason), []).append(one.reason)
+    groups = sorted(alike.values(), key=len, reverse=True)
+    told = [_told(reasons) for reasons in groups[:most]]
+    return "; ".join([*told, *([f"and {len(groups) - most} other reasons"] if len(groups) > most else [])])
+
+
+def _told(reasons: Sequence[str]) -> str:
+    if len(reasons) == 1:
+        return reasons[0]
+    return f"{reasons[0]} ({len(reasons)} times{', with other numbers' if len(set(reasons)) > 1 else ''})"
 
 
 def unlike(runs: ReferenceRuns, done: Sequence[Outcome]) -> str | None:

@@ -13,6 +13,10 @@ def test_reasons_are_counted() -> None:
     many = [Outcome(case=CASES[0], trace=None, reason=reason) for reason in "abbc"]
     assert reasons_of(many, 2) == "b (2 times); a; and 1 other reasons"
     assert not reasons_of([Outcome(case=CASES[0], trace=None)])
+    where = ["y is nan at 2.2 s", "no", "y is nan at 17 s", "y is nan at 1e-5 s", "line 3", "line 12", "u1", "no"]
+    many = [Outcome(case=CASES[0], trace=None, reason=reason) for reason in where]
+    told = "y is nan at 2.2 s (3 times, with other numbers); no (2 times); line 3; line 12; and 1 other reasons"
+    assert reasons_of(many, 4) == told
 
 
 def test_a_reference_that_does_not_repeat_itself_is_told(tmp_path: Path) -> None:

@@ -23,6 +23,9 @@ Records = Sequence[tuple[Array, Array]]
 
 STANDS = 1e-6
 """Share of the fastest step from sample to sample within which an output stands."""
+ANYWHERE, LATEST, BY_CHANCE = 0.5, 4, 0.1
+"""Part of its stands that are at places of their own; part of the longest record to which a dead time may come; and
+part of the stands over which inputs that come so late move by chance."""
 BAND = 1e-3
 """Share of its range from an end within which it is held there, and not by friction."""
 LONG, FEWEST, DRIVEN = 4, 3, 0.05
@@ -178,18 +181,43 @@ def _ends(records: Records, k: int, steps: Sequence[Array]) -> Between:
 
 
 def _sticks(records: Records, k: int, steps: Sequence[Array], ends: Between, reach: Array) -> bool:
-    """Whether an output stands, elsewhere than at its ends, while an input moves on, and moves on later."""
-    often, band = 0, BAND * float(np.ptp(np.concatenate([y[:, k] for _, y in records])))
-    for (u, y), step in zip(records, steps, strict=True):
-        free = np.ones(len(step), dtype=bool)
-        for stop in ends:
-            free &= True if stop is None else np.abs(y[:, k] - stop) > band
-        still = free & (np.abs(step) <= STANDS)
-        # Stretches that begin and end in motion: before the first nobody knows whether anything holds it.
-        for begin, end in itertools.pairwise(np.flatnonzero(~still)):
-            if end - begin > LONG and free[begin + 1 : end].all():
-                often += bool((np.ptp(u[begin + 1 : end], axis=0) > DRIVEN * reach).any())
-    return often >= FEWEST
+    """Whether an output stands, elsewhere than at its ends, while an input moves on, and moves on later.
+
+    It stands anywhere: what comes to rest at the same few places again and again is held by a dead band, or is coarse.
+    And it does so whatever the dead time: one after which it stands only where the inputs have stood explains it all.
+    """
+    band = BAND * float(np.ptp(np.concatenate([y[:, k] for _, y in records])))
+    stands = [
+        (r, begin + 1, end)
+        for r, ((_, y), step) in enumerate(zip(records, steps, strict=True))
+        for begin, end in _standing(y[:, k], step, ends, band)
+    ]
+    places = np.array([records[r][1][begin, k] for r, begin, _ in stands])
+    if len(set((places / (band or 1.0)).round().tolist())) < ANYWHERE * len(places):
+        return False
+    for late in range(1 + max(len(u) for u, _ in records) // LATEST):
+        driven = [
+            bool((np.ptp(records[r][0][begin - late : end - late], axis=0) > DRIVEN * reach).any())
+            for r, begin, end in stands
+            if begin >= late
+        ]
+        if sum(driven) < (FEWEST if late == 0 else BY_CHANCE * len(driven)):
+            return False
+    return True
+
+
+def _standing(place: Array, step: Array, ends: Between, band: float) -> list[tuple[int, int]]:
+    """First sample of each stretch over which a place stands away from its ends, and the one behind its last."""
+    free = np.ones(len(step), dtype=bool)
+    for stop in ends:
+        free &= True if stop is None else np.abs(place - stop) > band
+    still = free & (np.abs(step) <= STANDS)
+    # Stretches that begin and end in motion: before the first nobody knows whether anything holds it.
+    return [
+        (begin + 1, end)
+        for begin, end in itertools.pairwise(np.flatnonzero(~still).tolist())
+        if end - begin > LONG and free[begin + 1 : end].all()
+    ]
 
 
 def _beside(records: Records, j: int, k: int, fastest: float, reach: Array) -> Beside | None:

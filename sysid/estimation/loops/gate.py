@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from sysid.estimation.linear.majority_map import majority_map
@@ -24,6 +25,9 @@ NEARER, EXACT = 0.03, 0.8
 """Part of how near samples have to be within which most of those are that follow a law exactly; and that share."""
 ALIKE = 0.97
 """Part of the share of the law that most follow from which on a shorter law is taken for it."""
+LATE, TERMS, ROWS = 4, 240, 4000
+"""Part of the longest record to which a dead time may come, most inputs of earlier samples in a law that has one, and
+samples by which it is looked for."""
 MOVES = 1e-4
 """Share of its range by which an output moves at least."""
 
@@ -90,6 +94,34 @@ def law_of(records: Sequence[tuple[Array, Array]], *, order: int, seed: int = 0)
     )
 
 
+def is_late(records: Sequence[tuple[Array, Array]]) -> bool:
+    """Whether all samples follow one linear law whose inputs act late, which no equations of a loop have.
+
+    Args:
+        records: Inputs, shape ``(n_samples, n_inputs)``, and an output, shape ``(n_samples,)``, in shares of its range.
+
+    Returns:
+        Whether they do.
+    """
+    past, inputs = max(ORDERS), records[0][0].shape[1]
+    lags = max(past, min(max(len(y) for _, y in records) // LATE, TERMS // inputs))
+    rows, values = [], []
+    for u, y in records:
+        # At rest before its first sample, as all records are of which a loop is sought.
+        moved = np.concatenate([np.zeros(past), np.diff(y, prepend=y[0])])
+        driven = np.concatenate([np.zeros((lags, inputs)), np.diff(u, axis=0, prepend=u[:1])])
+        own, drives = (sliding_window_view(of, n, axis=0) for of, n in ((moved[:-1], past), (driven[1:], lags)))
+        rows.append(np.hstack([own, drives.reshape(len(y), -1)]))
+        values.append(moved[past:])
+    terms, changes = np.vstack(rows), np.concatenate(values)
+    some = np.linspace(0, len(terms) - 1, min(len(terms), ROWS)).astype(int)
+    if len(some) < 2 * terms.shape[1]:
+        return False
+    found = np.linalg.lstsq(terms[some], changes[some], rcond=None)[0]
+    moves = np.abs(changes) > MOVES
+    return bool(np.mean(np.abs(terms @ found - changes)[moves] <= NEAR) > ALL) if moves.any() else False
+
+
 def pieces(records: Sequence[tuple[Array, Array]]) -> dict[int, Law]:
     """Laws that some samples follow and others do not, by the number of the output.
 
@@ -97,7 +129,8 @@ def pieces(records: Sequence[tuple[Array, Array]]) -> dict[int, Law]:
         records: Inputs and outputs, in shares of their ranges.
 
     Returns:
-        Of each output the law that most follow; empty where one output has none, or all samples of all follow one.
+        Of each output the law that most follow; empty where one output has none, all samples of all follow one, or all
+        of one follow one with a dead time.
     """
     found = {}
     for k in range(records[0][1].shape[1]):
@@ -108,4 +141,6 @@ def pieces(records: Sequence[tuple[Array, Array]]) -> dict[int, Law]:
             return {}
         # A longer law says the same with poles that are of nothing.
         found[k] = next(law for law in laws if law.share >= ALIKE * most)
+        if most <= ALL and is_late(own):
+            return {}
     return {} if all(law.share > ALL for law in found.values()) else found

@@ -18,6 +18,9 @@ QUIET = 3
 """Samples before and behind it in which no input moves: what an input's step does by itself is no jump."""
 FEWEST = 0.2
 """Share of the records that have one at least."""
+LATE, ALIKE, SEVERAL = 4, 0.9, 3
+"""Part of the longest record to which a dead time may come, share of the jumps that follow an input's at one, and how
+many are more than chance."""
 
 UNDERSTOOD = (
     "Between its jumps the reference is linear, and a level tells when one comes: equations of that were found in the "
@@ -55,10 +58,23 @@ def jumps_of(traces: Sequence[Trace], mapping: Mapping) -> dict[str, NDArray[np.
             continue
         beside = [_beside(trace[name]) / span for trace in traces]
         usual = float(np.quantile(np.concatenate(beside), 0.9))
-        sizes = [b[s & (b > JUMP) & (b > ABOVE * usual)] for b, s in zip(beside, still, strict=True)]
-        if np.mean([len(one) > 0 for one in sizes]) >= FEWEST:
-            found[name] = np.concatenate(sizes)
+        jumps = [np.flatnonzero(s & (b > JUMP) & (b > ABOVE * usual)) for b, s in zip(beside, still, strict=True)]
+        if np.mean([len(one) > 0 for one in jumps]) >= FEWEST and not _late(traces, mapping, jumps):
+            found[name] = np.concatenate([b[at] for b, at in zip(beside, jumps, strict=True)])
     return found
+
+
+def _late(traces: Sequence[Trace], mapping: Mapping, jumps: Sequence[NDArray[np.intp]]) -> bool:
+    """Whether nearly all jumps are those of an input, some samples later: a dead time."""
+    for name in mapping.inputs:
+        span = max(trace[name].max() for trace in traces) - min(trace[name].min() for trace in traces)
+        steps = [_beside(trace[name]) > JUMP * span for trace in traces]
+        for late in range(QUIET, 1 + max(map(len, traces)) // LATE):
+            # Of the first samples nobody knows what moved before.
+            follow = np.concatenate([step[at[at >= late] - late] for step, at in zip(steps, jumps, strict=True)])
+            if follow.sum() >= SEVERAL and follow.mean() >= ALIKE:
+                return True
+    return False
 
 
 def jumps_told(traces: Sequence[Trace], mapping: Mapping, *, understood: bool = False) -> list[str]:

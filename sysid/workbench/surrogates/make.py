@@ -99,6 +99,6 @@ def make_surrogate(
     shown = proving.done.get(place) or proving(place)
     page, fmu = work.page(place), work.delivered(place)
     bundle = read_bundle(place / "bundle")
-    notes += [*said, *work.learnt(bundle, found), *poor(shown, minutes, needs_s)]
+    notes += [*said, *work.learnt(bundle, found, shown), *poor(shown, minutes, needs_s)]
     notes += short_of_time(shown, plan, count, took=0.0 if iterations else time.monotonic() - began)
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes, pipeline=pipeline)

@@ -27,16 +27,19 @@ GOOD = 0.9
 """Share of the proof's experiments within the tolerance below which a surrogate is said to be poor."""
 
 
-def without_effect(bundle: Bundle, traces: Sequence[Trace]) -> list[str]:
+def without_effect(bundle: Bundle, traces: Sequence[Trace], shown: Proof) -> list[str]:
     """Inputs and parameters that move no output, as the surrogate has learnt it.
 
     Args:
         bundle: The surrogate.
         traces: Runs of the reference.
+        shown: How it does on new experiments: what a poor one has not learnt may move the reference all the same.
 
     Returns:
         A sentence for each that may stand still in every run without an output going elsewhere; of one input, none.
     """
+    if shown.share < GOOD:
+        return []
     names = [str(entry["name"]) for entry in bundle.inputs]
     outputs = [str(entry["name"]) for entry in bundle.outputs]
     spans = np.array([span_of(traces, name) or 1.0 for name in outputs])

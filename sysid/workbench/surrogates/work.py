@@ -214,11 +214,11 @@ class Work:
             shutil.copyfile(fmu, draft)
         return target
 
-    def learnt(self, bundle: Bundle, found: Experimented) -> list[str]:
+    def learnt(self, bundle: Bundle, found: Experimented, shown: Proof) -> list[str]:
         """What the surrogate itself shows: where it begins, and what moves none of its outputs."""
         moving = not self.config.fits and restless(found, self.mapping)
         begun = beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if moving else []
-        return [*begun, *without_effect(bundle, found.traces.with_role(Role.ESTIMATION))]
+        return [*begun, *without_effect(bundle, found.traces.with_role(Role.ESTIMATION), shown)]
 
     def searched(
         self, found: Experimented, minutes: float, before_page: Callable[[], object] | None, *, whole: float

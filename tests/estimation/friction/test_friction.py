@@ -70,6 +70,17 @@ def noisy(inputs: Array) -> Array:
     return sledge(inputs) + 1e-3 * np.random.default_rng(7).standard_normal((len(inputs), 1))
 
 
+def dead_band(inputs: Array) -> Array:
+    """Always stands at the same place while its input moves on."""
+    drawn = np.abs(np.sin(np.arange(len(inputs)) / 9.0))[:, np.newaxis] * inputs
+    return np.sign(drawn) * np.maximum(np.abs(drawn) - 0.8, 0.0)
+
+
+def coarse(inputs: Array) -> Array:
+    """Stands at a few places until its input has moved on by a step of the sensor."""
+    return np.round(5.0 * lag(inputs)) / 5.0
+
+
 def records(plant: Callable[[Array], Array], reach: float, runs: int = 8) -> list[tuple[Array, Array]]:
     found = []
     for seed in range(runs):
@@ -124,9 +135,21 @@ def test_stops_are_those_that_are_met_and_not_where_it_happens_to_stand() -> Non
     assert [(one.output, bool(one.by_inputs)) for one in free.beside] == [(0, True), (2, False)]
 
 
-@pytest.mark.parametrize("plant", [lag, tank, noisy])
+@pytest.mark.parametrize("plant", [lag, tank, noisy, dead_band, coarse])
 def test_what_stands_for_another_reason_or_never_is_left_alone(plant: Callable[[Array], Array]) -> None:
     assert found_friction(records(plant, 1.5)) is None
+
+
+def test_what_comes_late_is_held_by_nothing() -> None:
+    """Through a curve, and seven samples late: it stands while its input moves on, as that stood before."""
+    runs = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        turns = np.cumsum(rng.integers(5, 30, 20))
+        u = np.interp(np.arange(300), turns, np.repeat(rng.uniform(-1.5, 1.5, 10), 2))[:, np.newaxis]
+        u -= u[0]
+        runs.append((u, np.tanh(np.vstack([np.zeros((7, 1)), u[:-7]]))))
+    assert found_friction(runs) is None
 
 
 def test_records_that_begin_at_several_places_or_have_no_input_are_left_alone() -> None:

@@ -56,3 +56,11 @@ def test_what_inputs_and_ends_and_time_constants_do_is_no_jump() -> None:
     assert told(still, np.sin(np.arange(N) / 3.0)) == []
     assert told(still, np.full(N, 2.0)) == []
     assert told(still, rng.standard_normal(N)) == []
+
+
+def test_an_input_that_jumps_a_dead_time_before_is_what_jumps() -> None:
+    steps = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, N // 20), 20)
+    assert told(steps, np.concatenate([np.zeros(8), np.tanh(steps[:-8])])) == []
+    ball = velocity(0.8)
+    assert told(np.where(np.arange(N) < 7, 0.0, 0.8), ball) == told(np.full(N, 0.8), ball)
+    assert told(steps, ball)

@@ -307,7 +307,9 @@ def test_a_reference_that_is_random_is_told_to_who_goes_on_too(monkeypatch: pyte
     assert unlike(tmp_path) == []
 
 
-def test_a_parameter_without_effect_is_told(tmp_path: Path) -> None:
+def test_a_parameter_without_effect_is_told_of_a_good_surrogate(
+    proven: tuple[Bundle, Proof, JudgementRecord], tmp_path: Path
+) -> None:
     rng = np.random.default_rng(0)
     u, p = rng.standard_normal(400), np.repeat(rng.uniform(0.0, 1.0, 4), 100)
     y = np.zeros(400)
@@ -316,8 +318,9 @@ def test_a_parameter_without_effect_is_told(tmp_path: Path) -> None:
     traces = sysid.data({"u": u, "p": p, "y": y}, inputs=["u", "p"], outputs="y", sample_time=0.5)
     fit = sysid.fit(traces, "u+p -> y", sysid.ARX(na=1, nb=(1, 1), nk=(0, 0)), rest_output=0.0)
     bundle = sysid.save(fit, traces, tmp_path / "bundle", formats=("c",), start=Start())
-    (said,) = without_effect(bundle, traces.traces)
+    (said,) = without_effect(bundle, traces.traces, proven[1])
     assert said.startswith("p moves no output by more than")
+    assert without_effect(bundle, traces.traces, replace(proven[1], errors=np.full((12, 1), 0.3))) == []
 
 
 def test_what_experiments_take_is_told_before_they_are_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
