@@ -20,6 +20,7 @@ from sysid.ingest.tables.time_columns import is_time_unit
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
+_MINUTE = 60.0
 
 
 def find_time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
@@ -51,8 +52,10 @@ def find_time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     with np.errstate(invalid="ignore"):
         steps = np.diff(column.values[:100_000])
     step = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
-    # Few records are sampled slower than every 5 s, and few clocks count finer than they sample.
-    guess = "s" if step < 5.0 else "ms" if step < 5e3 else "us"
+    # Few records are sampled slower than every 5 s, but for those of whole minutes; few clocks count finer than they
+    # sample.
+    minutes = step >= _MINUTE and step % _MINUTE == 0.0
+    guess = "s" if step < 5.0 or minutes else "ms" if step < 5e3 else "us"
     why = f"the file says {said}, which is no unit of time" if said else "the file does not say its unit"
     first = f"{by_rising}; " if by_rising else ""
     why += "; it rises by 1, as a number of samples does" if len(steps) and bool((steps == 1.0).all()) else ""

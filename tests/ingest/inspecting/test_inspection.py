@@ -223,6 +223,13 @@ def test_a_record_is_proposed_in_parts(tmp_path: Path, split: list[float], roles
     assert np.concatenate([trace["u"] for trace in loaded]).tolist() == [k % 7 for k in range(20)]
 
 
+@pytest.mark.parametrize(("step", "unit"), [(0.02, "s"), (10, "ms"), (60, "s"), (1800, "s"), (10_000, "us")])
+def test_stamps_without_a_unit_are_of_one_that_records_have(write: Write, step: float, unit: str) -> None:
+    found = inspect_file(write("rig.csv", "Time,u\n" + rows(20, lambda i: f"{i * step},{i % 3}")))
+    assert found.time.unit == unit
+    assert f"Time in {unit}; the file does not say its unit" in found.time_told
+
+
 @pytest.mark.parametrize(
     ("head", "step", "said"),
     [
