@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -151,16 +151,21 @@ class FileFinding:
         found += self.of_time
         for case in self.cases[1:]:  # the first is this one
             found += [f"{case.name}: {one}" for one in case.finding.of_time if one not in self.of_time]
+        of_columns: dict[str, list[str]] = {}
         for column in self.columns:
-            if column.problem:
-                found.append(f"{column.name}: {column.problem}")
-                continue
-            found += [f"{column.name}: {counted(column.missing, 'missing value')}"] if column.missing else []
-            found += [f"{column.name}: {column.far}"] if column.far and not column.aside else []
-            found += [f"{column.name}: never changes"] if column.constant and not column.aside else []
-            unknown = f"{column.name}: the file says {column.said}, which is no unit that is known"
-            found += [unknown] if column.said else []
-        return tuple(found)
+            for told in _of_column(column):
+                of_columns.setdefault(told, []).append(column.name)
+        return (*found, *(f"{listed(names, 12)}: {told}" for told, names in of_columns.items()))
+
+
+def _of_column(column: ColumnFinding) -> list[str]:
+    """What is the matter with a column, one phrase each."""
+    if column.problem:
+        return [column.problem]
+    found = [counted(column.missing, "missing value")] if column.missing else []
+    found += [column.far] if column.far and not column.aside else []
+    found += ["never changes"] if column.constant and not column.aside else []
+    return [*found, f"the file says {column.said}, which is no unit that is known"] if column.said else found
 
 
 def _guess(name: str, value: object) -> str:
@@ -210,3 +215,21 @@ def counted(number: int, what: str) -> str:
         ('1 gap', '2 gaps')
     """
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+def listed(names: Sequence[str], most: int = 6) -> str:
+    """The first of some names, and how many more there are.
+
+    Args:
+        names: The names.
+        most: How many are shown.
+
+    Returns:
+        The words.
+
+    Example:
+        >>> listed(["u", "y", "z"], 2)
+        'u, y and 1 more'
+    """
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

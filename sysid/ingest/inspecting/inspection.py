@@ -16,7 +16,7 @@ from sysid.ingest.cells.blanks import blanks_mean, marks_in
 from sysid.ingest.inspecting.attempts import Attempt, read_somehow
 from sysid.ingest.inspecting.column_findings import column_finding
 from sysid.ingest.inspecting.events import are_events
-from sysid.ingest.inspecting.findings import CaseFinding, ColumnFinding, FileFinding, counted
+from sysid.ingest.inspecting.findings import CaseFinding, ColumnFinding, FileFinding, counted, listed
 from sysid.ingest.inspecting.restarts import finer_than_clock, records_by_clock
 from sysid.ingest.inspecting.second_clocks import without_second_clocks
 from sysid.ingest.inspecting.time_findings import find_time, finite_of, needs_of_time, step_beside, without_copies
@@ -24,6 +24,8 @@ from sysid.ingest.readers.records import role_of
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
 from sysid.ingest.tables.table import RawTable
+
+_MOST_APART = 6  # records of other kinds that are told one by one
 
 
 def inspect_file(path: str | Path, *, files: FileOptions | None = None) -> FileFinding:
@@ -200,13 +202,14 @@ def _of_records(whole: FileFinding, attempt: Attempt) -> FileFinding:
         return whole
     chosen = max(kinds.values(), key=len)
     apart = [case for case in cases if case not in chosen]
-    sizes = ", ".join(f"{case.name} ({case.finding.samples} samples)" for case in chosen)
+    sizes = listed([f"{case.name} ({case.finding.samples} samples)" for case in chosen])
     told = [f"{counted(len(chosen), 'record')}: {sizes}"]
     told += [
         f"{case.name}: a record with other channels or another sample time: a data set of its own, with "
         + ", ".join(f"{key}: {value}" for key, value in case.options.items())
-        for case in apart
+        for case in apart[:_MOST_APART]
     ]
+    told += [f"{len(apart) - _MOST_APART} more such records"] if len(apart) > _MOST_APART else []
     first = chosen[0].finding
     notes = dict.fromkeys([*told, *(note for case in chosen for note in case.finding.notes)])
     merged = {key: value for case in chosen for key, value in case.finding.needed.model_dump(exclude_none=True).items()}

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UnitError
+from sysid.ingest.tables.clocks import since_1970
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import is_called_time, is_time_unit
@@ -24,8 +25,8 @@ _COUNTER = re.compile(
     rf"(?:(?:lfd\.?|{_COUNTED})s?[ _.]*)?(?:#|no\.?|nr\.?|num|number|index|id|count(?:er)?)|n|k|i|{_COUNTED}",
     re.IGNORECASE,
 )
-_NAMELESS = {"column_1", "unnamed: 0", "level_0"}
-"""What a first column without a name is called, as that of an index that pandas wrote."""
+_NAMELESS = re.compile(r"column_1|level_0|unnamed: \d+(?:\.\d+)*", re.IGNORECASE)
+"""What a first column without a name is called, as those of indices that pandas wrote."""
 _EVEN = 0.25
 """Of its usual step, how far each step of a clock may be off it."""
 _TOGETHER = 0.1
@@ -57,7 +58,7 @@ def counts_rows(column: RawColumn) -> bool:
     Returns:
         Whether it is.
     """
-    called = is_counter(column.name) or column.name.casefold() in _NAMELESS
+    called = is_counter(column.name) or _NAMELESS.fullmatch(column.name) is not None
     return called and column.unit in {None, "1"} and _by_one(column.values)
 
 
@@ -89,6 +90,8 @@ def _said(column: RawColumn, first: RawColumn | None) -> str:
         return "counts the rows"
     if first is None or is_counter(column.name):
         return ""
+    if column.unit is None and since_1970(column.values) and since_1970(first.values):
+        return f"a second clock beside {first.name}"
     called = is_called_time(column.name) or _NUMBERED.fullmatch(column.name.strip()) is not None
     timed = column.unit is not None and is_time_unit(column.unit)
     if not (called or timed) or not _is_even(column.values):

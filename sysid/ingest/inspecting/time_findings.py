@@ -12,7 +12,7 @@ from sysid.ingest.assembling.timing import Timing, even_step, round_step, rounde
 from sysid.ingest.cells.headers import unit_in_name
 from sysid.ingest.inspecting.second_clocks import counts_rows, is_counter
 from sysid.ingest.readers.leaves import step_in
-from sysid.ingest.tables.clocks import clock_of
+from sysid.ingest.tables.clocks import clock_of, since_1970
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, GridOptions, TimeOptions
 from sysid.ingest.tables.table import RawTable
@@ -20,6 +20,7 @@ from sysid.ingest.tables.time_columns import is_time_unit
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
+_ARRAYS = {"matlab", "numpy"}
 _MINUTE = 60.0
 
 
@@ -51,15 +52,27 @@ def find_time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
         return TimeOptions(column=column.name, unit=clock.unit), f"guessed: {name} counts {clock.told}, by its size"
     with np.errstate(invalid="ignore"):
         steps = np.diff(column.values[:100_000])
-    step = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
-    # Few records are sampled slower than every 5 s, but for those of whole minutes; few clocks count finer than they
-    # sample.
-    minutes = step >= _MINUTE and step % _MINUTE == 0.0
-    guess = "s" if step < 5.0 or minutes else "ms" if step < 5e3 else "us"
+    steps = finite_of(steps)
+    guess, other = _unit_by_step(steps, arrays=table.reader in _ARRAYS)
     why = f"the file says {said}, which is no unit of time" if said else "the file does not say its unit"
     first = f"{by_rising}; " if by_rising else ""
     why += "; it rises by 1, as a number of samples does" if len(steps) and bool((steps == 1.0).all()) else ""
+    why += f"; if it is {other}, say so: unit: {other} (--time-unit {other})" if other else ""
     return TimeOptions(column=column.name, unit=guess), f"guessed: {first}{name} in {guess}; {why}"
+
+
+def _unit_by_step(steps: NDArray[np.float64], *, arrays: bool) -> tuple[str, str]:
+    """The unit of a clock that says none, and the other one that it may well be, or nothing."""
+    step = float(np.median(steps)) if len(steps) else 0.0
+    # Few records are sampled slower than every 5 s, but for those of whole minutes; few clocks count finer than they
+    # sample.
+    if step < 5.0:
+        return "s", ""
+    even = float(np.mean(np.abs(steps - step) <= 1e-6 * step)) >= _RISING_SHARE
+    # What is computed with has its time in s, where a logger's clock is uneven.
+    if (step >= _MINUTE and step % _MINUTE == 0.0) or (arrays and even and step < 1e3):
+        return "s", "ms"
+    return ("ms", "s") if step < 5e3 else ("us", "ms")
 
 
 def without_copies(columns: Sequence[RawColumn]) -> tuple[RawColumn, ...]:
@@ -90,14 +103,15 @@ def finite_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _rising(columns: Sequence[RawColumn]) -> str | None:
-    """A column that rises like a clock: nearly always, and by much the same step."""
-    for column in sorted(columns, key=lambda column: is_counter(column.name)):  # a clock goes before a counter
+    """A column that rises like a clock: nearly always, and by much the same step, or from 1970 on."""
+    # A clock goes before a counter, and one that says the date before any.
+    for column in sorted(columns, key=lambda c: (not since_1970(c.values), is_counter(c.name) or counts_rows(c))):
         with np.errstate(invalid="ignore"):
             steps = np.diff(column.values)
         if column.problem is not None or not len(steps) or np.mean(steps > 0.0) < _RISING_SHARE:
             continue
         usual = np.median(steps)
-        if np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
+        if since_1970(column.values) or np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
             return column.name
     return None
 

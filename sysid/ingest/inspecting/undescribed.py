@@ -13,7 +13,7 @@ from sysid.errors import ReaderError, UnitError, UserError
 from sysid.field_checks import check
 from sysid.ingest.datasets.dataset import load_described
 from sysid.ingest.datasets.description import DatasetDescription
-from sysid.ingest.inspecting.findings import FileFinding
+from sysid.ingest.inspecting.findings import FileFinding, listed
 from sysid.ingest.inspecting.inspection import inspect_file
 from sysid.ingest.inspecting.proposal import propose_dataset
 from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file
@@ -121,7 +121,7 @@ def _guesses(found: FileFinding) -> Iterator[str]:
         yield found.time_told.removeprefix("guessed: ")
     without = [column.name for column in found.channels if column.unit_guessed and column.unit == "1"]
     if without:
-        yield f"no unit for {_listed(without)}"
+        yield f"no unit for {listed(without)}"
     named = [
         f"{column.name} in {column.unit}" for column in found.channels if column.unit_guessed and column.unit != "1"
     ]
@@ -131,15 +131,9 @@ def _guesses(found: FileFinding) -> Iterator[str]:
     yield from found.guesses
     if found.cases:
         yield from found.notes
-        yield "roles " + _listed([f"{case.name}: {case.role}" for case in found.cases])
+        yield "roles " + listed([f"{case.name}: {case.role}" for case in found.cases])
     aside = [
         f"{column.name} ({column.problem or column.aside})" for column in found.columns if column not in found.channels
     ]
     if aside:
-        yield f"left out: {_listed(aside)}"
-
-
-def _listed(names: list[str], most: int = 6) -> str:
-    """The first of some names, and how many more there are."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+        yield f"left out: {listed(aside)}"

@@ -268,9 +268,13 @@ class Body:
     def _row_by_row(self, block: Block, *, last: bool) -> None:
         width = len(self.columns)
         ended = io.StringIO(block.text, newline="\n")
-        found = split_rows(ended, self.layout.separator, line=block.line, comment=self.comment, path=self.file.path)
+        found = split_rows(
+            ended, self.layout.separator, line=block.line, comment=self.comment, path=self.file.path, width=width
+        )
         rows = [Row(line=row.line, cells=trimmed(row.cells, width)) for row in found]
         rows = self._without_headers(rows)
+        while last and rows and not any(rows[-1].cells):
+            rows.pop()
         footer = self._footer(rows) if last else 0
         if footer:
             cut = rows[len(rows) - footer :]

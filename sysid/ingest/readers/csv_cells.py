@@ -137,7 +137,14 @@ def trimmed(cells: list[str], width: int) -> list[str]:
 
 
 def split_rows(
-    lines: Iterable[str], separator: str, *, line: int, comment: str, path: Path, whole: bool = True
+    lines: Iterable[str],
+    separator: str,
+    *,
+    line: int,
+    comment: str,
+    path: Path,
+    whole: bool = True,
+    width: int = 0,
 ) -> Iterator[Row]:
     """Cells of every row that is neither blank nor a comment.
 
@@ -148,6 +155,7 @@ def split_rows(
         comment: What a comment line begins with.
         path: The file, for errors.
         whole: Whether a quote that does not close is an error; otherwise the rows before it are all.
+        width: How many empty cells a row of separators alone is; with 0 it is a blank one.
 
     Yields:
         The rows.
@@ -167,6 +175,8 @@ def split_rows(
         for cells in parser:
             if any(map(str.strip, cells)):
                 yield Row(line=parser.line_num + line - 1, cells=cells)
+            elif width and len(cells) > 1:
+                yield Row(line=parser.line_num + line - 1, cells=[""] * width)
     except csv.Error as error:
         if not whole and "unexpected end" in str(error):
             return

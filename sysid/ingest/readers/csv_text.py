@@ -82,8 +82,11 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
     if layout.numbers.decimal != ".":
         notes.append("decimal comma")
     if file.encoding == "cp1252" and options.encoding is None and seems_garbled(layout.names):
-        notes.append("the names are no words in Windows-1252: name the encoding (encoding: cp1251, cp1250, cp932 ...)")
+        notes.append(
+            "the names are no words in Windows-1252: name the encoding (encoding: gb18030, cp1251, cp1250, cp932 ...)"
+        )
     clock = headers[time].name if time is not None else recognise_time(raw)
+    raw, rows = _without_empty_rows(raw, rows, notes, stamped=clock is not None)
     above = [*layout.comments, *(layout.separator.join(row.cells) for row in layout.preamble)]
     step = said_step(above)
     if step is not None and clock is None:
@@ -122,7 +125,7 @@ READER = Reader(
 
 def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
     width = len(layout.kinds)
-    texts: Sequence[str] = layout.names or [f"column_{index + 1}" for index in range(width)]
+    texts: Sequence[str] = layout.names or [*(f"column_{i + 1}" for i in range(_filled(layout))), *[""] * width][:width]
     if options.names is not None:
         texts = _given_names(options.names, layout, path)
     headers = parse_headers([from_csv_cell(text) for text in texts])
@@ -139,11 +142,15 @@ def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
     return headers
 
 
+def _filled(layout: Layout) -> int:
+    """How many columns need a name: a separator at the end of every line makes one that does not."""
+    width = len(layout.kinds)
+    return width - 1 if width > 1 and layout.kinds[-1] is Kind.NOTHING else width
+
+
 def _given_names(names: Sequence[str], layout: Layout, path: Path) -> list[str]:
     width = len(layout.kinds)
-    # A separator at the end of every line makes a column that needs no name.
-    filled = width - 1 if width > 1 and layout.kinds[-1] is Kind.NOTHING else width
-    if len(names) not in {filled, width}:
+    if len(names) not in {_filled(layout), width}:
         raise ReaderError(
             "names does not fit the columns",
             where=f"{path}, line {layout.skip + 1}",
@@ -232,6 +239,29 @@ def _finished(
             notes.append(f"column {index + 1} has no name: called column_{index + 1}")
         found.append(raw)
     return tuple(found), guess
+
+
+def _without_empty_rows(
+    columns: tuple[RawColumn, ...], lines: NDArray[np.int32], notes: list[str], *, stamped: bool
+) -> tuple[tuple[RawColumn, ...], NDArray[np.int32]]:
+    """Without rows of separators alone: behind the table, and among stamps, where they are at no time."""
+    if any(column.problem is not None and column.words is None for column in columns):
+        return columns, lines
+    filled = np.zeros(len(lines), dtype=np.bool_)
+    for column in columns:
+        filled |= (column.words.codes >= 0) if column.words is not None else ~np.isnan(column.values)
+        if filled.all():
+            return columns, lines
+    kept = filled if stamped else np.arange(len(lines)) <= np.flatnonzero(filled).max(initial=-1)
+    if not kept.any() or kept.all():
+        return columns, lines
+    told = "1 row" if np.sum(~kept) == 1 else f"{np.sum(~kept)} rows"
+    notes.append(f"{told} without a value left out, the first: line {lines[~kept][0]}")
+    some = tuple(
+        replace(c, values=c.values[kept], words=c.words and replace(c.words, codes=c.words.codes[kept]))
+        for c in columns
+    )
+    return some, lines[kept]
 
 
 def _take_dates(columns: Sequence[AnyColumn], calendar: int) -> int | None:

@@ -46,6 +46,16 @@ _PACKED = (b"\x1f\x8b", b"PK\x03\x04", b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf", b"\x2
 """How files of gzip, zip, bzip2, xz, 7-Zip and Zstandard begin."""
 
 
+_IN_R = "in R: write.csv(as.data.frame(x), 'x.csv', row.names = FALSE)"
+_ELSEWHERE = {
+    **dict.fromkeys((".rda", ".rdata", ".rds"), _IN_R),
+    ".ods": "save it in LibreOffice as .xlsx or CSV",
+    **dict.fromkeys((".pkl", ".pickle"), "write it in Python by to_parquet or to_csv: nothing is unpickled here"),
+    ".ulg": "write it as CSV: pip install pyulog, then ulog2csv FILE",
+}
+"""What to do with files that are known, and read by others, though they look packed."""
+
+
 def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None) -> Reader:
     """The reader for a file.
 
@@ -72,8 +82,9 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
     if by_suffix is not None and by_suffix.is_mine is not None and by_suffix.is_mine(head):
         return by_suffix
     by_content = next((reader for reader in readers if reader.is_mine is not None and reader.is_mine(head)), None)
-    if by_content is None and by_suffix is not None and by_suffix.is_mine is not None:
-        _check_no_markup(head, by_suffix, path)
+    if by_content is None and (by_suffix is None or by_suffix.is_mine is not None):
+        if by_suffix is not None:
+            _check_no_markup(head, by_suffix, path)
         if _IS_TABLE.search(_as_ascii(head)):  # programs give tables of text any name: "a.xls", "a.mat" of save -ascii
             by_content = next((reader for reader in readers if reader.name == "csv"), None)
     if by_content is not None or by_suffix is not None:
@@ -83,13 +94,18 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
         where=path,
         expected=f"a name that ends in {', '.join(suffix for reader in readers for suffix in reader.suffixes)}",
         got=path.suffix or "a name without an ending",
-        remedy="unpack it first: it is compressed"
-        if head.startswith(_PACKED)
-        else "export the traces to one of these (sound: scipy.io.wavfile.read and sysid.data)"
-        if head.startswith(b"RIFF")
-        else "export the traces to one of these"
-        + ("" if b"\0" in head else ", or, as it is text, name the reader (reader: csv)"),
+        remedy=_remedy(path, head),
     )
+
+
+def _remedy(path: Path, head: bytes) -> str:
+    elsewhere = _ELSEWHERE.get(path.suffix.lower())
+    if elsewhere is not None or head.startswith(_PACKED):
+        return elsewhere or "unpack it first: it is compressed"
+    if head.startswith(b"RIFF"):
+        return "export the traces to one of these (sound: scipy.io.wavfile.read and sysid.data)"
+    as_text = "" if b"\0" in head else ", or, as it is text, name the reader: csv (--reader csv)"
+    return f"export the traces to one of these{as_text}"
 
 
 def _as_ascii(head: bytes) -> bytes:

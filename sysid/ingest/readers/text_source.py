@@ -223,12 +223,14 @@ def not_text(path: Path, tries: list[str], problem: Exception) -> ReaderError:
             f"the file is packed with {packed}", where=path, expected="a file as it was recorded", got=f"{packed} data",
             remedy="unpack it, and give the file that was in it",
         )  # fmt: skip
+    lost = ", take out what a logger wrote as it lost power (tr -d '\\000' < file > clean.csv)"
+    clean = lost if isinstance(problem, ZeroBytesError) else ""
     return ReaderError(
         "the file is not text",
         where=path,
         expected=f"text in {' or '.join(tries)}",
         got=problem,
-        remedy="check that it is a CSV file, or name its encoding "
+        remedy=f"check that it is a CSV file{clean}, or name its encoding "
         "(encoding: cp932 for Japanese, gb18030, big5, cp949, cp1251, cp1250, utf-16-le)",
     )
 

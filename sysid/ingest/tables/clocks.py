@@ -83,6 +83,23 @@ def clock_of(values: NDArray[np.float64], name: str, *, origin: int = 0) -> Cloc
     return None
 
 
+def since_1970(values: NDArray[np.float64]) -> bool:
+    """Whether a column without a unit counts from 1970 on, by its size: no signal does.
+
+    Args:
+        values: Shape ``(n,)``; NaN where there is no stamp.
+
+    Returns:
+        Whether it does.
+
+    Example:
+        >>> since_1970(np.array([1.7e12, 1.7e12 + 100.0])), since_1970(np.array([0.0, 0.1]))
+        (True, False)
+    """
+    clock = clock_of(values, "")
+    return clock is not None and not clock.by_name
+
+
 def _is_in_days(step: float) -> bool:
     """Whether a step is a whole number of seconds if it is in days, and no short number if it is not."""
     seconds = step * _DAY

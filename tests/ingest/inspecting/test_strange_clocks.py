@@ -114,3 +114,39 @@ def test_varnames_beside_a_matrix_name_its_columns(tmp_path: Path) -> None:
     names = np.array(["time", "pump", "level"], dtype=object)
     savemat(tmp_path / "a.mat", {"data": np.column_stack([np.arange(N) / 10, U, Y]), "varnames": names})
     assert [column.name for column in inspect_file(tmp_path / "a.mat").channels] == ["pump", "level"]
+
+
+@pytest.mark.parametrize(
+    ("step", "unit"), [(1800.0, "s"), (60.0, "s"), (20.0, "ms"), (1000.0, "ms"), (0.5, "s"), (10_000.0, "us")]
+)
+def test_a_clock_without_a_unit_that_goes_by_whole_minutes_is_in_seconds(
+    tmp_path: Path, step: float, unit: str
+) -> None:
+    found = inspect_file(write(tmp_path, rows([f"{k * step}" for k in range(N)], "Time,u [V],y [V]")))
+    assert found.time.unit == unit
+    assert ("say so" in found.time_told) == (step >= 5)
+
+
+def test_an_even_clock_of_a_workspace_is_in_seconds_and_a_loggers_is_not(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    logged = 20 * np.arange(N) + np.random.default_rng(0).integers(0, 3, N)
+    for stamps, unit in ((5 * np.arange(N), "s"), (logged, "ms")):
+        savemat(tmp_path / "a.mat", {"t": stamps, "u": U, "y": Y})
+        assert inspect_file(tmp_path / "a.mat").time.unit == unit
+
+
+def test_a_clock_beside_an_index_without_a_name_is_found(tmp_path: Path) -> None:
+    text = "\n".join([",Unnamed: 0.1,time_exp,u,y", *(f"{k},{k},{k / 200},{U[k]},{Y[k]}" for k in range(N))])
+    found = inspect_file(write(tmp_path, text + "\n"))
+    assert (found.time.column, found.sample_time) == ("time_exp", pytest.approx(0.005))
+    assert [column.name for column in found.channels] == ["u", "y"]
+
+
+def test_stamps_since_1970_are_time_however_uneven_and_further_ones_are_no_channels(tmp_path: Path) -> None:
+    steps = np.random.default_rng(0).choice([90, 200, 1000, 5000], N)
+    stamps = 1_394_206_372_724 + np.cumsum(steps)
+    lines = [f"{k} {U[k]} {stamps[k]} {stamps[k] + 37 + k % 5} {Y[k]}" for k in range(N)]
+    found = inspect_file(write(tmp_path, "\n".join(lines) + "\n"))
+    assert (found.time.column, found.time.unit) == ("column_3", "ms")
+    assert [column.name for column in found.channels] == ["column_2", "column_5"]

@@ -10,6 +10,7 @@ import pytest
 
 import sysid
 from sysid.errors import ChannelError, ConfigError, ReaderError, TraceError, UnitError
+from sysid.ingest import inspect_file
 from sysid.ingest.inspecting.undescribed import GuessedWarning
 
 N = 120
@@ -120,3 +121,11 @@ def test_a_signal_that_is_called_as_time_is_not_the_clock(
         trace = sysid.load(tmp_path / "rig.csv").traces[0]
     assert trace.sample_time == (step or 1.0)
     assert np.allclose(trace[trace.channel_names[-1]], level, atol=1e-6)
+
+
+def test_what_is_the_matter_with_several_columns_is_told_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t [s],a,b,c,d\n" + "".join(f"{k / 10},1,2,{k},\n" for k in range(30)))
+    problems = inspect_file(path).problems
+    assert "a, b: never changes" in problems
+    assert sum("never changes" in one for one in problems) == 1

@@ -57,6 +57,21 @@ def test_a_file_without_header_gets_numbered_columns(write: Write) -> None:
     assert (table.names, len(table), table.time) == (("column_1", "column_2"), 2, None)
 
 
+def test_a_separator_at_the_end_of_every_line_makes_no_column(write: Write) -> None:
+    assert read_table(write("run.dat", "0.1\t1.5\t\n0.2\t-2.5\t\n")).names == ("column_1", "column_2")
+
+
+@pytest.mark.parametrize("times", [1, 20_000], ids=["row by row", "in bulk"])
+def test_rows_of_separators_alone_are_no_lost_samples(write: Write, times: int) -> None:
+    body = "1.5,2\n,\n2.5,3\n" * times + ",\n,\n"
+    without = read_table(write("run.csv", "u [V],y\n" + body))
+    assert without.find("u").values[:3].tolist() == pytest.approx([1.5, np.nan, 2.5], nan_ok=True)
+    assert len(without) == 3 * times
+    stamped = read_table(write("run.csv", "t [s],u [V]\n" + body))
+    assert stamped.find("u").values[:2].tolist() == [2.0, 3.0]
+    assert any("without a value left out" in note for note in stamped.notes)
+
+
 def test_lines_before_the_header_are_skipped_and_lines_still_count_from_the_top(write: Write) -> None:
     path = write("run.csv", "Logger 7\nSerial;12;34\nt [s];u [V]\n0;1,5\n1;x\n")
     table = read_table(path, files=FileOptions(skip_lines=2, separator=";"))

@@ -187,9 +187,10 @@ def test_a_file_is_known_by_its_content_whatever_it_is_called(
 
 
 def test_an_unknown_ending_names_the_known_ones(tmp_path: Path) -> None:
-    (tmp_path / "run.xyz").write_text("t [s],u [V]\n0,1\n1,2\n")
+    (tmp_path / "run.xyz").write_text("t [s],u [V]\non,off\n")
     with pytest.raises(ReaderError, match=r"(?s)\.csv.*\.mat.*got: +\.xyz.*name the reader"):
         read_table(tmp_path / "run.xyz")
+    (tmp_path / "run.xyz").write_text("t [s],u [V]\n0,1\n1,2\n")
     assert read_table(tmp_path / "run.xyz", files=FileOptions(reader="csv")).names == ("t", "u")
 
 
@@ -251,3 +252,16 @@ def test_a_packed_file_of_a_kind_that_is_not_opened_is_to_be_unpacked(tmp_path: 
     path.write_bytes(b"\x28\xb5\x2f\xfd" + bytes(20))
     with pytest.raises(ReaderError, match="unpack it first"):
         read_table(path)
+
+
+@pytest.mark.parametrize("name", ["putty.log", "run.out", "run"])
+def test_text_of_numbers_is_read_whatever_its_ending(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("0,91777,0,43.72\n0,92278,0,43.69\n")
+    assert read_table(tmp_path / name).reader == "csv"
+
+
+@pytest.mark.parametrize(("name", "remedy"), [("a.rda", "write.csv"), ("a.ods", "LibreOffice"), ("a.ulg", "ulog2csv")])
+def test_a_file_of_another_tool_says_how_it_is_written_as_a_table(tmp_path: Path, name: str, remedy: str) -> None:
+    (tmp_path / name).write_bytes(b"\x1f\x8b" + bytes(40))
+    with pytest.raises(ReaderError, match=f"remedy: .*{remedy}"):
+        read_table(tmp_path / name)
