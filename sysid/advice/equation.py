@@ -57,20 +57,19 @@ def least_bic(traces: Sequence[Trace], mapping: Mapping, dead: Sequence[int], *,
     Returns:
         The equation; ``None`` where the records are too short for any.
     """
-    m, samples = len(mapping.inputs), sum(int(trace.usable_samples.sum()) for trace in traces)
     # The grid has the same range of dead times for each input: what they have in common is taken off the inputs.
-    low = max(min(dead, default=0) - 1, int(at_once))
+    first = int(at_once)
+    low = max(min(dead, default=0) - 1, first)
     spread = min(max(dead, default=0) + 1 - low, 4) if dead else 0
-    order = next(
-        (n for n in range(MOST_ORDER, 0, -1) if 4 * (n + m * (n + low + spread) + 1) <= samples
-         and OrderGrid(max_na=n, max_nb=n, max_nk=low + spread, min_nk=low).size(m) <= MOST_CANDIDATES),
-        None,
-    )  # fmt: skip
-    if order is None:
+    near = _search(traces, mapping, low, spread)
+    # A response that is small at first, as of what adds up twice, is taken for a dead time, and a wrong one for poles
+    # that grow.
+    early = _search(traces, mapping, first, 1) if low > first + 1 else None
+    found = min((one for one in (near, early) if one is not None), key=lambda one: one[0], default=None)
+    if found is None:
         return None
-    grid = OrderGrid(max_na=order, max_nb=order, max_nk=low + spread, min_nk=low)
+    _, best, order = found
     try:
-        best = search_orders(traces, mapping, grid, start=FROM_START, workers=1).best(Criterion.BIC)
         fit = fit_arx(traces, mapping, best, start=FROM_START)
     except UserError:
         return None
@@ -78,8 +77,28 @@ def least_bic(traces: Sequence[Trace], mapping: Mapping, dead: Sequence[int], *,
     assert isinstance(model, ARXModel)  # noqa: S101 - that is what was asked for
     pole, deviation = (0j, 0.0) if known is None else _outermost(model, known.covariance)
     beyond = abs(pole) - 1.0
-    grows = beyond > BEYOND * deviation and beyond * samples > FOLDS
+    grows = beyond > BEYOND * deviation and beyond * _samples(traces) > FOLDS
     return Equation(structure=best, order=order, explained=_explained(model, traces), pole=pole, grows=grows)
+
+
+def _samples(traces: Sequence[Trace]) -> int:
+    return sum(int(trace.usable_samples.sum()) for trace in traces)
+
+
+def _search(traces: Sequence[Trace], mapping: Mapping, low: int, spread: int) -> tuple[float, ARX, int] | None:
+    """The criterion for each sample, the structure, and the largest order that was tried; or that none can be."""
+    m, samples = len(mapping.inputs), _samples(traces)
+    for order in range(MOST_ORDER, 0, -1):
+        grid = OrderGrid(max_na=order, max_nb=order, max_nk=low + spread, min_nk=low)
+        if 4 * (order + m * (order + low + spread) + 1) > samples or grid.size(m) > MOST_CANDIDATES:
+            continue
+        try:
+            found = search_orders(traces, mapping, grid, start=FROM_START, workers=1)
+        except UserError:
+            return None
+        best = int(np.argmin(found.score(Criterion.BIC)))
+        return float(found.score(Criterion.BIC)[best]) / found.n_samples, found.orders(best), order
+    return None
 
 
 def _outermost(model: ARXModel, covariance: NDArray[np.float64]) -> tuple[complex, float]:

@@ -221,7 +221,7 @@ class OrderSearch:
         lines = [
             f"{one.fit.model.structure.label:<24}{one.fit.model.n_parameters:>11}{one.one_step_mse:>14.4g}"
             f"{self.score(one, Criterion.BIC):>12.1f}{percent(one.mean_fit):>17}"
-            f"{pole(one.pole_radius):>14}"
+            f"  {pole(one.pole_radius):>12}"
             for one in self.contenders[: 10 if self.others is None else None]
         ]
         return "\n".join([f"{len(self.losses):,} structures; {self.chosen_by}", head, *lines, *self.notes])

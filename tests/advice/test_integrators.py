@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from sysid.advice import Advice, Verdict, advise
+from sysid.advice.equation import least_bic
 from sysid.advice.integrators import integrates
 from sysid.models import Mapping, NeuralStateSpace
 from sysid.traces import Role, Trace, TraceSet
@@ -88,3 +89,21 @@ def test_it_is_told_and_what_is_suggested_has_it() -> None:
     networks = [one.structure for one in found.suggestions if isinstance(one.structure, NeuralStateSpace)]
     assert [one.integrators for one in networks] == [1]
     assert "integrates" in str(found)
+
+
+def test_a_response_that_is_small_at_first_is_no_dead_time_after_which_the_plant_runs_away() -> None:
+    """A joint that a controller positions: its place answers the first samples by next to nothing."""
+    n, T = 2400, 0.005
+    wanted = np.repeat(np.random.default_rng(1).uniform(-0.3, 0.3, n // 400), 400)
+    u, y, speed, place = np.empty(n), np.empty(n), 0.0, 0.0
+    for t in range(n):
+        y[t] = place
+        u[t] = np.clip(160.0 * (wanted[t] - place) - 24.0 * speed, -4.0, 4.0)
+        speed += T * (u[t] * 0.36 - 2.0 * speed - 0.2 * np.tanh(50.0 * speed))
+        place += T * speed
+    # By the response alone its dead time is some twenty samples.
+    found = least_bic([a_trace(u, y, noise=1e-5)], MAPPING, [20], at_once=False)
+    assert found is not None
+    assert max(found.structure.nk) <= 2
+    assert not found.grows
+    assert found.explained > 0.9

@@ -48,6 +48,11 @@ def test_the_selection_traces_choose_where_there_are_some(found: OrderSearch) ->
     assert "selection" in found.chosen_by
 
 
+def test_an_unstable_pole_stands_apart_from_the_free_run(found: OrderSearch, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sysid.api.orders.pole", lambda _: "1.0005, unstable")
+    assert "  1.0005, unstable" in str(found)
+
+
 def test_without_selection_traces_bic_sorts_the_shortlist() -> None:
     searched = sysid.search_orders(sysid.data(record(300), sample_time=1.0), "u -> y")
     assert searched.to_frame()["BIC"].is_monotonic_increasing

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Mapping
 from datetime import datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -24,22 +25,31 @@ _MOST_BYTES = 2**30
 """Of Python objects, which JSON becomes before it is numbers."""
 _OPENING, _ITEM = 96, 40  # bytes that a list or a mapping takes, and an item in one
 _DEEPEST = 64
+_KEPT = 2**24  # bytes of a file that is kept, as it was read last
 _OPENS = re.compile(rb'(?:\xef\xbb\xbf)?\s*(?:\{\s*"|\[\s*(?:\{\s*"|\[\s*["\d\[-]))')
 _VALUES = {"values", "data", "samples", "value"}
 
 
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
-    raw = path.read_bytes()
-    _check_size(raw, path)
-    try:
-        content = _content(raw.decode("utf-8-sig"))
-        tree = _tree(content, 0)
-    except (ValueError, RecursionError) as error:
-        raise damaged(path, "JSON", error) from error
+    state = path.stat()
+    # Ninety records of one file would read it ninety times.
+    tree = (_again if state.st_size < _KEPT else _tree_in)(path, (state.st_size, state.st_mtime_ns))
     if not isinstance(tree, dict):
         records = isinstance(tree, list) and all(isinstance(item, dict) for item in tree)
         tree = {"record" if records else "column": tree}
     return table_of(tree, path=path, reader="json", options=options)
+
+
+def _tree_in(path: Path, _: tuple[int, int]) -> Any:
+    raw = path.read_bytes()
+    _check_size(raw, path)
+    try:
+        return _tree(_content(raw.decode("utf-8-sig")), 0)
+    except (ValueError, RecursionError) as error:
+        raise damaged(path, "JSON", error) from error
+
+
+_again = lru_cache(maxsize=1)(_tree_in)
 
 
 READER = Reader(
@@ -57,10 +67,9 @@ def _check_size(raw: bytes, path: Path) -> None:
     claimed = _OPENING * openings + _ITEM * (raw.count(b",") + openings)
     if claimed > _MOST_BYTES:
         raise too_large(path, f"about {claimed / 2**20:.0f} MB of lists and numbers", _MOST_BYTES)
-    depth = deepest = 0
-    for byte in raw[: 2**16]:
-        depth += (byte in b"[{") - (byte in b"]}")
-        deepest = max(deepest, depth)
+    begin = np.frombuffer(raw[: 2**16], dtype=np.uint8)
+    steps = np.isin(begin, list(b"[{")).astype(np.int64) - np.isin(begin, list(b"]}"))
+    deepest = int(np.cumsum(steps).max(initial=0))
     if deepest > _DEEPEST:
         raise ReaderError(
             "the file nests its lists too deep",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -97,3 +98,18 @@ def test_a_temperature_is_no_clock(tmp_path: Path) -> None:
     assert read_table(tmp_path / "a.npz").time == "t"
     np.savez(tmp_path / "a.npz", T=0.1 * LONG, u=LONG)
     assert read_table(tmp_path / "a.npz").time == "T"
+
+
+def test_records_of_one_json_file_are_parsed_once_until_it_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from sysid.ingest.readers import json_text
+
+    parsed, plain = [], json_text._content
+    monkeypatch.setattr(json_text, "_content", lambda text: parsed.append(len(text)) or plain(text))
+    file = tmp_path / "a.json"
+    for last in (1, 2):
+        file.write_text(json.dumps({"u": [1, 2, last], "padding": "x" * last}))
+        for _ in range(3):
+            assert read_table(file).find("u").values[-1] == last
+        assert len(parsed) == last
