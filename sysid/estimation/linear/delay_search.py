@@ -42,7 +42,11 @@ def check_max_delay(most: int | None, *, searched: bool, field: str) -> None:
 
 
 def searched_delays(
-    places: Sequence[Sequence[int]], least: int, most: int, loss_at: Callable[[tuple[int, ...], int], float]
+    places: Sequence[Sequence[int]],
+    least: int,
+    most: int,
+    loss_at: Callable[[tuple[int, ...], int], float],
+    loss_near: Callable[[tuple[int, ...], int], float] | None = None,
 ) -> tuple[tuple[int, ...], tuple[str, ...]]:
     """Dead times with the least loss.
 
@@ -53,6 +57,8 @@ def searched_delays(
         least: The shortest that is tried.
         most: The longest.
         loss_at: The loss of some dead times where so many first samples of each record do not count.
+        loss_near: The same of dead times next to others that were looked at, which may take less; ``loss_at`` by
+            default.
 
     Returns:
         The dead times, and what is to be said of the search.
@@ -63,9 +69,9 @@ def searched_delays(
     known: dict[tuple[int, ...], float] = {}
     reach = [min(most, max(FEW, *(place for of in places for place in of)) + 2 * AROUND)]
 
-    def loss(delays: tuple[int, ...]) -> float:
+    def loss(delays: tuple[int, ...], by: Callable[[tuple[int, ...], int], float] = loss_near or loss_at) -> float:
         if delays not in known:
-            known[delays] = loss_at(delays, reach[0])
+            known[delays] = by(delays, reach[0])
         return known[delays]
 
     if len(few) ** m <= MOST_COMBINATIONS:
@@ -73,7 +79,7 @@ def searched_delays(
     else:
         starts = [(least,) * m, (few[-1],) * m]
     starts += [tuple(of[min(i, len(of) - 1)] for of in places) for i in range(max(len(of) for of in places))]
-    ranked = sorted(dict.fromkeys(starts), key=loss)
+    ranked = sorted(dict.fromkeys(starts), key=lambda start: loss(start, loss_at))
     best = min((descend(start, least, reach[0], loss) for start in ranked[:2]), key=loss)
     while max(best) == reach[0] < most:  # at the end of what was compared: further
         reach[0] = min(most, 2 * reach[0])

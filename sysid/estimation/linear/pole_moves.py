@@ -17,11 +17,15 @@ FASTEST = 30.0
 GROWS, BACK = 1e-6, 1e-6
 """Rate per sample from which a pole is one that grows, and by how much such a one is drawn back."""
 MOST_CONTAINED = 12
-"""Structures within one up to which all of them are fitted as starts for it; of larger ones a chain down to there."""
+"""Structures within one, over its inputs, up to which all of them are fitted as starts for it; of larger ones a chain
+down to there."""
 
 
 def next_smaller(orders: TransferFunction) -> list[TransferFunction]:
-    """The largest structures that one contains, with one zero or one pole less; a single one where there are many.
+    """The largest structures that one contains, with one zero or one pole less.
+
+    Where there are many of them it is a single one, with a pole less for each input that has the most, or a zero. One
+    input after the other would be a chain as long as there are poles: of three inputs with three poles fifteen fits.
 
     Args:
         orders: The structure.
@@ -34,10 +38,13 @@ def next_smaller(orders: TransferFunction) -> list[TransferFunction]:
         ['TF [2; 0; 1]', 'TF [1; 1; 1]']
     """
     pairs = list(enumerate(zip(orders.poles, orders.zeros, strict=True)))
-    one_pole_less = {j: _with(orders, j, n - 1, min(m, n - 1)) for j, (n, m) in pairs if n > 1}
-    if one_pole_less and _contained(orders) > MOST_CONTAINED:
-        return [one_pole_less[int(np.argmax(orders.poles))]]
-    return [*(_with(orders, j, n, m - 1) for j, (n, m) in pairs if m > 0), *one_pole_less.values()]
+    if _contained(orders) > MOST_CONTAINED // len(pairs):
+        most, zero = max(orders.poles), max(orders.zeros)
+        poles = tuple(n - (n == most > 1) for n in orders.poles)
+        zeros = tuple(min(m - (most == 1 and m == zero), n) for m, n in zip(orders.zeros, poles, strict=True))
+        return [replace(orders, poles=poles, zeros=zeros)]
+    one_pole_less = [_with(orders, j, n - 1, min(m, n - 1)) for j, (n, m) in pairs if n > 1]
+    return [*(_with(orders, j, n, m - 1) for j, (n, m) in pairs if m > 0), *one_pole_less]
 
 
 def _with(orders: TransferFunction, j: int, poles: int, zeros: int) -> TransferFunction:

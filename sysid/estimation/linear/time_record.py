@@ -15,7 +15,7 @@ from sysid.estimation.linear.predictor import MirroredPredictor
 from sysid.estimation.linear.records import AbstractRecord, Bases, full, tap_slices
 from sysid.kernels import linear as kernel
 from sysid.kernels.arrays import GONE, forget_what_has_died_away
-from sysid.models.converting.orthonormal_basis import BasisSection, Domain
+from sysid.models.converting.orthonormal_basis import BasisSection, Domain, growth
 from sysid.models.converting.realisation import Realisation, realise
 
 
@@ -46,6 +46,10 @@ class TimeRecord(AbstractRecord):
     def predictor(self, bases: Bases) -> MirroredPredictor | None:
         """From a fitted initial state alone; see the base class."""
         if not self.free_start:
+            return None
+        # Asked of every trial step: sections tell their poles in no time, a realisation and its eigenvalues do not.
+        edge = 1.0 if self.domain is Domain.DISCRETE else 0.0
+        if all(growth(section.denominator, self.domain) <= edge for basis in bases for section in basis):
             return None
         return _predictor(bases, self.domain, self.sample_time, self.moving, len(self.target))
 

@@ -21,6 +21,7 @@ Coefficients stand in ascending powers of :math:`q^{-1}` (discrete) or of :math:
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -187,6 +188,30 @@ def section_poles(d: NDArray[np.float64], domain: Domain) -> NDArray[np.complex1
         Shape ``(order,)``.
     """
     return np.asarray(np.roots(d if domain is Domain.DISCRETE else d[::-1]), dtype=np.complex128)
+
+
+def growth(d: NDArray[np.float64], domain: Domain) -> float:
+    """How fast the slowest pole of one section dies away, or the fastest grows.
+
+    Args:
+        d: Its denominator, of order 1 or 2.
+        domain: Its domain.
+
+    Returns:
+        The largest magnitude of a pole (discrete), the largest real part (continuous).
+    """
+    if domain is Domain.CONTINUOUS:
+        c1, c0 = float(d[-2]), float(d[0])
+        if len(d) == 2:
+            return -c0
+        bent = c1 * c1 - 4.0 * c0
+        return 0.5 * (-c1 + (math.sqrt(bent) if bent > 0.0 else 0.0))
+    c1 = float(d[1])
+    if len(d) == 2:
+        return abs(c1)
+    c2 = float(d[2])
+    bent = c1 * c1 - 4.0 * c2
+    return math.sqrt(c2) if bent < 0.0 else 0.5 * (abs(c1) + math.sqrt(bent))
 
 
 def responses(basis: Sequence[BasisSection], variable: NDArray[np.complex128]) -> NDArray[np.complex128]:
