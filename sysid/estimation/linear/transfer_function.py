@@ -20,6 +20,7 @@ from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_star
 from sysid.estimation.linear.segments import delayed_inputs, scaling_of
 from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.linear.time_record import TimeRecord
+from sysid.estimation.linear.transfer_function_delays import DelaySearch
 from sysid.estimation.linear.transfer_function_problem import AbstractProblem, Score
 from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_search import solve
@@ -170,6 +171,7 @@ class _Problem(AbstractProblem):
     training: TransferFunctionTraining
     terms: Terms
     as_scored: Score = None
+    rested: bool = True
 
     def provider(self, delays: tuple[int, ...], *, unknown: int | None = None) -> SeparableProvider:
         """The least-squares problem with these dead times; see the base class."""
@@ -219,7 +221,7 @@ class _Problem(AbstractProblem):
         targets = [e.output[rows] for e in self.experiments for rows in _counted(e)]
         whole = self.scaling.scale_output(np.concatenate(targets))
         constant = 0.5 * float(np.sum((whole - whole.mean()) ** 2)), len(whole)
-        found = without_dead_time(delays, 1, self.loss_at, constant)
+        found = without_dead_time(delays, 1, DelaySearch(problem=self).loss_at, constant)
         return delays if found == delays or self._fed_back() else found
 
     def _fed_back(self) -> bool:
@@ -229,6 +231,10 @@ class _Problem(AbstractProblem):
         kept = informative(np.concatenate([s.inputs for s in stretches]))
         found = find_feedback([replace(s, inputs=s.inputs[:, list(kept)]) for s in stretches])
         return not isinstance(found, str) and found.at_once
+
+    def begun_in_motion(self) -> _Problem | None:
+        """With first samples left out that stand; see the base class."""
+        return replace(self, rested=False) if any(e.free and _at_rest(e, 0) for e in self.experiments) else None
 
     def likely_delays(self, least: int, most: int) -> list[list[int]]:
         """By correlation; see the base class."""
@@ -263,9 +269,8 @@ class _Problem(AbstractProblem):
         not judged by each of them.
         """
         unknown, dead = (max(delays), min(delays)) if most is None else (most, 0)
-        known = [
-            self._record(experiment, delays, unknown - _at_rest(experiment, dead)) for experiment in self.experiments
-        ]
+        rest = [_at_rest(experiment, dead) if self.rested else 0 for experiment in self.experiments]
+        known = [self._record(one, delays, unknown - at) for one, at in zip(self.experiments, rest, strict=True)]
         records = tuple(record for record in known if len(record.target))
         if not records:
             raise TraceError(

@@ -12,20 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError
-from sysid.estimation.linear.delay_search import FEW, READ_BACKWARDS, searched_delays
+from sysid.estimation.linear.delay_search import FEW
 from sysid.estimation.linear.pole_moves import at_one
 from sysid.estimation.linear.pole_starts import PoleStart
-from sysid.estimation.linear.transfer_function_runs import Candidate, End, short_run, tried
+from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.transfer_function_uncertainty import transfer_function_uncertainty
 from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
-from sysid.estimation.nonparametric.dead_time import AROUND
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel
 from sysid.models.converting.orthonormal_basis import Domain
 
-COMPARED = 2
-"""Starts, the best as they are, from which a dead time is tried."""
 SLOWEST = 5.0
 """Longest time constant of a stable pole, in lengths of the longest record."""
 
@@ -148,33 +145,9 @@ class AbstractProblem(ABC):
             slowest=rate if discrete else rate / self.terms.sample_time,
         )
 
-    def found_delays(self) -> tuple[tuple[int, ...], tuple[str, ...]]:
-        """Those of the structure, or those of least error, and what is to be said of them."""
-        return (self.orders.delays, ()) if self.orders.delays is not None else self.searched()
-
-    def searched(self) -> tuple[tuple[int, ...], tuple[str, ...]]:
-        """Dead times with the least loss, and what is to be said of the search."""
-        least, most = self.delay_range()
-        reached: dict[tuple[int, ...], Candidate] = {}
-
-        def loss_at(delays: tuple[int, ...], unknown: int) -> float:
-            reached[delays] = self._short(delays, unknown)
-            return reached[delays].loss
-
-        def loss_near(delays: tuple[int, ...], unknown: int) -> float:
-            # A sample more of one input hardly moves the poles: those of the best next to it lead there by themselves.
-            near = [one for of, one in reached.items() if max(abs(np.subtract(of, delays))) <= AROUND]
-            best = min(near, key=lambda one: one.loss, default=None)
-            if best is None or not np.isfinite(best.loss):
-                return loss_at(delays, unknown)
-            start = PoleStart(name="next to it", sections=best.provider.poles.sections(best.theta))
-            provider = self.provider(delays, unknown=unknown)
-            reached[delays] = short_run(start, delays, provider, self.training)
-            return reached[delays].loss
-
-        found, told = searched_delays(self.likely_delays(least, most), least, most, loss_at, loss_near)
-        direct = self.direct(found) if least > 0 else found
-        return direct, told if direct == found else (*told, READ_BACKWARDS)
+    def begun_in_motion(self) -> Self | None:
+        """The same problem where no record begins at rest; ``None`` where none is taken to."""
+        return None
 
     def direct(self, delays: tuple[int, ...]) -> tuple[int, ...]:
         """Dead times, none where an input clearly acts within the sample; of spectra they stay.
@@ -186,16 +159,6 @@ class AbstractProblem(ABC):
             The dead times.
         """
         return delays
-
-    def loss_at(self, delays: tuple[int, ...], unknown: int) -> float:
-        """The loss of some dead times after a short search, where so many first samples of a record do not count."""
-        return self._short(delays, unknown).loss
-
-    def _short(self, delays: tuple[int, ...], unknown: int) -> Candidate:
-        provider = self.provider(delays, unknown=unknown)
-        begun = [tried(start, delays, provider) for start in self.starts(provider, few=True)]
-        worth = sorted(begun, key=lambda one: one.loss)[:COMPARED]
-        return min((short_run(one.start, delays, provider, self.training) for one in worth), key=lambda one: one.loss)
 
     def model(self, end: End) -> tuple[TransferFunctionModel, Uncertainty | None]:
         """The model at an end, and how uncertain its parameters are, where that is known.

@@ -18,6 +18,7 @@ from sysid.estimation.least_squares.levenberg_marquardt import Iteration
 from sysid.estimation.linear.delay_search import FEW, READ_BACKWARDS
 from sysid.estimation.linear.pole_moves import filled_up, next_smaller, slowness
 from sysid.estimation.linear.pole_starts import PoleStart
+from sysid.estimation.linear.transfer_function_delays import delays_of_least_error, found_delays
 from sysid.estimation.linear.transfer_function_problem import AbstractProblem, Score
 from sysid.estimation.linear.transfer_function_runs import EXACT, Candidate, End, Watch, long_run, short_run, tried
 from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_speed, of_stability, of_starts
@@ -69,7 +70,7 @@ def solve(own: AbstractProblem, began: float, on_iteration: Callable[[Iteration]
     part = own.part() if own.training.max_iterations else None
     from_part = None if part is None else _from_part(own, part, watch, score)
     if from_part is None:
-        delays, told = own.found_delays()
+        delays, told = found_delays(own)
         reached = _reached(own, delays, watch, score, {})
     else:
         reached, told = from_part
@@ -112,7 +113,7 @@ def _from_part(
         Both; ``None`` where the part misleads: poles or dead times stand at its edge, or a start that was found
         over all samples leads further down.
     """
-    delays, told = part.found_delays()
+    delays, told = found_delays(part)
     if own.orders.delays is None and max(delays) + FEW >= part.delay_range()[1]:
         return None
     found = _reached(part, delays, watch.unseen(), score, {})
@@ -240,7 +241,7 @@ def _free_poles(
     at_end = replace(end, notes=(*end.notes, AT_EDGE)) if slowest >= edge else end
     told: tuple[str, ...] = ()
     if own.orders.delays is None:  # those of a plant that cannot integrate need not be those of one that does
-        delays, told = free.searched()
+        delays, told = delays_of_least_error(free)
         provider = free.provider(delays)
     starts = [*free.free_starts(provider), PoleStart(name="the best bounded one", sections=end.sections)]
     runs = (short_run(start, delays, provider, free.training) for start in starts)

@@ -157,10 +157,24 @@ def descend(start: tuple[int, ...], least: int, most: int, loss: Callable[[tuple
     while moved:
         moved = False
         for j in range(len(start)):
-            near = [k for k in range(current[j] - AROUND, current[j] + AROUND + 1) if least <= k <= most]
-            trials = [(*current[:j], k, *current[j + 1 :]) for k in near if k != current[j]]
-            losses = {trial: loss(trial) for trial in trials}
+            losses = {trial: loss(trial) for trial in around(current, j, least, most)}
             trial = min(losses, key=losses.__getitem__, default=current)
             if trial != current and losses[trial] < best:
                 current, best, moved = trial, losses[trial], True
     return current
+
+
+def around(delays: tuple[int, ...], j: int, least: int, most: int) -> list[tuple[int, ...]]:
+    """Dead times that differ in one input.
+
+    Args:
+        delays: In samples.
+        j: Which input.
+        least: The shortest.
+        most: The longest.
+
+    Returns:
+        Those up to :data:`AROUND` samples away.
+    """
+    near = range(max(delays[j] - AROUND, least), min(delays[j] + AROUND, most) + 1)
+    return [(*delays[:j], k, *delays[j + 1 :]) for k in near if k != delays[j]]

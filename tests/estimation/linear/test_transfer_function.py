@@ -208,6 +208,19 @@ def test_an_input_that_moves_between_samples_is_one_where_that_is_said(between) 
     assert any(told in note for note in fit.notes)
 
 
+@pytest.mark.parametrize(("dead", "seed"), [(42, 2), (60, 0), (30, 10)])
+def test_a_record_that_begins_in_motion_while_its_inputs_stand_tells_its_dead_time(dead: int, seed: int) -> None:
+    """The input moved as the record began, stands for some samples, and shows later than it moves again."""
+    rng = np.random.default_rng([seed, dead])
+    u = np.repeat(rng.integers(0, 2, 120), 5) * 2.0 - 1.0
+    y = signal.lfilter([*np.zeros(dead), 0.02, 0.015], np.convolve([1.0, -0.9], [1.0, -0.8]), u)
+    y += 0.1 * y.std() * rng.standard_normal(600)
+    estimated = Start(kind=StartKind.ESTIMATED)
+    structure = TransferFunction(poles=(2,), zeros=(1,))
+    fit = fit_transfer_function([trace_of(u[:, np.newaxis], y)], ONE, structure, start=estimated)
+    assert fit.model.structure.to_dict()["delays"] == [dead]
+
+
 @pytest.mark.parametrize("width", [1, 180], ids=["impulse", "step"])
 def test_a_record_that_begins_at_rest_tells_its_dead_time_by_a_single_response(width: int) -> None:
     """Samples that a long dead time would leave out are all that it has."""
