@@ -74,12 +74,12 @@ def searched_delays(
             known[delays] = by(delays, reach[0])
         return known[delays]
 
-    if len(few) ** m <= MOST_COMBINATIONS:
-        starts: list[tuple[int, ...]] = [tuple(k) for k in itertools.product(few, repeat=m)]
-    else:
-        starts = [(least,) * m, (few[-1],) * m]
-    starts += [tuple(of[min(i, len(of) - 1)] for of in places) for i in range(max(len(of) for of in places))]
-    ranked = sorted(dict.fromkeys(starts), key=lambda start: loss(start, loss_at))
+    informed = [(least,) * m, (few[-1],) * m]
+    informed += [tuple(of[min(i, len(of) - 1)] for of in places) for i in range(max(len(of) for of in places))]
+    few_each = list(itertools.product(few, repeat=m)) if len(few) ** m <= MOST_COMBINATIONS else []
+    for start in dict.fromkeys(informed):
+        loss(start, loss_at)
+    ranked = sorted(dict.fromkeys([*informed, *few_each]), key=loss)
     best = min((descend(start, least, reach[0], loss) for start in ranked[:2]), key=loss)
     while max(best) == reach[0] < most:  # at the end of what was compared: further
         reach[0] = min(most, 2 * reach[0])
