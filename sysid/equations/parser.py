@@ -135,6 +135,11 @@ class _Parser:
             name = self._named()
             self.sign(")", after="the state")
             return CONTINUOUS, name
+        if first.kind == "name" and first.text == "d" and self.now.kind == "quoted" and self.ahead(2).text == "dt":
+            name = self.take().text
+            self.sign("/", after="the state")
+            self.take()
+            return CONTINUOUS, name
         rate = _RATE.fullmatch(first.text) if first.kind == "name" else None
         if rate is not None and self.now.text == "/" and self.ahead(1).text == "dt":
             self.place += 2

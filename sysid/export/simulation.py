@@ -237,5 +237,6 @@ def _check_level(targets: list[str], initial: Initial) -> None:
             where="initial",
             expected="a number for each of them",
             got=f"one number for {', '.join(targets)}",
-            remedy=f'leave it out: each begins at its declared level; in Python, initial={{"{targets[0]}": ...}}',
+            remedy=f'leave it out: each begins at its declared level; or name them, --initial "{targets[0]}=..." for '
+            f'each, in Python initial={{"{targets[0]}": ...}}',
         )

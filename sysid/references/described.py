@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,8 @@ from sysid.references.fmu import read_fmu
 from sysid.references.fmu_variables import INTEGERS, declared_unit, is_number
 from sysid.references.guessed import GUESS, guessed, named_values, range_told
 
+OURS, DECLARED = "sysid-workbench ", re.compile(r"declared from (\S+) to (\S+)")
+"""What the tool of an FMU is called that was exported here, and what such an FMU says of an input's range."""
 TRUTH = {"false": "0", "true": "1"}
 UNBOUNDED = 1e30
 """A min or max of this size is a tool's word for none."""
@@ -65,8 +68,9 @@ def described(path: Path, wish: Wish) -> tuple[dict[str, Any], float | None, lis
             got=missing[0], remedy=did_you_mean(missing[0], variables, "correct the name"),
         )  # fmt: skip
     notes: list[str] = []
-    ports = _numbers_of(variables.values(), notes)
-    inputs = {one.name: _input(one, wish, notes) for one in ports if _moves(one, wish)}
+    ours = str(getattr(description, "generationTool", "")).startswith(OURS)
+    ports = _numbers_of(variables.values(), wish, notes, ours=ours)
+    inputs = {one.name: _input(one, wish, notes, ours=ours) for one in ports if _moves(one, wish)}
     _check_roles(path, wish, variables, inputs)
     sample_time, duration = _times(description, wish, notes)
     outputs = list(wish.outputs) or [one.name for one in ports if one.causality == "output"]
@@ -82,11 +86,13 @@ def described(path: Path, wish: Wish) -> tuple[dict[str, Any], float | None, lis
     return fields, duration, notes
 
 
-def _numbers_of(variables: Iterable[Any], notes: list[str]) -> list[Any]:
+def _numbers_of(variables: Iterable[Any], wish: Wish, notes: list[str], *, ours: bool) -> list[Any]:
     """The variables that are numbers; of inputs and outputs that are none it is told that nothing is done with them."""
     found = []
     for one in variables:
-        if is_number(one):
+        if ours and one.causality == "output" and str(one.type) in INTEGERS and not wish.outputs:
+            notes.append(f"{one.name}: left out, as it says how far the values of this surrogate may be trusted")
+        elif is_number(one):
             found.append(one)
         elif one.causality in {"input", "output"}:
             notes.append(f"{one.name}: left out, as it is no number but {one.type}; an input stays at its start")
@@ -128,8 +134,9 @@ def _parameter(variable: Any, span: tuple[float, float], wish: Wish, ports: set[
     return f"{variable.name}_start", {**fields, "variable": variable.name}
 
 
-def _input(variable: Any, wish: Wish, notes: list[str]) -> dict[str, Any]:
+def _input(variable: Any, wish: Wish, notes: list[str], *, ours: bool) -> dict[str, Any]:
     (low, high), start = _limits(variable), _number(variable.start)
+    declared = DECLARED.fullmatch(variable.description or "") if ours else None
     found: dict[str, Any] = {"unit": _unit(variable), **wish.units.get(variable.name, {})}
     if variable.name in wish.ranges:
         found["range"] = list(wish.ranges[variable.name])
@@ -137,6 +144,9 @@ def _input(variable: Any, wish: Wish, notes: list[str]) -> dict[str, Any]:
     elif low is not None and high is not None and low < high:
         found["range"] = [low, high]
         notes.append(f"{variable.name}: {low:g} to {high:g}, as the model description has min and max")
+    elif declared is not None:
+        found["range"] = [float(declared[1]), float(declared[2])]
+        notes.append(f"{range_told(variable.name, *found['range'])}, for which this surrogate is declared")
     elif str(variable.type) == "Boolean":
         found["range"] = [0.0, 1.0]
         notes.append(f"{variable.name}: 0 and 1, as it is a truth value")

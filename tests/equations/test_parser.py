@@ -62,6 +62,7 @@ def test_operators_bind_as_they_do_in_mathematics(text: str, tree: str) -> None:
         ("dx1/dt = 0", "d/dt", "x1"),
         ("der(x1) = 0", "d/dt", "x1"),
         ('der("x 1") = 0', "d/dt", "x 1"),
+        ('d"x 1"/dt = 0', "d/dt", "x 1"),
         ("x[k+1] = 0", "[k+1]", "x"),
         ("y = 0", "=", "y"),
         ("y[k] = 0", "=", "y"),

@@ -198,6 +198,19 @@ def test_what_an_importer_would_pass_over_is_refused(second: Path, fields: dict[
         FmuReference(reference(second, **fields))
 
 
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_surrogate_of_ours_proposes_what_it_is_declared_for_and_no_flags(bundle: Path, version: int) -> None:
+    (file,) = [one for one in bundle.rglob("*.fmu") if f"fmi{version}" in str(one)]
+    found = proposed(source_of(str(file)), Wish(ranges={}, parameters={}, duration=20.0))
+    low, high = sysid.read_bundle(bundle).inputs[0]["range"]
+    assert found.content["reference"]["inputs"]["u"]["range"] == [low, high]
+    assert list(found.content["reference"]["outputs"]) == ["y"]
+    assert "for which this surrogate is declared" in "; ".join(found.notes)
+    assert "flags: left out" in "; ".join(found.notes)
+    asked = proposed(source_of(str(file)), Wish(ranges={}, parameters={}, outputs=["flags"], duration=20.0))
+    assert list(asked.content["reference"]["outputs"]) == ["flags"]
+
+
 def variable(name: str, kind: str = "Real", **fields: object) -> SimpleNamespace:
     """As fmpy has it."""
     usual = {"causality": "input", "variability": "continuous", "min": None, "max": None, "start": None, "unit": None}

@@ -34,6 +34,7 @@ def test_every_option_of_the_model_can_be_typed() -> None:
         (["--names", "t", "--names", "u"], {"names": ("t", "u")}),
         (["--names", "[t, u]"], {"names": ("t", "u")}),
         (["--missing", "---"], {"missing": ("---",)}),
+        (["--states", "T[1]=0", "--states", "a: b=1"], {"states": {"T[1]": 0.0, "a: b": 1.0}}),
         (["--long-names", "tag", "--long-values", "value"], {"long": {"names": "tag", "values": "value"}}),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -42,6 +43,12 @@ def test_what_is_typed_is_what_the_yaml_would_say(words: list[str], files: dict[
     given, rest = take_options(["log.csv", *words, "--propose", "x.yaml"])
     assert rest == ["log.csv", "--propose", "x.yaml"]
     assert files_from(given) == FileOptions.model_validate(files)
+
+
+def test_the_remedy_of_a_file_is_an_option_that_helps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bytes.csv").write_bytes(bytes(range(1, 256)) * 9)
+    assert run_cli(["ingest", str(tmp_path / "bytes.csv")]) == 2
+    assert "--encoding cp932" in capsys.readouterr().err
 
 
 def test_a_value_that_cannot_be_is_refused_by_its_name() -> None:

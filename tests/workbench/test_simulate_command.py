@@ -46,6 +46,34 @@ def test_a_command_is_simulated_written_and_drawn(bundle, tmp_path, capsys, endi
     assert "an output is held at one of its limits" in said
 
 
+def test_each_of_several_outputs_begins_at_a_level_of_its_own(tmp_path, capsys):
+    def model(text):
+        return ARXModel(
+            orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.1, 0.9]), intercept=0.0,
+            mapping=Mapping.parse(text), sample_time=0.1, input_units=("V",), output_unit="V", rest_output=0.0,
+        )  # fmt: skip
+
+    cascade = Cascade(models=(model("u -> T[1]"), model("u -> b")), rest={"T[1]": 0.0, "b": 0.0})
+    channel = (Channel(name="u", unit="V"),)
+    record = Trace(name="EST", sample_time=0.1, channels=channel, values=np.linspace(0.0, 1.0, 50)[:, np.newaxis])
+    traces = TraceSet(name="t", traces=(record,), roles={"EST": Role.ESTIMATION})
+    folder = export_bundle(cascade, traces, tmp_path / "b", formats=[]).folder
+    (tmp_path / "u.csv").write_text("time [s],u\n" + "".join(f"{k / 10},{k}\n" for k in range(9)))
+    words = ["simulate", str(folder), str(tmp_path / "u.csv"), "--units", "u=V", "--out", str(tmp_path / "o.csv")]
+    assert run_cli([*words, "--initial", "T[1]=3", "--initial", "b=-1"]) == 0
+    assert read_trace(tmp_path / "o.csv")["T[1]"][0] == pytest.approx(2.7)
+    assert read_trace(tmp_path / "o.csv")["b"][0] == pytest.approx(-0.9)
+    for wrong, said in (
+        (["3"], '--initial "T[1]=..." for each'),
+        (["b=x"], "NAME=NUMBER for each of several outputs"),
+        (["b=nan"], "the output cannot begin there"),
+        (["c=1"], "missing channel c"),
+    ):
+        capsys.readouterr()
+        assert run_cli([*words, *(part for one in wrong for part in ("--initial", one))]) == 2
+        assert said in " ".join(capsys.readouterr().err.split())
+
+
 def test_a_picture_where_it_is_asked_for(bundle, tmp_path):
     (tmp_path / "c.json").write_text("[[0, 2.0], [6, 0]]")
     words = ["--command", str(tmp_path / "c.json"), "--time-unit", "s", "--unit", "V", "--out", str(tmp_path / "o.csv")]

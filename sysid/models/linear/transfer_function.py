@@ -91,8 +91,8 @@ class TransferFunction(AbstractStructure):
         if not numbers or not same or not self.poles or not all(map(_proper, self.poles, self.zeros)):
             raise ConfigError(
                 "not the orders of a transfer function",
-                expected=f"for each input 1 to {MOST_POLES} poles, no more zeros than poles, and a dead time from 0 to "
-                f"{MOST:,}",
+                expected=f"for each input 1 to {MOST_POLES} poles, no more zeros than poles, and a dead time of 0 to "
+                f"{MOST:,} samples, a whole number",
                 got=f"poles {shortened(list(self.poles))}, zeros {shortened(list(self.zeros))}, "
                 f"delays {shortened(self.delays)}",
                 remedy="write for example poles: [2, 2], zeros: [1, 1], delays: [1, 1]",

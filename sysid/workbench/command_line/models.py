@@ -48,7 +48,11 @@ def simulate(
         ),
     ] = None,
     initial: Annotated[
-        float | None, typer.Option(help="Output before the first sample; its declared level by default.")
+        list[str] | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Output before the first sample; its declared level by default. NAME=NUMBER of several, repeated.",
+        ),
     ] = None,
     constant: Annotated[
         list[str] | None, typer.Option(metavar="NAME=NUMBER", help="An input that is a number and no column; repeated.")
@@ -62,7 +66,7 @@ def simulate(
     old_positions: Annotated[str | None, typer.Option("--places", hidden=True)] = None,
 ) -> None:
     """Run an exported model or cascade on a file of inputs or a command, fed with nothing but its own past."""
-    from sysid.workbench.commands.simulate import Wish, simulate_command
+    from sysid.workbench.commands.simulate import Wish, parse_initial, simulate_command
 
     if old_positions is not None:
         from sysid.workbench.old_words import tell_old_word
@@ -70,8 +74,8 @@ def simulate(
         tell_old_word("--places", "--positions")
         positions = positions or old_positions
     wish = Wish(
-        bundle=bundle, inputs=inputs, out=out, initial=initial, start=start, constants=constant or [],
-        command=command, time_unit=time_unit, unit=unit, plot=plot, reading=ctx.meta[META],
+        bundle=bundle, inputs=inputs, out=out, initial=parse_initial(initial or []), start=start,
+        constants=constant or [], command=command, time_unit=time_unit, unit=unit, plot=plot, reading=ctx.meta[META],
     )  # fmt: skip
     if positions is None:
         simulate_command(wish)

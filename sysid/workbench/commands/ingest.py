@@ -19,7 +19,7 @@ from sysid.reporting.figures.record_picture import record_picture
 from sysid.reporting.figures.svg import as_file
 from sysid.traces import TraceSet
 from sysid.units import Reference
-from sysid.workbench.commands.reader_options import files_from
+from sysid.workbench.commands.reader_options import as_typed, files_from
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.store import write_bytes
@@ -45,7 +45,9 @@ def ingest_command(
     """
     path = Path(source)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:
-        _show_file(inspect_file(path, files=files_from(given or {})), propose, _shares(split))
+        with as_typed(whole=False):
+            found = inspect_file(path, files=files_from(given or {}))
+        _show_file(found, propose, _shares(split))
         return
     if split is not None:
         raise ConfigError(

@@ -120,24 +120,29 @@ def reading_options(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @contextmanager
-def as_typed() -> Iterator[None]:
-    """What is refused within says what helps as it is typed, not as it stands in a ``dataset.yaml``."""
+def as_typed(*, whole: bool = True) -> Iterator[None]:
+    """What is refused within says what helps as it is typed, not as it stands in a ``dataset.yaml``.
+
+    Args:
+        whole: Whether the command takes columns, units, repairs and the grid, too.
+    """
     try:
         yield
     except UserError as error:
         if error.remedy is None:
             raise
-        told = typed(error.remedy)
+        told = typed(error.remedy, whole=whole)
         if told == error.remedy:
             raise
         raise UserError(error.what, where=error.where, expected=error.expected, got=error.got, remedy=told) from error
 
 
-def typed(text: str) -> str:
+def typed(text: str, *, whole: bool = True) -> str:
     """Options of a data set as options of a command.
 
     Args:
         text: A remedy.
+        whole: Whether the command takes columns, units, repairs and the grid, too.
 
     Returns:
         The same, with ``repairs: {nan: hold}`` as ``--repairs nan=hold`` and ``files: {time: 't [ms]'}`` as
@@ -148,25 +153,41 @@ def typed(text: str) -> str:
         'ask for --repairs gaps=linear or --repairs gaps=hold; (--grid longest_step=...)'
         >>> typed("write files: {units: {u: V, y: rad/s}}")
         'write --units u=V --units y=rad/s'
+        >>> typed("write missing: ['abc']; if for a state, states: {'abc': 0}")
+        "write --missing 'abc'; if for a state, --states 'abc'=0"
+        >>> typed("write time: {column: ..., unit: datetime}, or decimal: ','")
+        "write --time ... --time-unit datetime, or --decimal ','"
     """
-    section = ""
+    section, there = "", {option.place[0] for option in reader_options(whole=whole).values()}
 
     def option(found: re.Match[str]) -> str:
         nonlocal section
         section = found[1] or section
-        if not section:
-            return found[0]
-        name, value = found[2], found[3].strip()
-        inner = re.fullmatch(r"\{([^:{}]+): ([^{}]*)\}", value)
-        if section == "files" and inner:
-            if name == "time":
-                return f"--{name}-{inner[1]} {inner[2]}"
-            pairs = re.split(r", (?=[^,:]+: )", f"{inner[1]}: {inner[2]}")
-            return " ".join(f"--{name} {'='.join(pair.split(': ', 1))}" for pair in pairs)
-        return f"--{name} {value}" if section == "files" else f"--{section} {name}={value}"
+        mine = (found[2] if section == "files" else section) in there
+        return _flags(section, found[2], found[3].strip()) if mine else found[0]
+
+    def bare(found: re.Match[str]) -> str:
+        return _flags("files", found[1], found[2])
 
     said = re.sub(r"(?:(repairs|grid|files): )?\{(\w+): (\{[^{}]*\}|[^{}]*)\}", option, text)
+    names = "|".join(sorted(there - {*_GROUPS}))
+    said = re.sub(rf"(?<![-\w{{])({names}): (\{{[^{{}}]*\}}|\[[^][]*\]|'[^']*'|\w*\d[\w-]*)", bare, said)
     return said.replace(" in a dataset.yaml", "").replace(" to source", "")
+
+
+def _flags(section: str, name: str, value: str) -> str:
+    """An option of a section as it is typed; a number of values is an option each."""
+    if section != "files":
+        return f"--{section} {name}={value}"
+    flags = {option.place: option.flag for option in reader_options(whole=True).values()}
+    if value.startswith("{"):
+        pairs = [pair.split(": ", 1) for pair in re.split(r", (?=[^,:]+: )", value[1:-1])]
+        return " ".join(
+            f"{flags[name, key]} {one}" if (name, key) in flags else f"{flags.get((name,), f'--{name}')} {key}={one}"
+            for key, one in pairs
+        )
+    flag = flags.get((name,)) or flags.get((name, "column"), f"--{name}")
+    return " ".join(f"{flag} {one}" for one in (re.split(", ?", value[1:-1]) if value.startswith("[") else [value]))
 
 
 def files_from(given: Mapping[str, Any]) -> FileOptions:
@@ -242,10 +263,10 @@ def _plain(option: ReaderOption, text: str) -> Any:
     """A value as YAML; ``OFF=0`` is short for ``{OFF: 0}``."""
     from sysid.yaml_files import parse_yaml
 
-    pair = re.fullmatch(r"([^={}\[\]:]+)=(.+)", text)
-    shown = f"{{{pair[1]!r}: {pair[2]}}}" if pair and not option.repeated else text
+    pair = None if option.repeated else re.fullmatch(r"([^={\[][^=]*)=(.+)", text)
     try:
-        return parse_yaml(f"value: {shown}", where=f"the command line, {option.flag}")["value"]
+        value = parse_yaml(f"value: {pair[2] if pair else text}", where=f"the command line, {option.flag}")["value"]
+        return {pair[1]: value} if pair else value
     except ConfigError:
         if option.repeated:
             return [text]

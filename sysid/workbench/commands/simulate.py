@@ -41,7 +41,7 @@ class Wish:
         bundle: The bundle's folder or zip, or the folder of the run that exported it.
         out: The file to write, ``.csv`` or ``.parquet``; by default ``NAME.simulated.csv`` beside what is simulated.
         inputs: A file with the input channels, whose units are converted to the bundle's; or a data set's name.
-        initial: The output's value before the first sample; ``None`` is its declared level.
+        initial: The output's value before the first sample, or values by name; ``None`` is its declared level.
         start: How the run begins, as in a pipeline; ``None`` leaves it to the bundle and the file.
         constants: ``NAME=NUMBER`` of inputs that are held.
         command: A command table in place of ``inputs``.
@@ -54,7 +54,7 @@ class Wish:
     bundle: Path
     out: Path | None = None
     inputs: Path | None = None
-    initial: float | None = None
+    initial: float | Mapping[str, float] | None = None
     start: str | None = None
     constants: Sequence[str] = ()
     command: Path | None = None
@@ -194,6 +194,41 @@ def parse_constants(words: Sequence[str]) -> dict[str, float]:
     return found
 
 
+def parse_initial(words: Sequence[str]) -> float | dict[str, float] | None:
+    """Where a run's outputs have stood, as it is typed.
+
+    Args:
+        words: A number, or ``NAME=NUMBER`` for each output.
+
+    Returns:
+        The number, or numbers by name; ``None`` where nothing is said.
+
+    Raises:
+        ConfigError: If one cannot be read, or is there twice.
+
+    Example:
+        >>> parse_initial(["3.4"]), parse_initial(["y1=3.4", "y2=-1"])
+        (3.4, {'y1': 3.4, 'y2': -1.0})
+    """
+    if len(words) == 1 and "=" not in words[0]:
+        try:
+            return float(words[0])
+        except ValueError:
+            raise _no_level(words[0]) from None
+    try:
+        return parse_constants(words) or None
+    except ConfigError as error:
+        raise _no_level(str(error.got)) from None
+
+
+def _no_level(got: str) -> ConfigError:
+    return ConfigError(
+        "the output cannot begin there", where="option --initial",
+        expected="a finite number, in the output's unit, or NAME=NUMBER for each of several outputs", got=got,
+        remedy="give the output's value before the first sample, or leave --initial out",
+    )  # fmt: skip
+
+
 def parse_start(word: str | None) -> Start | None:
     """How a run begins, as it is typed.
 
@@ -240,14 +275,9 @@ def _check(wish: Wish) -> None:
             got=", ".join(wish.reading),
             remedy="leave them out: a command table says its units, or --time-unit and --unit do",
         )
-    if initial is not None and not np.isfinite(initial):
-        raise ConfigError(
-            "the output cannot begin there",
-            where="option --initial",
-            expected="a finite number, in the output's unit",
-            got=f"--initial {initial}",
-            remedy="give the output's value before the first sample, or leave --initial out",
-        )
+    levels = [] if initial is None else [*initial.values()] if isinstance(initial, Mapping) else [initial]
+    if not np.isfinite(levels).all():
+        raise _no_level(f"--initial {initial}")
     check_picture(wish.plot)
 
 
