@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,16 +71,40 @@ class Port(_Strict):
         return self
 
 
+def with_range(port: Any) -> Any:
+    """A port as it is written; where it has levels and no range, from the least level to the greatest.
+
+    Args:
+        port: Its fields.
+
+    Returns:
+        The same, with a range where one follows.
+    """
+    levels = port.get("levels") if isinstance(port, Mapping) and port.get("range") is None else None
+    numbers = isinstance(levels, list | tuple) and all(isinstance(one, int | float) for one in levels)
+    return {**port, "range": (min(levels), max(levels))} if levels and numbers else port
+
+
+def _not_required(schema: dict[str, Any]) -> None:
+    """Levels stand for a range, which no validator of a single field can say."""
+    schema["required"] = [name for name in schema.get("required", []) if name != "range"]
+    schema["anyOf"] = [{"required": ["range"]}, {"required": ["levels"]}]
+
+
 class VariedPort(Port):
     """What experiments choose values of.
 
     Args:
-        range: The values, never left.
+        range: The values, never left; by default from the least level to the greatest.
         levels: The only ones that it may have, where it cannot have all in its range.
     """
 
+    model_config = ConfigDict(json_schema_extra=_not_required)
+
     range: Span
     levels: tuple[float, ...] | None = None
+
+    _ranged = model_validator(mode="before")(with_range)
 
     @model_validator(mode="after")
     def _within(self) -> VariedPort:
@@ -117,7 +142,7 @@ class InputPort(VariedPort):
     """An input that experiments move.
 
     Args:
-        range: Levels, never left.
+        range: Levels, never left; by default from the least of those that are named to the greatest.
         rate: Largest change in a second, in its unit; ``None`` for steps.
         levels: The only levels that it may have, where it cannot have all in its range.
         start: Where every experiment begins; the middle of the range by default.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sysid.errors import ConfigError
+from sysid.references.config import with_range
 from sysid.references.described import Wish, described
 from sysid.references.sources import Source
 
@@ -47,7 +48,7 @@ def proposed(source: Source, wish: Wish) -> Proposal:
     Raises:
         ConfigError: If something is said twice, or nobody says it; the remedy is what says it.
     """
-    told, experiment = source.reference, dict(source.content.get("experiment") or {})
+    told, experiment = _ranged(source.reference), dict(source.content.get("experiment") or {})
     _check_said_once(source, wish, experiment)
     duration, notes = experiment.get("duration", wish.duration), list[str]()
     if source.fmu is None:
@@ -59,6 +60,12 @@ def proposed(source: Source, wish: Wish) -> Proposal:
     content = {**source.content, "kind": "experiment", "reference": {k: v for k, v in reference.items() if v}}
     content["experiment"] = {**experiment, "duration": duration}
     return Proposal(content=content, notes=tuple(notes))
+
+
+def _ranged(reference: Mapping[str, Any]) -> dict[str, Any]:
+    """What a table says of a reference, with the ranges that follow from levels."""
+    groups = {name: reference[name] for name in ("inputs", "parameters") if isinstance(reference.get(name), Mapping)}
+    return {**reference, **{name: {k: with_range(p) for k, p in ports.items()} for name, ports in groups.items()}}
 
 
 def _port(name: str, wish: Wish, **more: Any) -> dict[str, Any]:

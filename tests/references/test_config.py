@@ -22,3 +22,11 @@ def test_a_pressure_says_what_it_is_measured_from() -> None:
 def test_what_is_no_pressure_is_measured_from_nothing() -> None:
     with pytest.raises(ValueError, match="only pressures are measured from something"):
         InputPort.model_validate({"unit": "V", "reference": "gauge", "range": [0, 1]})
+
+
+def test_levels_say_how_far_a_port_goes() -> None:
+    assert InputPort.model_validate({"levels": [2, 0, 1]}).range == (0.0, 2.0)
+    assert InputPort.model_validate({"levels": [2, 0, 1], "range": [-1, 5]}).range == (-1.0, 5.0)
+    for port in ({}, {"levels": []}, {"levels": [1]}, {"levels": "012"}):
+        with pytest.raises(ValueError, match=r"range|levels"):
+            InputPort.model_validate(port)

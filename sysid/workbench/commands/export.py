@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sysid.errors import ConfigError, did_you_mean
 from sysid.export.bundle import Bundle
+from sysid.export.finding import RUN, find_bundle
 from sysid.export.manifest import MANIFEST
 from sysid.export.reading import read_bundle
 from sysid.export.writing import zip_bundle
@@ -54,8 +55,9 @@ def export_command(
         ParityError: If a file differs from the model by more than the tolerance.
     """
     if fit is None and _is_bundle(Path(pipeline)):
-        _tell(_renewed(Path(pipeline), out, formats, doubt=doubt, mean=mean), pack=pack)
+        _tell(_renewed(find_bundle(Path(pipeline)), out, formats, doubt=doubt, mean=mean), pack=pack)
         return
+    path = find_pipeline(pipeline)
     given = {"--formats": formats, "--doubt": doubt, "--mean": mean}
     if fit is None or any(one is not None for one in given.values()):
         raise ConfigError(
@@ -65,7 +67,6 @@ def export_command(
             got="no --fit" if fit is None else next(name for name, one in given.items() if one is not None),
             remedy="name the fit, or give the bundle's folder or zip",
         )
-    path = find_pipeline(pipeline)
     program = kinds()[kind_of(path)].load_program()(RunRequest(path=path, typed=pipeline))
     store = RunFolder(path=(run_folder or Path("runs") / program.name).resolve())
     # Looked for as a run would: what is found is what the pipeline, its data and the code now stand for.
@@ -88,8 +89,8 @@ def export_command(
 
 
 def _is_bundle(path: Path) -> bool:
-    """Whether a path is a bundle's folder or zip; a pipeline is a name or a YAML."""
-    return (path / MANIFEST).is_file() or (path.is_file() and path.suffix == ".zip")
+    """Whether a path is a bundle's folder or zip, or that of a run; a pipeline is a name or a YAML."""
+    return any((path / one).is_file() for one in (MANIFEST, RUN)) or (path.is_file() and path.suffix == ".zip")
 
 
 def _renewed(path: Path, out: Path | None, formats: str | None, *, doubt: Path | None, mean: Path | None) -> Bundle:

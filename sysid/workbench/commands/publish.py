@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.workbench.runner.console import console
+from sysid.workbench.runner.naming import meant
 
 
 def publish_command(run_folder: Path, *, name: str | None, into: Path, bundle: bool) -> None:
@@ -21,4 +22,4 @@ def publish_command(run_folder: Path, *, name: str | None, into: Path, bundle: b
     """
     from sysid.reporting import publish_run
 
-    console().print(f"Published: {publish_run(run_folder, into, name=name, bundle=bundle)}", soft_wrap=True)
+    console().print(f"Published: {publish_run(meant(run_folder), into, name=name, bundle=bundle)}", soft_wrap=True)

@@ -16,7 +16,7 @@ from sysid.reporting.linear.responses import Bode, StepResponse
 from sysid.reporting.results import read_results
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.runner.console import console
-from sysid.workbench.runner.naming import nearby
+from sysid.workbench.runner.naming import meant, nearby
 from sysid.workbench.runner.store import RunFolder, write_bytes
 
 RESULTS = "results.json"
@@ -34,7 +34,7 @@ def response_command(model: Path, *, fit: str | None, seconds: float | None, out
     Raises:
         ConfigError: If there is no such fit, or it is not linear.
     """
-    model = model if model.exists() else Path("runs") / model
+    model = meant(model)
     run = (model / RESULTS).is_file()
     asked, title = (_fits(model, fit), fit or model.name) if run else (_bundle(model, fit), model.stem)
     # What has no response at all is told before anything is written.

@@ -26,6 +26,7 @@ from sysid.units import in_unit, squared
 from sysid.validation.metrics import percent
 from sysid.workbench.commands.reader_options import as_typed, reading_options
 from sysid.workbench.runner.console import console
+from sysid.workbench.runner.naming import meant
 
 PICTURES = (".png", ".svg", ".pdf")
 """What a picture may end in."""
@@ -91,7 +92,7 @@ def simulate_command(wish: Wish) -> None:
         UserError: If the inputs cannot be read, or the output not written.
     """
     _check(wish)
-    read, plot, start = read_bundle(wish.bundle), wish.plot, parse_start(wish.start)
+    read, plot, start = read_bundle(meant(wish.bundle)), wish.plot, parse_start(wish.start)
     constants, out = parse_constants(wish.constants), wish.written
     if wish.command is not None:
         words = {"time_unit": wish.time_unit, "unit": wish.unit}

@@ -18,6 +18,7 @@ from sysid.workbench.assembly.interpolation import StoredInterpolation
 from sysid.workbench.assembly.runner import read_interpolation
 from sysid.workbench.commands.simulate import Wish, check_picture
 from sysid.workbench.runner.console import console
+from sysid.workbench.runner.naming import meant
 
 DRAWN = 5
 """Positions in the picture at most: more lines of one field are not told apart."""
@@ -54,7 +55,7 @@ def simulate_line_command(wish: Wish, asked: str) -> None:
             remedy="give --command FILE alone",
         )
     check_picture(wish.plot)
-    out, stored, positions = wish.written, read_interpolation(wish.bundle), parse_positions(asked)
+    out, stored, positions = wish.written, read_interpolation(meant(wish.bundle)), parse_positions(asked)
     table = read_command(wish.command, stored.inputs, time_unit=wish.time_unit, unit=wish.unit)
     trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
     write_trace(replace(trace, name=out.stem), out)

@@ -16,6 +16,7 @@ from sysid.ingest import DatasetDescription, find_dataset, read_description
 from sysid.units import in_unit
 from sysid.workbench.runner import events
 from sysid.workbench.runner.console import console
+from sysid.workbench.runner.naming import meant
 from sysid.workbench.runner.screen import Screen
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.worst import Kept, drawn, errors_of, kept_text
@@ -48,7 +49,7 @@ def worst_command(bundle: Path, *, like: str, case: str | None, seeds: str, outp
             expected=f"1 to {len(numbers)}, as there are seeds",
             got=keep,
         )
-    surrogate, described = read_bundle(bundle), read_description(source)
+    surrogate, described = read_bundle(meant(bundle)), read_description(source)
     sequences = drawn(described, case, numbers, where=source)
     errors = _searched(surrogate, sequences, output, source)
     kept = Kept.of(list(sequences.cases), errors, keep)

@@ -24,6 +24,19 @@ def nearby(path: Path) -> Path:
     return whole.relative_to(here) if whole.is_relative_to(here) else path
 
 
+def meant(place: Path) -> Path:
+    """What somebody means who names a run: its folder, or its name alone, as of a pipeline.
+
+    Args:
+        place: As it was typed.
+
+    Returns:
+        The folder under ``runs`` where there is one of that name and no such path.
+    """
+    named = Path("runs") / place
+    return named if len(place.parts) == 1 and not place.exists() and named.exists() else place
+
+
 def cases_of(traces: TraceSet) -> str:
     """How many cases of which data set.
 
