@@ -19,6 +19,7 @@ from sysid.export import EXPORTERS, Flag, Surrogate, expected_flags
 from sysid.export.fmi.fmu import HEADERS, fmu_variables
 from sysid.export.fmi.platforms import own_platform
 from sysid.export.fmi.units import unit_definitions
+from sysid.export.heeded import heeded
 
 VERSIONS = {"fmi2": FMU2Slave, "fmi3": FMU3Slave}
 
@@ -121,11 +122,13 @@ def test_description_has_units_start_values_and_meaning(fmu, surrogate):
     variables = {variable.name: variable for variable in description.modelVariables}
     for port in surrogate.inputs:
         assert (variables[port.name].unit, float(variables[port.name].start)) == ("psi", port.start)
-    for port in surrogate.outputs:
+    for port, says in zip(surrogate.outputs, heeded(surrogate), strict=True):
         assert variables[port.name].unit == "psi"
         if isinstance(port.level, str):  # it begins where an input does
             assert f"{port.name}_at_rest" not in variables
             assert f"begins at {port.level}" in variables[port.name].description
+        elif not says:  # the run would be the same
+            assert f"{port.name}_at_rest" not in variables
         else:
             assert float(variables[f"{port.name}_at_rest"].start) == port.level
     (unit,) = description.unitDefinitions
@@ -222,23 +225,30 @@ def test_a_step_that_is_not_whole_samples_is_refused(slave, step):
         slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=step)
 
 
+def resting(slave, surrogate):
+    """The last output whose level at rest can be set, and the parameter that does."""
+    there = [k for k, port in enumerate(surrogate.outputs) if f"{port.name}_at_rest" in slave.references]
+    return there[-1], slave.references[f"{surrogate.outputs[there[-1]].name}_at_rest"]
+
+
 def test_outputs_cannot_be_set_nor_rest_values_after_the_start(slave, surrogate):
-    rest = slave.references[f"{surrogate.outputs[-1].name}_at_rest"]
+    _, rest = resting(slave, surrogate)
     for reference in (slave.outputs[0], rest, 999):
         with pytest.raises(fmpy.fmi1.FMICallException):
             slave.set([reference], [1.0])
 
 
 def test_a_value_at_rest_set_before_the_start_is_where_the_run_begins(slave, surrogate):
-    rest = slave.references[f"{surrogate.outputs[-1].name}_at_rest"]
+    at, rest = resting(slave, surrogate)
     slave.reset()
     slave.set([rest], [12.5])
     initialise(slave)
-    assert slave.get([slave.outputs[-1]]) == [12.5]
+    assert slave.get([slave.outputs[at]]) == [12.5]
     u = np.full((3, len(surrogate.inputs)), 50.0)
     changed = at_rest(surrogate, u[0])
-    changed[-1] = 12.5
+    changed[at] = 12.5
     np.testing.assert_allclose(walk(slave, u)[0], surrogate.simulate(u, rest_outputs=changed), rtol=0.0, atol=1e-9)
+    assert not np.array_equal(surrogate.simulate(u, rest_outputs=changed), surrogate.simulate(u)), "it says something"
 
 
 def test_its_sources_compile_on_their_own_without_a_warning(fmu, tmp_path):

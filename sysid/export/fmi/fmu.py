@@ -17,6 +17,7 @@ from sysid.export.archive import write_archive
 from sysid.export.c.compiler import WARNINGS
 from sysid.export.c.source import c_files
 from sysid.export.flags import MEANING
+from sysid.export.heeded import heeded
 from sysid.export.fmi.platforms import build_binaries, left_out, own_platform
 from sysid.export.fmi.units import unit_definitions
 from sysid.export.surrogate import Surrogate
@@ -84,10 +85,10 @@ def fmu_variables(surrogate: Surrogate) -> list[dict[str, Any]]:
         kind = {"causality": "output", "variability": "continuous", "initial": "calculated"}
         text = "of the sample before" + (f"; begins at {port.level}" if isinstance(port.level, str) else "")
         rows.append({"name": names[port.name], **kind, "unit": port.unit, "start": None, "description": text})
-    for port in surrogate.outputs:
+    for port, says in zip(surrogate.outputs, heeded(surrogate), strict=True):
         name, kind = _free(f"{names[port.name]}_at_rest", taken), {"causality": "parameter", "variability": "fixed"}
         text = f"{port.name} before the first sample: the system has stood at it and at the inputs for ever"
-        start = None if isinstance(port.level, str) else c_real(port.level)
+        start = None if isinstance(port.level, str) or not says else c_real(port.level)
         rows.append({"name": name, **kind, "initial": "exact", "unit": port.unit, "start": start, "description": text})
     kind = {"causality": "output", "variability": "discrete", "initial": "exact"}
     text = "0, or the sum of: " + "; ".join(f"{int(flag)}: {words}" for flag, words in MEANING.items())
@@ -96,7 +97,7 @@ def fmu_variables(surrogate: Surrogate) -> list[dict[str, Any]]:
         row | {"reference": i, "integer": i == len(rows), "unit": "" if row["unit"] == "1" else row["unit"]}
         for i, row in enumerate(rows, start=1)
     ]
-    # An output that begins at an input has no parameter of its own.
+    # An output that begins at an input has no parameter of its own, nor one whose states rest where inputs alone say.
     shown = [row for row in numbered if row["causality"] != "parameter" or row["start"] is not None]
     return [row | {"index": i} for i, row in enumerate(shown, start=1)]
 
