@@ -17,9 +17,9 @@ from sysid.export.archive import write_archive
 from sysid.export.c.compiler import WARNINGS
 from sysid.export.c.source import c_files
 from sysid.export.flags import MEANING
-from sysid.export.heeded import heeded
 from sysid.export.fmi.platforms import build_binaries, left_out, own_platform
 from sysid.export.fmi.units import unit_definitions
+from sysid.export.heeded import heeded
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import c_real, render
 from sysid.names import distinct, xml_name
