@@ -33,6 +33,8 @@ LINEAR = 0.5
 """Share of the time of all trials by whose end linear structures beyond the first of each kind have to be done."""
 LARGER = 0.35
 """The same for those of more states than are tried unasked."""
+LITTLE = 0.005
+"""Share of the time that a linear trial may take whatever was spent before: one network takes longer than many."""
 FINAL = 0.15
 """Share of either that is kept for trying the best once more."""
 
@@ -108,7 +110,9 @@ class Budget:
         for point in points:
             cost = 0.0 if self.wall_s is None or self.is_stored(point) else self._seconds(point) / self.side_by_side
             fits = self._fits(price(point, self.folds), seconds + cost, paid=cost == 0.0)
-            if not fits and not self.forced and not (len(taken) < self.unlimited and self._before_the_last_fit()):
+            little = cost <= LITTLE * (self.wall_s or 0.0) and estimator_of(point.structure).linear
+            even_so = len(taken) < self.unlimited or little
+            if not fits and not self.forced and not (even_so and self._before_the_last_fit()):
                 continue
             seconds += cost
             self.spent += price(point, self.folds)
