@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from sysid.errors import ReaderError
 from sysid.ingest.inspecting.findings import ColumnFinding, FileFinding
 from sysid.ingest.readers.text_source import bare_stem
@@ -50,6 +52,7 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None, split: 
             got=f"{finding.samples} row",
             remedy="check that the recording was saved, and the options separator and skip_lines",
         )
+    finding = _in_parts(finding, split) if split and not finding.cases else finding
     # A data set under datasets/ is called by its folder, whatever the file is called.
     place = finding.path if folder is None else folder.resolve()
     name = place.name if place.parent.name == "datasets" and folder is not None else bare_stem(finding.path)
@@ -70,6 +73,21 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None, split: 
         'licence: ""',
     ]
     return "\n".join(lines) + "\n"
+
+
+def _in_parts(finding: FileFinding, split: Sequence[float]) -> FileFinding:
+    """What was found, with the channels that move in the record but not in each of its parts."""
+    from sysid.ingest.split import spans_of
+
+    told = []
+    for role, start, stop in spans_of(split, finding.samples):
+        parts = {column.name: finding.table.find(column.name).values[start:stop] for column in finding.channels}
+        still = [name for name, part in parts.items() if len(part) and np.all(part == part[0])]
+        told += [f"{', '.join(still)}: never changes in {role.value}"] if still else []
+    if not told:
+        return finding
+    needed = finding.needed.model_copy(update={"constant": "accept"})
+    return replace(finding, needed=needed, notes=(*finding.notes, *told))
 
 
 def _channel(column: ColumnFinding) -> str:

@@ -223,6 +223,16 @@ def test_a_record_is_proposed_in_parts(tmp_path: Path, split: list[float], roles
     assert np.concatenate([trace["u"] for trace in loaded]).tolist() == [k % 7 for k in range(20)]
 
 
+def test_a_step_that_stands_in_a_part_is_proposed_so_that_it_loads(tmp_path: Path) -> None:
+    """A step test: after the first samples the heater never changes."""
+    text = "t [s],heater [%],T [degC]\n" + "".join(f"{k},{50 * (k > 3)},{20 + k % 7}\n" for k in range(60))
+    (tmp_path / "log.csv").write_text(text)
+    proposed = propose_dataset(inspect_file(tmp_path / "log.csv"), split=[0.5, 0.2, 0.3])
+    assert "heater: never changes in selection" in proposed
+    (tmp_path / "dataset.yaml").write_text(proposed)
+    assert [len(trace) for trace in load_dataset(tmp_path / "dataset.yaml")] == [30, 12, 18]
+
+
 @pytest.mark.parametrize(("step", "unit"), [(0.02, "s"), (10, "ms"), (60, "s"), (1800, "s"), (10_000, "us")])
 def test_stamps_without_a_unit_are_of_one_that_records_have(write: Write, step: float, unit: str) -> None:
     found = inspect_file(write("rig.csv", "Time,u\n" + rows(20, lambda i: f"{i * step},{i % 3}")))

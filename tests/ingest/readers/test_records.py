@@ -105,8 +105,13 @@ def test_records_of_one_json_file_are_parsed_once_until_it_changes(
 ) -> None:
     from sysid.ingest.readers import json_text
 
-    parsed, plain = [], json_text._content
-    monkeypatch.setattr(json_text, "_content", lambda text: parsed.append(len(text)) or plain(text))
+    parsed, plain = list[str](), json_text._content
+
+    def counted(text: str) -> Any:
+        parsed.append(text)
+        return plain(text)
+
+    monkeypatch.setattr(json_text, "_content", counted)
     file = tmp_path / "a.json"
     for last in (1, 2):
         file.write_text(json.dumps({"u": [1, 2, last], "padding": "x" * last}))
