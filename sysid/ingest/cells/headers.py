@@ -30,6 +30,13 @@ _UNITS_IN_NAMES = frozenset(
     | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
     | {"g", "rad", "deg", "%"}
 )
+_WRITTEN_OUT = {
+    "second": "s", "sec": "s", "millisecond": "ms", "microsecond": "us", "minute": "min", "hour": "h", "volt": "V",
+    "millivolt": "mV", "ampere": "A", "amp": "A", "celsius": "degC", "kelvin": "K", "fahrenheit": "degF", "watt": "W",
+    "pascal": "Pa", "newton": "N", "meter": "m", "metre": "m", "percent": "%", "hertz": "Hz", "ohm": "ohm",
+    "radian": "rad", "degree": "deg",
+}  # fmt: skip
+"""Units as names end with them that are meant to be read by people, in the singular."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,11 +64,14 @@ def unit_in_name(name: str) -> str | None:
         The unit, or ``None``.
 
     Example:
-        >>> unit_in_name("t_ms"), unit_in_name("p.bar"), unit_in_name("ms"), unit_in_name("x_2")
-        ('ms', 'bar', None, None)
+        >>> unit_in_name("t_ms"), unit_in_name("p.bar"), unit_in_name("cell_volts"), unit_in_name("ms")
+        ('ms', 'bar', 'V', None)
     """
     last = re.split(r"[_.]", name)[-1]
-    return last if last != name and last in _UNITS_IN_NAMES else None
+    if last == name:
+        return None
+    word = last.casefold()
+    return last if last in _UNITS_IN_NAMES else _WRITTEN_OUT.get(word, _WRITTEN_OUT.get(word.removesuffix("s")))
 
 
 def is_unit(text: str) -> bool:

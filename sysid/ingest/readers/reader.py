@@ -51,6 +51,7 @@ _ELSEWHERE = {
     **dict.fromkeys((".rda", ".rdata", ".rds"), _IN_R),
     ".ods": "save it in LibreOffice as .xlsx or CSV",
     **dict.fromkeys((".pkl", ".pickle"), "write it in Python by to_parquet or to_csv: nothing is unpickled here"),
+    **dict.fromkeys((".nda", ".ndax", ".res", ".mpr"), "export it from the cycler's program as CSV or Excel"),
     ".ulg": "write it as CSV: pip install pyulog, then ulog2csv FILE",
 }
 """What to do with files that are known, and read by others, though they look packed."""

@@ -15,7 +15,9 @@ _TIME_NAMES = {
     "t", "time", "zeit", "tijd", "temps", "tiempo", "tempo", "tid", "timestamp", "timestamps", "time stamp",
     "elapsed time", "elapsed", "seconds", "tout", "date", "datum", "datetime", "date time", "date/time", "date & time",
     "uhrzeit", "zeitstempel", "tijdstip", "clock", "hora", "heure", "fecha", "epoch", "unix time", "unixtime", "utc",
-    "local time", "localtime", "time of day", "timeofday",
+    "local time", "localtime", "time of day", "timeofday", "test time", "run time", "sim time", "simulation time",
+    "total time", "relative time", "rel time", "record time", "recording time", "measurement time", "system time",
+    "unix timestamp",
 }  # fmt: skip
 _TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
 
@@ -82,15 +84,18 @@ def is_called_time(name: str) -> bool:
         Whether it is.
 
     Example:
-        >>> is_called_time("rig/Time"), is_called_time("t_ms"), is_called_time("temperature")
-        (True, True, False)
+        >>> is_called_time("rig/Time"), is_called_time("t_ms"), is_called_time("test_time_second")
+        (True, True, True)
+        >>> is_called_time("temperature"), is_called_time("dead_time")
+        (False, False)
     """
     whole = name.casefold().strip()
     # In whatever group it stands: "rig/time", "run{2}.t".
     for plain in (whole, re.split(r"[/.]", whole)[-1]):
-        # "t_ms", "time.s": the unit at the end of the name
-        stem = next((plain[: -len(u) - 1] for u in _TIME_UNITS if plain.endswith((f"_{u}", f".{u}"))), plain)
-        if plain in _TIME_NAMES or stem in _TIME_NAMES:
+        # "t_ms", "time.s", "test_time_seconds": the unit at the end of the name
+        ends = [u for one in _TIME_UNITS for u in (one, f"{one}s")]
+        stem = next((plain[: -len(u) - 1] for u in ends if plain.endswith((f"_{u}", f".{u}"))), plain)
+        if {plain, stem, plain.replace("_", " "), stem.replace("_", " ")} & _TIME_NAMES:
             return True
     return False
 

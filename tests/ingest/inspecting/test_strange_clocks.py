@@ -10,6 +10,7 @@ import pytest
 from sysid.errors import ReaderError
 from sysid.ingest import inspect_file, load_dataset, propose_dataset
 from sysid.ingest.assembling.timing import rounded_step, survey
+from sysid.ingest.tables.time_columns import is_called_time
 from sysid.traces import Trace
 
 N = 60
@@ -150,3 +151,21 @@ def test_stamps_since_1970_are_time_however_uneven_and_further_ones_are_no_chann
     found = inspect_file(write(tmp_path, "\n".join(lines) + "\n"))
     assert (found.time.column, found.time.unit) == ("column_3", "ms")
     assert [column.name for column in found.channels] == ["column_2", "column_5"]
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"), [("test_time_second", 1.0), ("test_time_millisecond", 1e-3), ("Elapsed_Time_minutes", 60.0)]
+)
+def test_a_time_whose_unit_is_written_out_is_known(tmp_path: Path, name: str, scale: float) -> None:
+    """As battery cyclers' files have it; steps of 10 s were taken for milliseconds, and uneven ones for no time."""
+    stamps = np.cumsum(np.random.default_rng(0).choice([10.0, 10.0, 10.5], N))
+    head = f"{name},voltage_volt,cell_temperature_celsius"
+    found = inspect_file(write(tmp_path, rows([f"{t}" for t in stamps], head)))
+    assert (found.time.column, found.time_told) == (name, "")
+    assert [column.unit for column in found.columns] == ["V", "degC"]
+    assert found.sample_time == pytest.approx(10.0 * scale, rel=0.05)
+
+
+def test_times_that_are_signals_are_no_clock() -> None:
+    for name in ("step_time", "dead_time_s", "cycle time", "Sample Time", "on_time_seconds"):
+        assert not is_called_time(name)
