@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sysid.estimation.linear.predictor import MirroredPredictor
 from sysid.estimation.linear.records import AbstractRecord, Bases, full, tap_slices
@@ -115,16 +114,17 @@ def _continuous_tangents(
     """The basis with every section once more behind its output, sampled as one system: driven by samples and a past."""
     main = realise(basis, how.domain)
     again = [realise((_bare(section),), how.domain) for section in basis]
-    n = len(main.A)
-    A = linalg.block_diag(main.A, *(part.A for part in again))
-    B = np.concatenate([main.B, np.zeros(n)])
-    C = linalg.block_diag(*(part.C for part in again))
+    n, order = len(main.A), len(main.A) + sum(len(part.A) for part in again)
+    A, C = np.zeros((order, order)), np.zeros((sum(len(part.C) for part in again), order))
+    B = np.concatenate([main.B, np.zeros(order - n)])
+    A[:n, :n] = main.A
     output = weights @ main.C
-    at = n
+    at, row = n, 0
     for part in again:
-        A[at : at + len(part.A), :n] = np.outer(part.B, output)
-        at += len(part.A)
-    C = np.concatenate([np.zeros((len(C), n)), C], axis=1)
+        own = slice(at, at + len(part.A))
+        A[own, own], A[own, :n] = part.A, np.outer(part.B, output)
+        C[row : row + len(part.C), own] = part.C
+        at, row = own.stop, row + len(part.C)
     whole = Realisation(A=A, B=B, C=-C, D=np.zeros(len(C)))
     return _run_sampled(whole, how, *driven)
 

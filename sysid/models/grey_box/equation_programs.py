@@ -14,14 +14,14 @@ from sysid.kernels import equation_run
 from sysid.kernels import register_machine as machine
 from sysid.models.channels.scaling import Scaling, VectorScaling
 from sysid.models.contract.form import AbstractForm
-from sysid.models.grey_box.state_search import LARGEST, at_rest
+from sysid.models.grey_box.state_search import LARGEST, Derived, at_rest
 
 Array = NDArray[np.float64]
 
 INTEGRATES = 1e-7
 """Singular value of what changes from sample to sample, in states' scales, up to which there is no equilibrium."""
 
-MANY_RESTS = 64
+MANY_RESTS = 256
 """States at rest that are kept at most: to find one takes twenty times as long as to run a short sequence from it."""
 
 
@@ -202,7 +202,7 @@ class EquationPrograms(AbstractForm):
         asked = u.tobytes(), output.tobytes()
         found = self._rests.get(asked)
         if found is None:
-            found = at_rest(lambda x: self._standing(x, u), output, self.output_scale, self.terms)[0]
+            found = at_rest(_Standing(programs=self, u=u), output, self.output_scale, self.terms)[0]
             if len(self._rests) < MANY_RESTS:
                 self._rests[asked] = found
         return found.copy()  # a run overwrites it
@@ -218,7 +218,7 @@ class EquationPrograms(AbstractForm):
         Returns:
             Shapes ``(n_states,)`` and ``(n_states, p)``.
         """
-        x, moves = at_rest(lambda x: self._standing(x, u, p), output, self.output_scale, self.terms)
+        x, moves = at_rest(_Standing(programs=self, u=u, p=p), output, self.output_scale, self.terms)
         return x, moves
 
     def rates_by_state(self, x: Array, u: Array) -> Array:
@@ -233,15 +233,37 @@ class EquationPrograms(AbstractForm):
         """
         return self._derived(self.lowered.rates, x, u, 0)[1]
 
-    def _standing(
-        self, x: Array, u: Array, p: int = 0
-    ) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
-        """What changes at a state, and the outputs there, each with its derivatives by state and parameters."""
+    def changing(self, x: Array, u: Array, p: int = 0) -> Derived:
+        """What changes at a state, and its derivatives by state and parameters.
+
+        Args:
+            x: State, shape ``(n_states,)``.
+            u: What the programs read, shape ``(n_lagged,)``.
+            p: How many parameters.
+
+        Returns:
+            Shapes ``(n_states,)``, ``(n_states, n_states)`` and ``(n_states, p)``; what follows from sample to sample
+            is less by the state, its derivatives are not.
+        """
         low = self.lowered
         changes = [self._derived(program, x, u, p) for program in (low.rates, low.updates)]
         change, by_state, by_parameter = (np.concatenate(parts) for parts in zip(*changes, strict=True))
+        change[low.n_continuous :] -= x[low.n_continuous :]
+        return change, by_state, by_parameter
+
+    def standing(self, x: Array, u: Array, p: int = 0) -> tuple[Derived, Derived]:
+        """What changes at a state, and the outputs there, each with its derivatives by state and parameters.
+
+        Args:
+            x: State, shape ``(n_states,)``.
+            u: What the programs read, shape ``(n_lagged,)``.
+            p: How many parameters.
+
+        Returns:
+            Both.
+        """
+        low, (change, by_state, by_parameter) = self.lowered, self.changing(x, u, p)
         first = low.n_continuous
-        change[first:] -= x[first:]
         by_state[first:, first:] = self._settling(by_state[first:, first:])
         return (change, by_state, by_parameter), self._derived(low.outputs, x, u, p)
 
@@ -265,3 +287,18 @@ class EquationPrograms(AbstractForm):
         r, Jx, Jp = np.empty(results), np.empty((results, len(x))), np.empty((results, p))
         machine.derivatives(program.arrays, self.filled, p, x, u, *self._tables, r, Jx, Jp)  # type: ignore[attr-defined]
         return r, Jx, Jp
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Standing:
+    """Some equations whose inputs stand."""
+
+    programs: EquationPrograms
+    u: Array
+    p: int = 0
+
+    def change(self, x: Array) -> Array:
+        return self.programs.changing(x, self.u)[0]
+
+    def __call__(self, x: Array) -> tuple[Derived, Derived]:
+        return self.programs.standing(x, self.u, self.p)

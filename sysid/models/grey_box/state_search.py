@@ -26,6 +26,9 @@ STEPS = 50
 MANY = 6
 """States up to which searches begin on both sides of each."""
 
+SLOWLY, PATIENCE = 1e-2, 3
+"""Part of what changes by which a step has to lessen it; and steps in a row that may do less before a search ends."""
+
 STOOD = 1e-10
 """What changes where nothing does, in shares of what would: searches from elsewhere are not needed then."""
 
@@ -48,13 +51,37 @@ class Bounded(Protocol):
     def held(self, x: Array) -> Array: ...  # noqa: D102
 
 
-def at_rest(
-    standing: Callable[[Array], tuple[Derived, Derived]], output: Array, output_scale: Array, terms: Bounded
-) -> tuple[Array, Array]:
+class Standing(Protocol):
+    """A system whose inputs stand."""
+
+    def change(self, x: Array) -> Array:
+        """What changes at a state.
+
+        Args:
+            x: The state, shape ``(n_states,)``.
+
+        Returns:
+            The same shape.
+        """
+        ...
+
+    def __call__(self, x: Array) -> tuple[Derived, Derived]:
+        """What changes at a state, and the outputs there, with derivatives.
+
+        Args:
+            x: The state, shape ``(n_states,)``.
+
+        Returns:
+            Both.
+        """
+        ...
+
+
+def at_rest(standing: Standing, output: Array, output_scale: Array, terms: Bounded) -> tuple[Array, Array]:
     """The state at which nothing changes; where that leaves directions open, the one with these outputs.
 
     Args:
-        standing: What changes at a state, and the outputs there, with derivatives.
+        standing: What changes at a state, and the outputs there.
         output: Outputs, in their units, shape ``(n_outputs,)``.
         output_scale: Of each, in its unit.
         terms: What is known of the states; those that are declared stay at their level.
@@ -92,7 +119,7 @@ def at_rest(
 
 
 def _stood(
-    standing: Callable[[Array], tuple[Derived, Derived]],
+    standing: Standing,
     x: Array,
     free: tuple[NDArray[np.int64], Array],
     outputs: tuple[Array, Array],
@@ -105,10 +132,10 @@ def _stood(
     rows = np.where((rows > 0.0) & np.isfinite(rows), rows, 1.0)
 
     def left(at: Array) -> float:
-        found = float(np.linalg.norm(standing(at)[0][0] / rows))
+        found = float(np.linalg.norm(standing.change(at) / rows))
         return found if np.isfinite(found) else np.inf
 
-    now = left(x)
+    now, slow = left(x), 0
     for _ in range(STEPS):
         (change, by_state, _), (y, out_state, _) = standing(x)
         J = by_state[:, places] * scale / rows[:, None]
@@ -132,7 +159,11 @@ def _stood(
             share /= 2.0
         if then > max(now, 1e-12) or np.array_equal(moved, x):
             break
+        # Where nothing ever stands, further steps gain as little; where all stands, they turn in a rounding.
+        slow = slow + 1 if then > (1.0 - SLOWLY) * now else 0
         x, now = moved, then
+        if slow == PATIENCE:
+            break
     return now, x
 
 
