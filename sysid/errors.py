@@ -209,7 +209,8 @@ class ChannelError(UserError):
         self.missing = names
         self.available = tuple(available)
         guesses = [near[0] for name in names if (near := near_words(name, available))]
-        remedy = f"did you mean {', '.join(guesses)}?" if guesses else "name one of the channels that are there"
+        bring = f"name one of those that are there, or bring a channel {', '.join(names)}"
+        remedy = f"did you mean {', '.join(guesses)}?" if guesses else bring
         listed = [part.strip() for name in names for part in re.split("[,+]", name)]
         if len(listed) > len(names) and set(listed) <= set(available):
             remedy = f"write {'+'.join(listed)} in a mapping, {listed} where a list of channels is asked for"

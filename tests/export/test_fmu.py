@@ -20,6 +20,7 @@ from sysid.export.fmi.fmu import HEADERS, fmu_variables
 from sysid.export.fmi.platforms import own_platform
 from sysid.export.fmi.units import unit_definitions
 from sysid.export.heeded import heeded
+from tests.export.grey_boxes import build_grey
 
 VERSIONS = {"fmi2": FMU2Slave, "fmi3": FMU3Slave}
 
@@ -111,10 +112,24 @@ def test_a_simulation_by_fmpy_equals_the_model_with_the_offset_of_one_step(fmu, 
         set_input_derivatives=False,
     )
     found = np.column_stack([result[port.name] for port in surrogate.outputs])
-    np.testing.assert_array_equal(found[0], at_rest(surrogate, u[0]))
     expected = surrogate.simulate(u)
+    stands = np.where(heeded(surrogate), at_rest(surrogate, u[0]), expected[0])
+    np.testing.assert_allclose(found[0], stands, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(found[1:], expected, rtol=0.0, atol=1e-9)
     np.testing.assert_array_equal(result["flags"][1:], expected_flags(surrogate, u, surrogate.compute(u)))
+
+
+@pytest.mark.parametrize("format_name", VERSIONS)
+def test_what_stands_where_the_inputs_say_is_shown_there_from_the_beginning(format_name, tmp_path):
+    """Its declared level is passed over by the states: it would be left with a jump at the first step."""
+    surrogate = Surrogate.of(build_grey("dx/dt = (BP - x)/2\nBC = x + 0.1*AR"), {"BP": (0.0, 80.0), "AR": (0.0, 80.0)})
+    (file,) = EXPORTERS[format_name].write(surrogate, tmp_path)
+    names, u = [port.name for port in surrogate.inputs], np.array([45.0, 30.0])
+    found = fmpy.simulate_fmu(
+        str(tmp_path / file.name), stop_time=0.5, output_interval=0.1, start_values=dict(zip(names, u, strict=True))
+    )
+    assert heeded(surrogate) == (False,)
+    np.testing.assert_allclose(found["BC"], np.full(6, 48.0), rtol=0.0, atol=1e-9)
 
 
 def test_description_has_units_start_values_and_meaning(fmu, surrogate):

@@ -132,6 +132,7 @@ def _texts(surrogate: Surrogate, version: int, variables: list[dict[str, Any]]) 
         "followed": [
             (k, names.index(port.level)) for k, port in enumerate(surrogate.outputs) if isinstance(port.level, str)
         ],
+        "stands": [k for k, says in enumerate(heeded(surrogate)) if not says],
     }
     whole = "".join(code.values()) + repr(sorted(values.items()))
     token = hashlib.sha256(whole.encode()).hexdigest()
