@@ -241,9 +241,13 @@ def yaml_text(data: Mapping[str, Any]) -> str:
     Example:
         >>> yaml_text({"sample_time": 1e-3, "words": ["no", "1e-3"]})
         "sample_time: 0.001\nwords: [no, '1e-3']\n"
+        >>> yaml_text({"größe": {"unit": "mm", "range": [0, 1]}})
+        'größe:\n  unit: mm\n  range: [0, 1]\n'
     """
-    text: str = yaml.dump(dict(data), Dumper=_Dumper, sort_keys=False, width=116, default_flow_style=None)
-    return text
+    as_it_is: dict[str, Any] = {"sort_keys": False, "width": 116, "default_flow_style": None}
+    escaped, shown = (str(yaml.dump(dict(data), Dumper=_Dumper, allow_unicode=one, **as_it_is)) for one in (False, True))
+    # Other signs for the end of a line are written as they are, and read as a blank.
+    return escaped if re.search(r"\\[NLP]", escaped) else shown
 
 
 def line_of(where: object, loc: Sequence[str | int]) -> str:

@@ -68,7 +68,7 @@ def orders_command(
 def _written(structure: AbstractStructure) -> str:
     """A structure as a pipeline has it, in one line."""
     own = {name: value for name, value in structure.to_dict().items() if value is not None}
-    return yaml.safe_dump(own, default_flow_style=True, sort_keys=False, width=1_000).strip()
+    return yaml.safe_dump(own, default_flow_style=True, sort_keys=False, allow_unicode=True, width=1_000).strip()
 
 
 def _table(found: OrderSearch) -> Table:
