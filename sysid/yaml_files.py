@@ -245,7 +245,9 @@ def yaml_text(data: Mapping[str, Any]) -> str:
         'größe:\n  unit: mm\n  range: [0, 1]\n'
     """
     as_it_is: dict[str, Any] = {"sort_keys": False, "width": 116, "default_flow_style": None}
-    escaped, shown = (str(yaml.dump(dict(data), Dumper=_Dumper, allow_unicode=one, **as_it_is)) for one in (False, True))
+    escaped, shown = (
+        str(yaml.dump(dict(data), Dumper=_Dumper, allow_unicode=one, **as_it_is)) for one in (False, True)
+    )
     # Other signs for the end of a line are written as they are, and read as a blank.
     return escaped if re.search(r"\\[NLP]", escaped) else shown
 
