@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,14 +22,18 @@ def heeded(surrogate: Surrogate) -> tuple[bool, ...]:
     Returns:
         One truth value an output; false of states that rest where the inputs alone say.
     """
-    first = np.array([port.start for port in surrogate.inputs])
-    declared = surrogate.chosen(surrogate.rest(first)[np.newaxis])[0]
+    found = np.zeros(len(surrogate.outputs), dtype=bool)
+    for first in _inputs(surrogate):
+        declared = surrogate.chosen(surrogate.rest(first)[np.newaxis])[0]
+        state = surrogate.at_rest(first, surrogate.rest(first, declared))
+        for k, by in itertools.product(range(len(found)), AWAY):
+            moved = declared + np.where(np.arange(len(found)) == k, by * (1.0 + np.abs(declared)), 0.0)
+            there = surrogate.at_rest(first, surrogate.rest(first, moved))
+            found[k] |= not np.array_equal(there, state, equal_nan=True)
+    return tuple(map(bool, found))
 
-    def state(levels: NDArray[np.float64]) -> NDArray[np.float64]:
-        return surrogate.at_rest(first, surrogate.rest(first, levels))
 
-    steps = np.diag(1.0 + np.abs(declared))
-    return tuple(
-        any(not np.array_equal(state(declared + by * step), state(declared), equal_nan=True) for by in AWAY)
-        for step in steps
-    )
+def _inputs(surrogate: Surrogate) -> list[NDArray[np.float64]]:
+    """Where inputs start, and the ends of their ranges: equations may rest anywhere at some inputs alone."""
+    ends = [port.range or (port.start, port.start) for port in surrogate.inputs]
+    return [np.array([port.start for port in surrogate.inputs]), *np.array(ends, dtype=np.float64).reshape(-1, 2).T]

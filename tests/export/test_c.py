@@ -12,6 +12,7 @@ import pytest
 from sysid.errors import ConfigError
 from sysid.export import EXPORTERS, Surrogate
 from sysid.export.c.compiler import CompilerError, build_library
+from sysid.export.c.source import PASSED_OVER, c_files
 from sysid.export.forms.incremental import IncrementalForm
 from sysid.export.forms.lagged import LaggedForm
 from sysid.models import NARX
@@ -275,6 +276,11 @@ def test_it_allocates_nothing_and_networks_do_not_even_need_libm(sources, tmp_pa
             {"exp", "memset", "pow", "sin", "sincos", "sqrt"} if name == "equations" else set()
         )  # which they are made of
         assert {line.split()[-1] for line in listed.splitlines()} <= copies | functions
+
+
+def test_the_header_says_of_which_output_init_reads_no_level():
+    files = c_files(Surrogate.of(GREY_BOXES["declared states"](), {"BP": (0.0, 80.0), "AR": (0.0, 80.0)}))
+    assert f"BC [psi], {PASSED_OVER}" in next(text for name, text in files.items() if name.endswith(".h"))
 
 
 def test_units_and_ranges_stand_in_the_header(sources):

@@ -17,10 +17,13 @@ from sysid.export.forms.layout import EquationState, HiddenState
 from sysid.export.forms.programs import ProgramForm
 from sysid.export.forms.stage import Level, Side, Stage
 from sysid.export.forms.state_space import StateSpaceForm
+from sysid.export.heeded import heeded
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import c_real, render
 from sysid.kernels.neurons import Neuron
 
+PASSED_OVER = "where the inputs say: what init is given of it is passed over"
+"""The level at rest of an output whose states do not heed one."""
 SHORT = 16
 """Terms up to which a sum is written out term by term: tables and a loop take longer."""
 
@@ -59,7 +62,10 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "equations": [stage for stage in stages if stage["kind"] == "equations"],
         "late": [{**asdict(late), "name": surrogate.channels[late.column].name} for late in surrogate.late],
         "levels": [level_text(surrogate, port.level) for port in surrogate.channels],
-        "levels_in_words": [_words(port.level) for port in surrogate.outputs],
+        "levels_in_words": [
+            _words(port.level) if says else PASSED_OVER
+            for port, says in zip(surrogate.outputs, heeded(surrogate), strict=True)
+        ],
         "places": _places(surrogate),
     }
     return {f"{surrogate.identifier}.{end}": render(f"surrogate.{end}.j2", **values) for end in ("h", "c")}
