@@ -76,7 +76,7 @@ def test_other_traces_are_refused(bundle, traces, tmp_path):
 @pytest.mark.parametrize(("fit", "formats"), [(None, None), ("linear", "c")])
 def test_a_fit_of_a_run_needs_its_name_and_has_the_formats_of_its_pipeline(fit, formats):
     with pytest.raises(ConfigError, match="by its name"):
-        export_command("rig", fit=fit, out=None, run_folder=None, formats=formats, pack=False)
+        export_command("service-brake", fit=fit, out=None, run_folder=None, formats=formats, pack=False)
 
 
 def test_what_was_allowed_in_units_is_allowed_again(fit, traces, start, tmp_path):
