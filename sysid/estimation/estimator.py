@@ -29,7 +29,7 @@ from sysid.estimation.remarks.record_notes import (
     underexcited,
     undetermined,
 )
-from sysid.estimation.results.result import FitResult
+from sysid.estimation.results.result import FitResult, Loop
 from sysid.estimation.stability.check import (
     AbstractStabilityCheck,
     FreeRunCheck,
@@ -257,7 +257,10 @@ class Estimator:
         found = self.with_posterior(found, traces, start, selection)
         told = () if found.posterior is not None else (f"No interval of the output: {self._unsure(options)}.",)
         off = equilibrium_notes(found.model, traces, start)
-        against = contradicted(found.model, traces, start, options, uncertainty=found.uncertainty)
+        linear = found.loop is Loop.CLOSED and found.model.pole_radius is not None
+        errors = found.history.get("mse") if linear else None
+        trained = float(errors[-1]) if errors is not None and len(errors) else None
+        against = contradicted(found.model, traces, start, options, uncertainty=found.uncertainty, trained=trained)
         few = (*outnumbered(found.model, traces), *underexcited(found.model, traces), *held(found.model, traces))
         switches, levels = between_levels(found.model, traces)
         warned = (*undetermined(traces, mapping), *lost, *few, *against, *off, *levels)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import sysid
+from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.reporting.advice.record import AdviceRecord
+from sysid.reporting.advice.words import said
 from sysid.reporting.parts import Picture
 from sysid.reporting.sections.advice import advice_section
 from sysid.reporting.tables import Table
@@ -44,3 +46,11 @@ def test_a_finding_of_a_later_release_is_shown_by_its_code() -> None:
     )
     assert [cell.text for cell in table.rows[0]][:2] == ["WEATHER", "WET"]
     assert "weather.rain" in table.rows[0][2].text
+
+
+def test_one_stands_alone_and_not_at_the_end_of_a_number() -> None:
+    figures = {"seconds": 76.0, "length": 5.1}
+    one = Finding(
+        topic=Topic.DYNAMICS, code="settling.short_record", verdict=Verdict.LOOK, subject=("u",), figures=figures
+    )
+    assert "only 5.1 times that" in said(one, {"u": "1"})[0]

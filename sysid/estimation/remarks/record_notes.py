@@ -42,6 +42,8 @@ DIVERGED = 1e12
 WORSE, HARDLY, POOR = 1.1, 0.9, 0.6
 """Mean squared error in free run, over the output's variance, above which a constant does better beyond doubt; above
 which it does as well, all but a twentieth of the output's movement; and above which a run is poor."""
+AT_FIRST = 0.1, 4.0
+"""Error of a run, and times the one that was fitted, from which on it is told that it is one of its beginning."""
 NO_INTERVALS = " The intervals of its parameters mean nothing: they take the model for true, and its error for noise."
 
 
@@ -257,6 +259,7 @@ def contradicted(
     training: object = None,
     *,
     uncertainty: Uncertainty | None = None,
+    trained: float | None = None,
 ) -> tuple[str, ...]:
     """What the free run says against a model, over the very records that it was fitted to.
 
@@ -266,6 +269,8 @@ def contradicted(
         start: What stands before each.
         training: How it was fitted.
         uncertainty: Of its parameters, where the fit knows one.
+        trained: Mean squared error of the free run that was fitted, whose first states were fitted with it; ``None``
+            where something else was.
 
     Returns:
         One sentence for each output whose free run a constant beats or equals, for each that acts on the inputs, and
@@ -273,7 +278,26 @@ def contradicted(
     """
     with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost, and its squares, are beyond any number
         runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
-        return _against(model, traces, runs, training, uncertainty)
+        lost = _lost_at_first(model, runs, trained)
+        return lost or _against(model, traces, runs, training, uncertainty)
+
+
+def _lost_at_first(model: AbstractModel, runs: Sequence[FreeRun], trained: float | None) -> tuple[str, ...]:
+    """That a run is poor for its first state alone: what is left of it then says nothing of orders, inputs and lags."""
+    ratios = _beside_constants(runs)
+    if trained is None or len(model.mapping.outputs) > 1 or not ratios or _lost(ratios[0]):
+        return ()
+    (name,), spread = model.mapping.outputs, np.var(np.concatenate([run.output[run.usable, 0] for run in runs]))
+    fitted = trained / float(spread)
+    if not AT_FIRST[0] < ratios[0] > AT_FIRST[1] * fitted:
+        return ()
+    fits = [f"{100.0 * (1.0 - np.sqrt(ratio)):.0f} %" for ratio in (ratios[0], fitted)]
+    return (
+        f"Over the records that were fitted the free run of {name} has a fit of {fits[0]} for how it begins: with the "
+        f"first states that were fitted beside the parameters it is {fits[1]}. The model does not forget them, and the "
+        "first samples do not tell them. Record from rest, fit fewer poles, or write start: {estimated: ...} with more "
+        "samples. The level of its free run is not to be trusted.",
+    )
 
 
 def _against(

@@ -69,7 +69,7 @@ def said(finding: Told, units: Mapping[str, str]) -> tuple[str, str]:
         "code": finding.code,
     }
     figures = _Figures(dict(finding.figures) | others)
-    says = re.sub(r"\b1 (sample|time)s\b", r"1 \1", words.says.format_map(figures))
+    says = re.sub(r"(?<![\d.])1 (sample|time)s\b", r"1 \1", words.says.format_map(figures))
     return " ".join(says.split()).replace(" ,", ",").replace(" .", "."), words.do.format_map(figures)
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import sysid
 from sysid.estimation.remarks.error_lags import left_out
@@ -416,3 +417,17 @@ def test_a_run_of_any_length_that_is_lost_ends_no_fit(structure: object, records
     assert fit.model.pole_radius == pytest.approx(1.1, abs=0.02)
     assert [note for note in fit.notes if "worse than a constant (it diverges)" in note]
     assert not [note for note in fit.notes if "no noise of a sensor" in note]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_run_that_is_poor_for_its_first_state_is_not_blamed_on_the_inputs(seed: int) -> None:
+    """Three slow inputs, and a record that begins far from rest: its fit was -110 %, and *other orders* the remedy."""
+    rng = np.random.default_rng(seed)
+    u = [np.repeat(rng.uniform(-1, 1, 30), 10) for _ in range(3)]
+    y = 0.2 * lfilter([0, 0.02], [1, -1.97, 0.9704], u[0]) + lfilter([0, 0.01], [1, -0.99], u[1])
+    y = y + 0.05 * lfilter([1], [1, -0.95], rng.standard_normal(300)) + 5 * np.exp(-np.arange(300) / 80)
+    traces = sysid.data((np.column_stack(u), y), sample_time=1.0)
+    fit = sysid.fit(traces, "u1+u2+u3 -> y", sysid.OE(nb=(2, 2, 2), nf=(2, 2, 2), nk=(1, 1, 1)))
+    (told,) = (note for note in fit.warnings if "for how it begins" in note)
+    assert "Record from rest" in told
+    assert not [note for note in fit.warnings if "than a constant" in note or "Nothing in these records" in note]

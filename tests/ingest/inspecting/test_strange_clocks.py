@@ -140,7 +140,8 @@ def test_an_even_clock_of_a_workspace_is_in_seconds_and_a_loggers_is_not(tmp_pat
 def test_a_clock_beside_an_index_without_a_name_is_found(tmp_path: Path) -> None:
     text = "\n".join([",Unnamed: 0.1,time_exp,u,y", *(f"{k},{k},{k / 200},{U[k]},{Y[k]}" for k in range(N))])
     found = inspect_file(write(tmp_path, text + "\n"))
-    assert (found.time.column, found.sample_time) == ("time_exp", pytest.approx(0.005))
+    assert found.time.column == "time_exp"
+    assert found.sample_time == pytest.approx(0.005)
     assert [column.name for column in found.channels] == ["u", "y"]
 
 
