@@ -21,6 +21,7 @@ from sysid.export.heeded import heeded
 from sysid.export.surrogate import Surrogate
 from sysid.export.templating import c_real, render
 from sysid.kernels.neurons import Neuron
+from sysid.models.grey_box.state_search import PATIENCE, SHORTER, SLOWLY
 
 PASSED_OVER = "where the inputs say: what init is given of it is passed over"
 """The level at rest of an output whose states do not heed one."""
@@ -62,6 +63,9 @@ def c_files(surrogate: Surrogate) -> dict[str, str]:
         "equations": [stage for stage in stages if stage["kind"] == "equations"],
         "late": [{**asdict(late), "name": surrogate.channels[late.column].name} for late in surrogate.late],
         "levels": [level_text(surrogate, port.level) for port in surrogate.channels],
+        "slowly": SLOWLY,
+        "shorter": SHORTER,
+        "patience": PATIENCE,
         "levels_in_words": [
             _words(port.level) if says else PASSED_OVER
             for port, says in zip(surrogate.outputs, heeded(surrogate), strict=True)

@@ -26,8 +26,9 @@ STEPS = 50
 MANY = 6
 """States up to which searches begin on both sides of each."""
 
-SLOWLY, PATIENCE = 1e-2, 3
-"""Part of what changes by which a step has to lessen it; and steps in a row that may do less before a search ends."""
+SLOWLY, SHORTER, PATIENCE = 1e-2, 0.5, 3
+"""Part of what changes by which a step has to lessen it, or part of the step before that it has to be shorter than; and
+steps in a row that may be neither before a search ends."""
 
 STOOD = 1e-10
 """What changes where nothing does, in shares of what would: searches from elsewhere are not needed then."""
@@ -135,7 +136,7 @@ def _stood(
         found = float(np.linalg.norm(standing.change(at) / rows))
         return found if np.isfinite(found) else np.inf
 
-    now, slow = left(x), 0
+    now, slow, before = left(x), 0, np.inf
     for _ in range(STEPS):
         (change, by_state, _), (y, out_state, _) = standing(x)
         J = by_state[:, places] * scale / rows[:, None]
@@ -159,9 +160,11 @@ def _stood(
             share /= 2.0
         if then > max(now, 1e-12) or np.array_equal(moved, x):
             break
-        # Where nothing ever stands, further steps gain as little; where all stands, they turn in a rounding.
-        slow = slow + 1 if then > (1.0 - SLOWLY) * now else 0
-        x, now = moved, then
+        # Where nothing ever stands, further steps gain as little; where all stands, they turn in a rounding. What a
+        # declared state changes by is always left, and hides what the others gain: their steps become shorter.
+        size = share * float(np.abs(step).max())
+        slow = slow + 1 if then > (1.0 - SLOWLY) * now and size > SHORTER * before else 0
+        x, now, before = moved, then, size
         if slow == PATIENCE:
             break
     return now, x
