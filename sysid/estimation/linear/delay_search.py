@@ -47,6 +47,8 @@ def searched_delays(
     most: int,
     loss_at: Callable[[tuple[int, ...], int], float],
     loss_near: Callable[[tuple[int, ...], int], float] | None = None,
+    *,
+    gain: float = 0.0,
 ) -> tuple[tuple[int, ...], tuple[str, ...]]:
     """Dead times with the least loss.
 
@@ -59,6 +61,8 @@ def searched_delays(
         loss_at: The loss of some dead times where so many first samples of each record do not count.
         loss_near: The same of dead times next to others that were looked at, which may take less; ``loss_at`` by
             default.
+        gain: Part of a loss below which one is no better than another: of an input without effect each place leaves
+            something else by chance, and the shortest is as good.
 
     Returns:
         The dead times, and what is to be said of the search.
@@ -80,11 +84,16 @@ def searched_delays(
     for start in dict.fromkeys(informed):
         loss(start, loss_at)
     ranked = sorted(dict.fromkeys([*informed, *few_each]), key=loss)
-    best = min((descend(start, least, reach[0], loss) for start in ranked[:2]), key=loss)
+    best, *others = (descend(start, least, reach[0], loss, gain) for start in ranked[:2])
+    best = next((other for other in others if loss(other) < (1.0 - gain) * loss(best)), best)
     while max(best) == reach[0] < most:  # at the end of what was compared: further
         reach[0] = min(most, 2 * reach[0])
         known.clear()
-        best = descend(best, least, reach[0], loss)
+        best = descend(best, least, reach[0], loss, gain)
+    for j in range(m if gain else 0):
+        short = (*best[:j], least, *best[j + 1 :])
+        if best[j] > least + FEW and loss(short, loss_at) <= (1.0 + gain) * loss(best):
+            best = short
     if max(best) < most:
         return best, ()
     return best, (

@@ -72,7 +72,9 @@ class DelaySearch:
         Returns:
             Both.
         """
-        return searched_delays(self.problem.likely_delays(least, most), least, most, self.loss_at, self.loss_near)
+        places = self.problem.likely_delays(least, most)
+        gain = CHANCE / self.problem.provider((least,) * len(places)).n_samples
+        return searched_delays(places, least, most, self.loss_at, self.loss_near, gain=gain)
 
     def contradicts(self, delays: tuple[int, ...], least: int, most: int) -> bool:
         """Whether others next to some dead times clearly leave less.

@@ -140,7 +140,9 @@ def _peaks(share: NDArray[np.float64]) -> list[int]:
     return found
 
 
-def descend(start: tuple[int, ...], least: int, most: int, loss: Callable[[tuple[int, ...]], float]) -> tuple[int, ...]:
+def descend(
+    start: tuple[int, ...], least: int, most: int, loss: Callable[[tuple[int, ...]], float], gain: float = 0.0
+) -> tuple[int, ...]:
     """From some dead times to those with the least loss about them, one input after the other.
 
     Args:
@@ -148,6 +150,7 @@ def descend(start: tuple[int, ...], least: int, most: int, loss: Callable[[tuple
         least: The shortest.
         most: The longest.
         loss: Of some dead times.
+        gain: Part of the loss that a move has to take away.
 
     Returns:
         Dead times about which none is better, up to :data:`AROUND` samples away in one input.
@@ -159,7 +162,7 @@ def descend(start: tuple[int, ...], least: int, most: int, loss: Callable[[tuple
         for j in range(len(start)):
             losses = {trial: loss(trial) for trial in around(current, j, least, most)}
             trial = min(losses, key=losses.__getitem__, default=current)
-            if trial != current and losses[trial] < best:
+            if trial != current and losses[trial] < (1.0 - gain) * best:
                 current, best, moved = trial, losses[trial], True
     return current
 

@@ -221,6 +221,18 @@ def test_a_record_that_begins_in_motion_while_its_inputs_stand_tells_its_dead_ti
     assert fit.model.structure.to_dict()["delays"] == [dead]
 
 
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_an_input_without_effect_has_a_short_dead_time(seed: int) -> None:
+    """Each place leaves something else by chance; a long dead time would be as many states in every file."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.0, 1.0, (60, 2)), 10, axis=0)
+    y = signal.lfilter([0.0, 0.0, 0.0, 0.2], [1.0, -0.8], u[:, 0]) + 0.05 * rng.standard_normal(600)
+    fit = fit_transfer_function([trace_of(u, y)], TWO, TransferFunction(poles=(1, 1), zeros=(0, 0)))
+    first, second = fit.model.structure.to_dict()["delays"]
+    assert first == 3
+    assert second <= 5
+
+
 @pytest.mark.parametrize("width", [1, 180], ids=["impulse", "step"])
 def test_a_record_that_begins_at_rest_tells_its_dead_time_by_a_single_response(width: int) -> None:
     """Samples that a long dead time would leave out are all that it has."""
