@@ -214,6 +214,26 @@ def rounded_step(stamps: NDArray[np.float64], timing: Timing) -> tuple[float, fl
     return None
 
 
+def roundest(low: float, high: float) -> float:
+    """The sample time of fewest digits between two, as a period or as a rate.
+
+    Args:
+        low: Least, in seconds.
+        high: Most.
+
+    Returns:
+        Seconds.
+
+    Example:
+        >>> roundest(0.0332, 0.03335), roundest(0.1349, 0.1351)
+        (0.03333333333333333, 0.135)
+    """
+    middle = 0.5 * (low + high)
+    found = [(len(f"{value:.15g}".strip("0.")), rate, value) for value, rate in _periods_and_rates(middle)]
+    steps = (1.0 / value if rate else value for _, rate, value in sorted(found))
+    return next((step for step in steps if low <= step <= high), middle)
+
+
 def _periods_and_rates(step: float) -> list[tuple[float, bool]]:
     return [(value, False) for value in _by_digits(step)] + [(value, True) for value in _by_digits(1.0 / step)]
 

@@ -17,7 +17,7 @@ from sysid.ingest.inspecting.attempts import Attempt, read_somehow
 from sysid.ingest.inspecting.column_findings import column_finding
 from sysid.ingest.inspecting.events import are_events
 from sysid.ingest.inspecting.findings import CaseFinding, ColumnFinding, FileFinding, counted, listed
-from sysid.ingest.inspecting.restarts import finer_than_clock, records_by_clock
+from sysid.ingest.inspecting.restarts import finer_than_clock, of_few_digits, records_by_clock
 from sysid.ingest.inspecting.second_clocks import without_second_clocks
 from sysid.ingest.inspecting.time_findings import find_time, finite_of, needs_of_time, step_beside, without_copies
 from sysid.ingest.readers.records import role_of
@@ -109,6 +109,8 @@ class _Clock:
         if needs.get("duplicates") and are_events(stamps, [c for c in table.columns if c.name != time.column]):
             needs["duplicates"] = "last"
         finer = None if found.unstamped else finer_than_clock(known, timing)
+        if finer is None and not found.unstamped and (needs["duplicates"] or needs["jitter"]):
+            finer = of_few_digits(known)
         if finer is not None:
             by_rows, said = TimeOptions(step=finer[0]), f"guessed: {finer[1]}"
             return replace(found, time=by_rows, told=said, step=finer[0], tolerance=tolerance)

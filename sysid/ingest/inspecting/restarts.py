@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.ingest.assembling.timing import Timing, round_step
+from sysid.ingest.assembling.timing import Timing, round_step, roundest
 from sysid.ingest.tables.table import RawTable, RecordChoice
 
 _MOST_RECORDS = 200
 _FEWEST_ROWS = 8
 _BACK, _EVEN, _IN_ORDER = 1.5, 0.25, 0.95  # steps that a clock is set back, and how even what is only out of order is
+_FEW_DIGITS = range(2, 8)
 _CLOSE = 0.02  # of the time that a record lasts: so near to the first start is the start of each record
 
 
@@ -99,3 +100,37 @@ def finer_than_clock(known: NDArray[np.float64], timing: Timing) -> tuple[float,
         step,
         f"the clock counts in steps of {steps.mean():g} s and {inner.mean():.4g} samples share each: {step:g} s",
     )
+
+
+def of_few_digits(known: NDArray[np.float64]) -> tuple[float, str] | None:
+    """The sample time of an even clock of which only the first digits were written: 1230, 1230, 1240 of 1231.2 on.
+
+    ``%g`` and the like keep as many digits however large the number is, so that later stamps are coarser than earlier
+    ones, and stamps of many samples are one.
+
+    Args:
+        known: Time stamps in seconds, shape ``(n,)``, all finite.
+
+    Returns:
+        Seconds between samples, and how that is known; ``None`` unless an even clock has all of these stamps.
+    """
+    n = len(known)
+    if n < _FEWEST_ROWS or (np.diff(known) < 0.0).any() or known[0] < 0.0 or not known[-1] > known[0]:
+        return None
+    decade = np.floor(np.log10(np.maximum(known, np.finfo(np.float64).tiny)) + 1e-12)
+    for digits in _FEW_DIGITS:
+        unit = 10.0 ** (decade - digits + 1)
+        if (np.abs(np.rint(known / unit) * unit - known) > 1e-9 * known).any():
+            continue
+        half = 0.5 * np.where(known > 0.0, unit, 0.0) * (1.0 + 1e-6)
+        k = np.arange(1, n)
+        low = float(((known[1:] - half[1:] - known[0] - half[0]) / k).max())
+        high = float(((known[1:] + half[1:] - known[0] + half[0]) / k).min())
+        if not 0.0 < low <= high:
+            return None
+        step = roundest(low, high)
+        return (
+            step,
+            f"the clock is written in {digits} digits, and samples {step:g} s apart would have all of its stamps",
+        )
+    return None
