@@ -109,7 +109,7 @@ class _Clock:
         if needs.get("duplicates") and are_events(stamps, [c for c in table.columns if c.name != time.column]):
             needs["duplicates"] = "last"
         finer = None if found.unstamped else finer_than_clock(known, timing)
-        if finer is None and not found.unstamped and (needs["duplicates"] or needs["jitter"]):
+        if finer is None and not found.unstamped and (needs.get("duplicates") or needs.get("jitter")):
             finer = of_few_digits(known)
         if finer is not None:
             by_rows, said = TimeOptions(step=finer[0]), f"guessed: {finer[1]}"

@@ -1,4 +1,4 @@
-"""Clocks of which only the first digits were written, as by ``%g``: no sample is lost, the step is that of the clock."""
+"""Clocks of which only the first digits were written, as by ``%g``: no sample is lost, and the step is theirs."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def test_a_clock_of_few_digits_loses_no_sample(tmp_path: Path, step: float, digi
 def test_what_is_found_has_all_of_the_stamps(step: float, digits: int, n: int, first: float) -> None:
     stamps = np.array(written(step, digits, n, float(f"{first:.{digits}g}")))
     found = of_few_digits(stamps)
-    if stamps[-1] > stamps[0]:
+    unit = 10.0 ** (np.floor(np.log10(np.maximum(stamps, 1e-300)) + 1e-12) - digits + 1)
+    if stamps[-1] - stamps[0] > 10.0 * unit[-1]:
         assert found is not None
         again = stamps[0] + found[0] * np.arange(n)
-        unit = 10.0 ** (np.floor(np.log10(np.maximum(stamps, 1e-300)) + 1e-12) - digits + 1)
         assert np.all(np.abs(again - stamps) <= 0.5 * (unit + unit[0]) * (1.0 + 1e-5))
 
 
