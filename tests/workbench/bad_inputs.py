@@ -216,7 +216,7 @@ COMMANDS = [
     Bad(id="inputs at another sample time", command="simulate runs/first/bundle a.csv --out o.csv", files={"a.csv": rows().replace("[s]", "[min]")}, says=("a.csv", "0.05 s", "3 s", "remedy")),
     Bad(id="an output of an unknown ending", command="simulate runs/first/bundle a.csv --out o.xlsx", files={"a.csv": rows()}, says=("o.xlsx", ".csv", "remedy")),
     Bad(id="an output into a file's inside", command="simulate runs/first/bundle a.csv --out pipelines/first.yaml/o.csv", files={"a.csv": rows()}, says=("o.csv", "remedy")),
-    Bad(id="a word for an initial value", command="simulate runs/first/bundle a.csv --out o.csv --initial low", files={"a.csv": rows()}, says=("--initial", "valid number", "--initial low")),
+    Bad(id="a word for an initial value", command="simulate runs/first/bundle a.csv --out o.csv --initial low", files={"a.csv": rows()}, says=("--initial", "finite number", "low", "--initial 3.4")),
     Bad(id="an infinite initial value", command="simulate runs/first/bundle a.csv --out o.csv --initial inf", files={"a.csv": rows()}, says=("--initial", "inf", "remedy")),
 ]  # fmt: skip
 

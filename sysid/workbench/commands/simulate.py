@@ -226,7 +226,7 @@ def _no_level(got: str) -> ConfigError:
     return ConfigError(
         "the output cannot begin there", where="option --initial",
         expected="a finite number, in the output's unit, or NAME=NUMBER for each of several outputs", got=got,
-        remedy="give the output's value before the first sample, or leave --initial out",
+        remedy="give the output's value before the first sample, as in --initial 3.4, or leave --initial out",
     )  # fmt: skip
 
 
