@@ -234,7 +234,10 @@ class _Problem(AbstractProblem):
 
     def begun_in_motion(self) -> _Problem | None:
         """With first samples left out that stand; see the base class."""
-        return replace(self, rested=False) if any(e.free and _at_rest(e, 0) for e in self.experiments) else None
+        # Where dead times are tried that are longer than all records, those that begin at rest alone tell of them.
+        long = max(len(e.output) for e in self.experiments) > self.delay_range()[1]
+        rests = long and any(e.free and _at_rest(e, 0) for e in self.experiments)
+        return replace(self, rested=False) if rests else None
 
     def likely_delays(self, least: int, most: int) -> list[list[int]]:
         """By correlation; see the base class."""

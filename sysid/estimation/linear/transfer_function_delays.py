@@ -73,7 +73,7 @@ class DelaySearch:
             Both.
         """
         places = self.problem.likely_delays(least, most)
-        gain = CHANCE / self.problem.provider((least,) * len(places)).n_samples
+        gain = -float(np.expm1(-CHANCE / max(self.problem.provider((least,) * len(places)).n_samples, 1)))
         return searched_delays(places, least, most, self.loss_at, self.loss_near, gain=gain)
 
     def contradicts(self, delays: tuple[int, ...], least: int, most: int) -> bool:

@@ -105,21 +105,28 @@ def is_late(records: Sequence[tuple[Array, Array]]) -> bool:
     """
     past, inputs = max(ORDERS), records[0][0].shape[1]
     lags = max(past, min(max(len(y) for _, y in records) // LATE, TERMS // inputs))
-    rows, values = [], []
+    total, seen, rows, values = sum(len(y) for _, y in records), [], [], []
     for u, y in records:
         # At rest before its first sample, as all records are of which a loop is sought.
         moved = np.concatenate([np.zeros(past), np.diff(y, prepend=y[0])])
         driven = np.concatenate([np.zeros((lags, inputs)), np.diff(u, axis=0, prepend=u[:1])])
+        some = np.linspace(0, len(y) - 1, -(-ROWS * len(y) // max(total, ROWS))).astype(int)
         own, drives = (sliding_window_view(of, n, axis=0) for of, n in ((moved[:-1], past), (driven[1:], lags)))
-        rows.append(np.hstack([own, drives.reshape(len(y), -1)]))
-        values.append(moved[past:])
-    terms, changes = np.vstack(rows), np.concatenate(values)
-    some = np.linspace(0, len(terms) - 1, min(len(terms), ROWS)).astype(int)
-    if len(some) < 2 * terms.shape[1]:
+        rows.append(np.hstack([own[some], drives[some].reshape(len(some), -1)]))
+        values.append(moved[past:][some])
+        seen.append((moved, driven[1:]))
+    terms = np.vstack(rows)
+    if len(terms) < 2 * terms.shape[1]:
         return False
-    found = np.linalg.lstsq(terms[some], changes[some], rcond=None)[0]
-    moves = np.abs(changes) > MOVES
-    return bool(np.mean(np.abs(terms @ found - changes)[moves] <= NEAR) > ALL) if moves.any() else False
+    found = np.linalg.lstsq(terms, np.concatenate(values), rcond=None)[0]
+    own_past, late = found[:past], found[past:].reshape(inputs, lags)
+    follow = among = 0
+    for moved, driven in seen:  # by a filter: all windows side by side are as many times the record as there are terms
+        off = np.convolve(moved[:-1], own_past[::-1], "valid") - moved[past:]
+        off += sum(np.convolve(driven[:, j], late[j][::-1], "valid") for j in range(inputs))
+        moves = np.abs(moved[past:]) > MOVES
+        follow, among = follow + int(np.sum(np.abs(off[moves]) <= NEAR)), among + int(moves.sum())
+    return follow > ALL * among
 
 
 def pieces(records: Sequence[tuple[Array, Array]]) -> dict[int, Law]:
