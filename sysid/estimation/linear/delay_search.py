@@ -14,6 +14,8 @@ FEW = 4
 """Dead times up to which every combination is tried, whatever a correlation says."""
 MOST_COMBINATIONS = 30
 """Combinations of dead times up to which all are tried; above, one input at a time."""
+MOVE = 0.1
+"""Part of what chance does not do from which a dead time is moved: the way to the true one has many such steps."""
 LITTLE, LESS, CHANCE = 1e-4, 0.2, 20.0
 """Part of a constant's loss from which an error is worth an explanation; part of a loss that a response within the
 sample must take away to be taken for one; and how much less, in twice the log likelihood, chance does not do."""
@@ -84,12 +86,12 @@ def searched_delays(
     for start in dict.fromkeys(informed):
         loss(start, loss_at)
     ranked = sorted(dict.fromkeys([*informed, *few_each]), key=loss)
-    best, *others = (descend(start, least, reach[0], loss, gain) for start in ranked[:2])
+    best, *others = (descend(start, least, reach[0], loss, MOVE * gain) for start in ranked[:2])
     best = next((other for other in others if loss(other) < (1.0 - gain) * loss(best)), best)
     while max(best) == reach[0] < most:  # at the end of what was compared: further
         reach[0] = min(most, 2 * reach[0])
         known.clear()
-        best = descend(best, least, reach[0], loss, gain)
+        best = descend(best, least, reach[0], loss, MOVE * gain)
     for j in range(m if gain else 0):
         short = (*best[:j], least, *best[j + 1 :])
         if best[j] > least + FEW and loss(short, loss_at) <= (1.0 + gain) * loss(best):

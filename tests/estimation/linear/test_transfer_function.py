@@ -233,6 +233,25 @@ def test_an_input_without_effect_has_a_short_dead_time(seed: int) -> None:
     assert second <= 5
 
 
+def test_a_dead_time_of_few_samples_moves_by_what_they_say() -> None:
+    """Of so few a better place takes away more than any part of the loss that grows with one over their number."""
+    u = np.repeat([0.0, 1.0], [6, 12])[:, np.newaxis]
+    y = signal.lfilter([0.0, 0.0, 0.0, 0.0, 0.2], [1.0, -0.8], u[:, 0])
+    y += 1e-3 * np.random.default_rng(0).standard_normal(18)
+    fit = fit_transfer_function([trace_of(u, y)], ONE, TransferFunction(poles=(1,), zeros=(0,)))
+    assert fit.model.structure.to_dict()["delays"] == [4]
+
+
+def test_dead_times_beyond_a_record_are_left_to_those_that_begin_at_rest() -> None:
+    u = np.repeat([0.0, 1.0], [50, 40])[:, np.newaxis]
+    y = signal.lfilter([*np.zeros(20), 0.2], [1.0, -0.8], u[:, 0]) + 1e-3 * np.random.default_rng(0).standard_normal(90)
+    training = TransferFunctionTraining(max_delay=100)
+    start = Start(kind=StartKind.ESTIMATED)
+    structure = TransferFunction(poles=(1,), zeros=(0,))
+    fit = fit_transfer_function([trace_of(u, y)], ONE, structure, training, start=start)
+    assert fit.model.structure.to_dict()["delays"] == [20]
+
+
 @pytest.mark.parametrize("width", [1, 180], ids=["impulse", "step"])
 def test_a_record_that_begins_at_rest_tells_its_dead_time_by_a_single_response(width: int) -> None:
     """Samples that a long dead time would leave out are all that it has."""
