@@ -90,16 +90,14 @@ class RegressorBasis:
         r, k = layout.lags.n_regressors, layout.neurons
         P = np.eye(layout.n_parameters)
         shift = self.matrix @ self.centre
-        for neuron in range(k):
-            weights = slice(neuron * r, (neuron + 1) * r)
-            P[weights, weights] = self.matrix.T
-            P[k * r + neuron, weights] = -shift
-            if layout.gated:
-                gate = slice(layout.gates.start + neuron * r, layout.gates.start + (neuron + 1) * r)
-                P[gate, gate] = self.matrix.T
-                P[layout.readout.start + neuron, gate] = -shift
+        # Each row of weights with the constant that takes up the shift of its regressors.
+        rows = [(neuron * r, k * r + neuron) for neuron in range(k)]
+        if layout.gated:
+            rows += [(layout.gates.start + neuron * r, layout.readout.start + neuron) for neuron in range(k)]
         if layout.linear:
-            constant, weights = layout.affine.start, slice(layout.affine.start + 1, layout.affine.stop)
+            rows += [(layout.linear_part(j).start, layout.affine.start + j) for j in range(len(layout.outputs))]
+        for first, constant in rows:
+            weights = slice(first, first + r)
             P[weights, weights] = self.matrix.T
             P[constant, weights] = -shift
         return P

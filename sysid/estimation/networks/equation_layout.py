@@ -49,7 +49,7 @@ class EquationLayout:
         return cls(name=model.mapping.output, parameters=grey.free)
 
     @property
-    def count(self) -> int:
+    def n_parameters(self) -> int:
         """Number of parameters."""
         return len(self.parameters)
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.models import NARX, Lags
+from sysid.models import NARX, Ends, Lags, Member
+from sysid.models.contract.column_recursion import ColumnRecursion
 
 READOUT_SPREAD = 1e-3
 """Standard deviation of the initial readout. Small, so that the first free run is the linear part's: bounded, and
@@ -69,23 +71,29 @@ class AbstractLayout(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Layout(AbstractLayout):
-    """Where each part of the flat parameter vector ``[W | b | v | c | w | V]`` stands.
+    """Where each part of the flat parameter vector ``[W | b | readouts | constants | linear parts | gates]`` stands.
+
+    Of a network that is fitted alone, or of a member of a cascade; of one output, or of several.
 
     Args:
-        lags: The regressors.
+        inputs: Lags of each input.
+        outputs: Lags of each output.
         neurons: Number of neurons.
         linear: Whether there is a linear part.
-        gated: Whether the neurons have gates.
+        gated: Whether the neurons have gates; of a network with one output.
+        name: What groups of parameters are named after; empty for a network that is fitted alone.
     """
 
-    lags: Lags
+    inputs: tuple[tuple[int, ...], ...]
+    outputs: tuple[tuple[int, ...], ...]
     neurons: int
     linear: bool
     gated: bool = False
+    name: str = ""
 
     @classmethod
     def of(cls, network: NARX, n_inputs: int) -> Layout:
-        """The layout of a network.
+        """The layout of a network with one output.
 
         Args:
             network: The structure.
@@ -95,8 +103,38 @@ class Layout(AbstractLayout):
             The layout.
         """
         return cls(
-            lags=network.lags(n_inputs), neurons=network.neurons, linear=network.feedthrough, gated=network.gated
+            inputs=network.lags(n_inputs).inputs,
+            outputs=(network.output_delays,),
+            neurons=network.neurons,
+            linear=network.feedthrough,
+            gated=network.gated,
         )
+
+    @classmethod
+    def of_member(cls, model: Member, columns: ColumnRecursion) -> Layout:
+        """The layout of a member of a cascade.
+
+        Args:
+            model: The member.
+            columns: What it lowers to.
+
+        Returns:
+            The layout.
+        """
+        ends, lags = Ends.of(model), columns.lags.inputs
+        return cls(
+            name="+".join(ends.outputs),
+            inputs=lags[: len(ends.inputs)],
+            outputs=lags[len(ends.inputs) :],
+            neurons=columns.neurons,
+            linear=columns.linear,
+            gated=columns.gated,
+        )
+
+    @cached_property
+    def lags(self) -> Lags:
+        """The regressors in order; the lags of all outputs, one output after the other, stand as those of one."""
+        return Lags(inputs=self.inputs, output=tuple(lag for lags in self.outputs for lag in lags))
 
     @property
     def n_parameters(self) -> int:
@@ -105,48 +143,54 @@ class Layout(AbstractLayout):
 
     @property
     def hidden(self) -> slice:
-        """Weights and biases of the tanh layer."""
+        """Weights and biases of the neurons."""
         return slice(0, self.neurons * (self.lags.n_regressors + 1))
 
     @property
     def readout(self) -> slice:
-        """Weights from the neurons to the output."""
-        return slice(self.hidden.stop, self.hidden.stop + self.neurons)
+        """Weights from the neurons to each output."""
+        return slice(self.hidden.stop, self.hidden.stop + len(self.outputs) * self.neurons)
 
     @property
     def affine(self) -> slice:
-        """Constant and linear part."""
-        return slice(self.readout.stop, self.readout.stop + 1 + (self.lags.n_regressors if self.linear else 0))
+        """Constants of all outputs, then the linear part of each."""
+        each = 1 + (self.lags.n_regressors if self.linear else 0)
+        return slice(self.readout.stop, self.readout.stop + len(self.outputs) * each)
 
     @property
     def gates(self) -> slice:
         """Weights of the gates, neuron by neuron."""
         return slice(self.affine.stop, self.affine.stop + (self.neurons * self.lags.n_regressors if self.gated else 0))
 
-    @property
-    def last_output(self) -> int | None:
-        """Position of the linear weight of ``y(t-1)``; ``None`` if there is none."""
-        if not self.linear or 1 not in self.lags.output:
-            return None
-        return int(self.readout.stop) + 1 + len(self.lags.input_lag) + self.lags.output.index(1)
+    def linear_part(self, output: int) -> slice:
+        """Weights from the regressors to an output; none without a linear part.
+
+        Args:
+            output: Which output, from 0 on.
+
+        Returns:
+            Where they stand.
+        """
+        each = self.lags.n_regressors if self.linear else 0
+        first = self.affine.start + len(self.outputs) + output * each
+        return slice(first, first + each)
 
     def centre(self) -> NDArray[np.float64]:
-        """What the prior draws the parameters to: "the output stays as it is", zero for everything else.
+        """What the prior draws the parameters to: "every output stays as it is", zero for everything else.
 
         Sampled fast, a system's next output is close to its last; drawing the weight of ``y(t-1)`` to 1 instead
         of 0 lets the regularisation shrink towards a model that holds, not one that collapses.
         """
         centre = np.zeros(self.n_parameters)
-        if self.last_output is not None:
-            centre[self.last_output] = 1.0
+        column = len(self.lags.input_lag)
+        for output, lags in enumerate(self.outputs):
+            if self.linear and 1 in lags:
+                centre[self.linear_part(output).start + column + lags.index(1)] = 1.0
+            column += len(lags)
         return centre
 
     def prior(self, centre: NDArray[np.float64], *, alpha: float, beta: float) -> Prior:
         """The prior a fit begins with.
-
-        The hidden weights of each regressor are a group of their own, and so are its gates, so that the evidence can
-        find a regressor unimportant (automatic relevance determination, MacKay 1994); biases, readout and linear part
-        are groups too.
 
         Args:
             centre: What the parameters are drawn to, shape ``(n_parameters,)``.
@@ -156,17 +200,33 @@ class Layout(AbstractLayout):
         Returns:
             The prior.
         """
-        r, k = self.lags.n_regressors, self.neurons
+        groups = self.groups()
+        return Prior(centre=centre, groups=groups, alphas=np.full(len(groups), alpha), beta=beta)
+
+    def groups(self, first: int = 0) -> tuple[Group, ...]:
+        """Groups of parameters that share a prior.
+
+        The hidden weights of each regressor are a group of their own, and so are its gates, so that the evidence can
+        find a regressor unimportant (automatic relevance determination, MacKay 1994); the biases are a group too, and
+        each output's readout and linear part.
+
+        Args:
+            first: Where the network's parameters begin among those of all that are trained together.
+
+        Returns:
+            The groups, their members counted over all.
+        """
+        r, k, m = self.lags.n_regressors, self.neurons, len(self.outputs)
         by_regressor = np.arange(k * r).reshape(k, r)
-        members = {f"hidden {i}": by_regressor[:, i] for i in range(r)} | {
-            "bias": np.arange(k * r, k * (r + 1)),
-            "readout": np.arange(self.readout.start, self.readout.stop),
-            "linear": np.arange(self.affine.start, self.affine.stop),
-        }
+        members = {f"hidden {i}": by_regressor[:, i] for i in range(r)} | {"bias": np.arange(k * r, k * (r + 1))}
+        for j in range(m):
+            suffix, linear = f" {j}" if m > 1 else "", self.linear_part(j)
+            members[f"readout{suffix}"] = self.readout.start + np.arange(j * k, (j + 1) * k)
+            members[f"linear{suffix}"] = np.array([self.affine.start + j, *range(linear.start, linear.stop)])
         if self.gated:
             members |= {f"gate {i}": self.gates.start + by_regressor[:, i] for i in range(r)}
-        groups = tuple(Group(name=name, members=places) for name, places in members.items() if len(places))
-        return Prior(centre=centre, groups=groups, alphas=np.full(len(groups), alpha), beta=beta)
+        before = f"{self.name}: " if self.name else ""
+        return tuple(Group(name=before + name, members=first + at) for name, at in members.items() if len(at))
 
     def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
         """A random start after Nguyen and Widrow 1990.
@@ -189,6 +249,6 @@ class Layout(AbstractLayout):
             weights = length * directions / np.linalg.norm(directions, axis=1, keepdims=True)
             biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
             theta[self.hidden] = np.concatenate([weights.ravel(), biases])
-            theta[self.readout] = READOUT_SPREAD * rng.standard_normal(k)
+            theta[self.readout] = READOUT_SPREAD * rng.standard_normal(k * len(self.outputs))
             theta[self.gates] = READOUT_SPREAD * rng.standard_normal(self.gates.stop - self.gates.start)
         return theta

@@ -141,10 +141,8 @@ def part_of(whole: Layout, mapping: Mapping, without: tuple[str, ...]) -> Layout
     Returns:
         The layout.
     """
-    inputs = tuple(
-        () if name in without else lags for name, lags in zip(mapping.inputs, whole.lags.inputs, strict=True)
-    )
-    return replace(whole, lags=replace(whole.lags, inputs=inputs))
+    inputs = tuple(() if name in without else lags for name, lags in zip(mapping.inputs, whole.inputs, strict=True))
+    return replace(whole, inputs=inputs)
 
 
 def embedding(part: Layout, whole: Layout) -> NDArray[np.float64]:

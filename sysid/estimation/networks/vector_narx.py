@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.together.fit import Joint
 from sysid.estimation.networks.together.layout import JointLayout
-from sysid.estimation.networks.together.member_layout import MemberLayout
 from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.together.result import CascadeFit
 from sysid.estimation.networks.training import FitProgress
@@ -223,4 +223,4 @@ def _template(
     ]
     model = replace(model, between=ends_of_several(network.limits, records, mapping.outputs))
     columns = ColumnRecursion.of(model)
-    return model.with_theta(MemberLayout.of(model, columns).centre()) if columns else model
+    return model.with_theta(Layout.of_member(model, columns).centre()) if columns else model

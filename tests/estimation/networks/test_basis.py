@@ -53,7 +53,7 @@ def test_a_constant_regressor_is_not_blown_up():
 def test_a_network_in_the_basis_is_the_network_over_plain_regressors(neurons, gated):
     X = records()
     basis = RegressorBasis.incremental(LAGS, X)
-    layout = Layout(lags=LAGS, neurons=neurons, linear=True, gated=gated)
+    layout = Layout(inputs=LAGS.inputs, outputs=(LAGS.output,), neurons=neurons, linear=True, gated=gated)
     theta = np.random.default_rng(1).standard_normal(layout.n_parameters)
     plain = basis.to_plain(layout) @ theta
 
@@ -68,7 +68,7 @@ def test_a_network_in_the_basis_is_the_network_over_plain_regressors(neurons, ga
 
 def test_the_gradient_in_the_basis_is_the_gradient():
     rng = np.random.default_rng(2)
-    layout = Layout(lags=LAGS, neurons=2, linear=True)
+    layout = Layout(inputs=LAGS.inputs, outputs=(LAGS.output,), neurons=2, linear=True)
     template = Recursion(lags=LAGS, neurons=2, theta=layout.centre(), scaling=Scaling.identity(2), low=-3.0, high=3.0)
     experiment = Experiment(
         inputs=rng.uniform(-1, 1, (50, 2)),
@@ -83,7 +83,7 @@ def test_the_gradient_in_the_basis_is_the_gradient():
 
 
 def test_the_centre_of_the_prior_holds_the_last_output():
-    layout = Layout(lags=LAGS, neurons=2, linear=True)
+    layout = Layout(inputs=LAGS.inputs, outputs=(LAGS.output,), neurons=2, linear=True)
     form = Recursion(lags=LAGS, neurons=2, theta=layout.centre(), scaling=Scaling.identity(2))
     output = form.simulate(np.random.default_rng(0).uniform(-1, 1, (20, 2)), History.at_rest(inputs=[0, 0], output=0.7))
     assert_allclose(output, 0.7)

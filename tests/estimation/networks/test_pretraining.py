@@ -109,7 +109,7 @@ def test_few_samples_are_all_taken():
 
 def test_a_start_has_neurons_of_every_sharpness_that_switch_where_samples_are():
     network = NARX(input_delays=[0, 2], output_delays=[1, 2], neurons=200)
-    layout = Layout(lags=network.lags(1), neurons=200, linear=True)
+    layout = Layout.of(network, 1)
     x = np.random.default_rng(0).uniform(-1, 1, (50, 4))
     one = StepSamples(layout=layout, regressors=x, target=np.zeros(50), neuron=NEURONS["tanh"])
     theta = one.draw(np.random.default_rng(1), layout.centre())

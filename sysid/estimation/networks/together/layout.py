@@ -10,15 +10,19 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.evidence import Group, Prior
+from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.equation_layout import EquationLayout
-from sysid.estimation.networks.together.member_layout import MemberLayout, basis_of
+from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.parameters.named import Named, check_alike, precision_of
-from sysid.models import Member
+from sysid.models import Ends, Member
 from sysid.models.contract.column_recursion import ColumnRecursion
 from sysid.models.grey_box.declared import Parameter
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
+
+MAX_ROWS = 50_000
+"""Samples that the basis is scaled to; more say nothing new about the range of a regressor."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,7 +36,7 @@ class JointLayout:
         to_plain: From what is trained to plain parameters: sparse, a block for each member.
     """
 
-    members: tuple[MemberLayout | EquationLayout, ...]
+    members: tuple[Layout | EquationLayout, ...]
     places: tuple[Places, ...]
     to_plain: scipy.sparse.csr_array
 
@@ -44,8 +48,7 @@ class JointLayout:
 
         Args:
             models: The members that are trained, in the order of the parameters.
-            records: What their bases are scaled to; see
-                :func:`~sysid.estimation.networks.together.member_layout.basis_of`.
+            records: What their bases are scaled to: channels by name, in their units, each of shape ``(n_samples,)``.
             shared: Parameters of equations that are one wherever they have this name.
 
         Returns:
@@ -54,18 +57,18 @@ class JointLayout:
         Raises:
             ConfigError: If one of them has other terms in another equation, or an equation cannot be trained.
         """
-        layouts = list[MemberLayout | EquationLayout]()
+        layouts = list[Layout | EquationLayout]()
         places, blocks, known, count = list[Places](), list[Array](), dict[str, tuple[int, Parameter]](), 0
         for model in models:
             columns = ColumnRecursion.of(model)
             if columns is None:
                 continue
             if columns.equation is None:
-                network = MemberLayout.of(model, columns)
+                network = Layout.of_member(model, columns)
                 layouts.append(network)
-                blocks.append(network.to_plain(basis_of(model, network, records)))
-                places.append(count + np.arange(network.count))
-                count += network.count
+                blocks.append(_basis(model, columns, network, records).to_plain(network))
+                places.append(count + np.arange(network.n_parameters))
+                count += network.n_parameters
                 continue
             equation = EquationLayout.of(model)
             layouts.append(equation)
@@ -133,8 +136,8 @@ class JointLayout:
         """
         first, found = 0, np.empty(self.count)
         for layout, places in zip(self.members, self.places, strict=True):
-            own = slice(first, first + layout.count)
-            if layout.count:
+            own = slice(first, first + layout.n_parameters)
+            if layout.n_parameters:
                 found[places] = np.linalg.solve(self.to_plain[own][:, places].toarray(), theta[own])
             first = own.stop
         return found
@@ -155,7 +158,7 @@ class JointLayout:
         """
         groups, alphas, seen = list[Group](), list[float](), set[int]()
         for layout, places in zip(self.members, self.places, strict=True):
-            if isinstance(layout, MemberLayout):
+            if isinstance(layout, Layout):
                 own = layout.groups(int(places[0]))
                 groups += own
                 alphas += [alpha] * len(own)
@@ -178,6 +181,26 @@ class JointLayout:
         """
         rng, found = np.random.default_rng(seed), self.centre()
         for layout, places in zip(self.members, self.places, strict=True):
-            if isinstance(layout, MemberLayout):
+            if isinstance(layout, Layout):
                 found[places] = layout.draw(rng, found[places])
         return found
+
+
+def _basis(
+    model: Member, columns: ColumnRecursion, layout: Layout, records: Sequence[dict[str, Array]]
+) -> RegressorBasis:
+    """Levels and rates of a member, scaled to some records; the plain basis without a linear part to take up shifts."""
+    if not layout.linear:
+        return RegressorBasis.identity(layout.lags)
+    ends, depth = Ends.of(model), columns.lags.depth
+    names = (*ends.inputs, *ends.outputs)
+    rows = []
+    for record in records:
+        z = np.column_stack([record[name] for name in names])
+        z = (z - np.array(columns.offset)) / np.array(columns.scale)
+        z = np.concatenate([np.repeat(z[:1], depth, axis=0), z])
+        n = len(z) - depth
+        pairs = zip(columns.lags.input_channel, columns.lags.input_lag, strict=True)
+        rows.append(np.column_stack([z[depth - lag : depth - lag + n, column] for column, lag in pairs]))
+    regressors = np.concatenate(rows)
+    return RegressorBasis.incremental(layout.lags, regressors[:: 1 + len(regressors) // MAX_ROWS])
