@@ -121,7 +121,11 @@ def _structure(value: object) -> AbstractStructure:
             got=", ".join(str(name) for name in value),
             remedy="add "
             + ", ".join(f"{name}: {_EXAMPLES.get(name, '...')}" for name in missing)
-            + ("; a list has one number for each input" if {"poles", "zeros", "nb", "nk", "nf"} & set(missing) else ""),
+            + (
+                "; one number is for all inputs, a list has one for each"
+                if {"poles", "zeros", "nb", "nk", "nf"} & set(missing)
+                else ""
+            ),
         )
     try:
         return structure_from_dict(value)

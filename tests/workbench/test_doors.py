@@ -71,6 +71,7 @@ ALONE = EVERYWHERE[:3]
 FITS = [
     pytest.param(ARX, None, ALONE, id="ARX"),
     pytest.param(ARX | {"intercept": False, "na": 4}, None, ALONE, id="ARX of another order"),
+    pytest.param(ARX | {"nb": 1, "nk": 1}, None, ALONE, id="ARX, one number for all inputs"),
     pytest.param(TF, {"seed": 7, "scattered_starts": 1}, ALONE, id="TransferFunction"),
     pytest.param(SS, None, ALONE, id="SS"),
     pytest.param(
@@ -278,8 +279,13 @@ WRONG = {
     "shooting without equations": (NARX, {"shooting": "multiple"}, "has no equations to shoot with", EVERYWHERE),
     "no iterations": (NARX, {"max_iterations": 0}, "max_iterations is too small", EVERYWHERE),
     "negative starts": (TF, {"scattered_starts": -1}, "scattered_starts is negative", EVERYWHERE),
-    "orders for one input of two": (ARX | {"nb": [1], "nk": [1]}, None, "the orders do not match the inputs", ALONE),
-    "poles for one input of two": (TF | {"poles": [1], "zeros": [0], "delays": [1]}, None, "do not match", ALONE),
+    "orders for three inputs of two": (
+        ARX | {"nb": [1, 1, 1], "nk": 1},
+        None,
+        "the orders do not match the inputs",
+        ALONE,
+    ),
+    "poles for three inputs of two": (TF | {"poles": [1, 1, 1], "zeros": 0, "delays": 1}, None, "do not match", ALONE),
     "delays for three inputs": (NARX | {"input_delays": [[1], [1], [1]]}, None, "do not match", EVERYWHERE),
 }
 

@@ -51,11 +51,11 @@ def test_its_key_knows_orders_seed_and_selection(workspace: Path) -> None:
     ("new", "said"),
     [
         (TF.replace("poles: [1, 1]", "poles: [1]"), "no more zeros than poles"),
-        (TF.replace("[1, 1], zeros: [0, 0], delays: [1, 1]", "[2], zeros: [1]"), "do not match the inputs"),
+        (TF.replace("[1, 1], zeros: [0, 0], delays: [1, 1]", "[2, 2, 2], zeros: 1"), "do not match the inputs"),
         (TF.replace("structure", "training: {loop: open}, structure"), "unknown field 'loop'"),
         (TF.replace("delays", "domain: laplace, delays"), "unknown domain"),
     ],
-    ids=["lengths differ", "one number for two inputs", "training", "domain"],
+    ids=["lengths differ", "three numbers for two inputs", "training", "domain"],
 )
 def test_a_mistake_is_named(workspace: Path, new: str, said: str) -> None:
     with pytest.raises(UserError, match=said):

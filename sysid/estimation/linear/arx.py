@@ -46,9 +46,10 @@ def fit_arx(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
-        TraceError: If there are fewer samples than parameters, or the orders do not fit the inputs.
+        ConfigError: If the orders do not fit the inputs.
+        TraceError: If there are fewer samples than parameters.
     """
-    began = now()
+    began, orders = now(), orders.for_inputs(len(mapping.inputs))
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = arx_experiments(
         traces, mapping, orders, start=start or Start(), rest_output=rest, operating_point=operating_point
@@ -106,15 +107,8 @@ def arx_experiments(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
-        TraceError: If the orders do not fit the inputs, or deviations go with an intercept.
+        TraceError: If deviations go with an intercept.
     """
-    if len(orders.nb) != len(mapping.inputs):
-        raise TraceError(
-            "the orders do not match the inputs",
-            expected=f"{len(mapping.inputs)} values of nb and nk for {mapping}",
-            got=f"{len(orders.nb)} values",
-            remedy="give one nb and one nk for each input",
-        )
     if operating_point is not None and orders.intercept:
         raise TraceError(
             "deviations from an operating point leave nothing for an intercept to do",

@@ -128,17 +128,19 @@ def fit_spectra(
         The fit; its mean squared error is that of real and imaginary parts.
 
     Raises:
+        ConfigError: If the orders do not fit the inputs.
         TraceError: If the orders do not fit the data.
         FitDivergedError: If no start gives a finite model.
     """
-    began = now()
     m = len(mapping.inputs)
-    if orders.intercept or len(orders.poles) != m or any(s.inputs.shape[1] != m for s in spectra):
+    began, orders = now(), orders.for_inputs(m)
+    if orders.intercept or any(s.inputs.shape[1] != m for s in spectra):
         raise TraceError(
             "the orders do not match the spectra",
             expected=f"orders without an intercept and {m} inputs everywhere, as in {mapping}",
-            got=f"{len(orders.poles)} numbers of poles, {'an' if orders.intercept else 'no'} intercept",
-            remedy="set intercept: false, and give one number of poles and one input column for each input",
+            got=f"spectra of {sorted({s.inputs.shape[1] for s in spectra})} inputs, "
+            f"{'an' if orders.intercept else 'no'} intercept",
+            remedy="set intercept: false, and give one input column for each input",
         )
     largest = [max(float(np.abs(s.inputs[:, j]).max()) for s in spectra) or 1.0 for j in range(m)]
     scale = max(float(np.abs(s.output).max()) for s in spectra) or 1.0

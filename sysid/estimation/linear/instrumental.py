@@ -55,9 +55,10 @@ def fit_iv4(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
-        TraceError: If there are fewer samples than parameters, or the orders do not fit the inputs.
+        ConfigError: If the orders do not fit the inputs.
+        TraceError: If there are fewer samples than parameters.
     """
-    began = now()
+    began, orders = now(), orders.for_inputs(len(mapping.inputs))
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = arx_experiments(
         traces, mapping, orders, start=start or Start(), rest_output=rest, operating_point=operating_point

@@ -78,15 +78,15 @@ def fit_transfer_function(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
-        ConfigError: If a largest dead time is asked for and none is searched.
-        TraceError: If the orders do not fit the inputs, or there are fewer samples than parameters.
+        ConfigError: If the orders do not fit the inputs, or a largest dead time is asked for and none is searched.
+        TraceError: If there are fewer samples than parameters.
         FitDivergedError: If no start gives a finite free run.
     """
     began = now()
-    start = start or Start()
+    start, orders = start or Start(), orders.for_inputs(len(mapping.inputs))
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     whole = experiments_of(traces, mapping, start, rest)
-    _check(orders, mapping, whole)
+    _check(orders, whole)
     training = training or TransferFunctionTraining()
     check_max_delay(training.max_delay, searched=orders.delays is None, field="delays")
     determined = Determined.of(whole)
@@ -318,14 +318,7 @@ def _counted(experiment: Experiment) -> list[slice]:
     return [slice(int(first), int(last)) for first, last in edges]
 
 
-def _check(orders: TransferFunction, mapping: Mapping, experiments: Sequence[Experiment]) -> None:
-    if len(orders.poles) != len(mapping.inputs):
-        raise TraceError(
-            "the orders do not match the inputs",
-            expected=f"{len(mapping.inputs)} numbers of poles and zeros for {mapping}",
-            got=f"{len(orders.poles)} numbers",
-            remedy="give one number of poles and of zeros for each input",
-        )
+def _check(orders: TransferFunction, experiments: Sequence[Experiment]) -> None:
     states = sum(orders.poles) * sum(experiment.free for experiment in experiments)
     needed = sum(orders.poles) + sum(orders.zeros) + len(orders.zeros) + orders.intercept + states
     counted = sum(experiment.n_counted for experiment in experiments)

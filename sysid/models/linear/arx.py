@@ -18,7 +18,7 @@ from sysid.models.converting.realisation import observer_row
 from sysid.models.converting.to_control import Matrices
 from sysid.models.lagged.recursion import Recursion
 from sysid.models.linear.linear_forms import LinearForms
-from sysid.models.orders.lags import MOST, Lagged, Lags, per_input, whole
+from sysid.models.orders.lags import MOST, Lagged, Lags, whole
 from sysid.models.orders.ranges import IntRange
 from sysid.models.orders.structure import AbstractStructure
 
@@ -29,8 +29,9 @@ class ARX(AbstractStructure):
 
     Args:
         na: Number of past outputs.
-        nb: Number of past values of each input; empty, as ``nk``, for a record without input (an AR model).
-        nk: Dead time of each input in samples.
+        nb: Number of past values of each input, or one number for all; empty, as ``nk``, for a record without input
+            (an AR model).
+        nk: Dead time of each input in samples, or one for all.
         intercept: Fit a constant beside the lags. Without it, or data as deviations from an operating
             point, an ARX model of pressures around 90 psi is not judged fairly.
 
@@ -51,12 +52,12 @@ class ARX(AbstractStructure):
     per_input = ("nb", "nk")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "nb", per_input(self.nb))
-        object.__setattr__(self, "nk", per_input(self.nk))
+        self._listed(*self.per_input)
         if not all(map(whole, (self.na, *self.nb, *self.nk))) or len(self.nb) != len(self.nk):
             raise ConfigError(
                 "not the orders of an ARX model",
-                expected=f"na from 0 on, and one nb and one nk from 0 on for each input, whole numbers up to {MOST:,}",
+                expected=f"na from 0 on, and one nb and one nk from 0 on for each input, or one for all, whole "
+                f"numbers up to {MOST:,}",
                 got=f"na = {shortened(self.na)}, nb = {shortened(list(self.nb))}, nk = {shortened(list(self.nk))}",
                 remedy="write for example na: 2, nb: [2, 2], nk: [1, 1]",
             )
@@ -76,8 +77,7 @@ class ARX(AbstractStructure):
 
     def lagged(self, n_inputs: int) -> Lagged:
         """Linear in its regressors."""
-        del n_inputs
-        return Lagged(lags=self.lags)
+        return Lagged(lags=self.for_inputs(n_inputs).lags)
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""

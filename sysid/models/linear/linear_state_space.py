@@ -25,7 +25,7 @@ from sysid.models.linear.innovations import Innovations
 from sysid.models.linear.linear_forms import LinearForms
 from sysid.models.linear.state_space import Filter, StateSpace
 from sysid.models.linear.state_space_polynomials import polynomials
-from sysid.models.orders.lags import MOST, per_input, whole
+from sysid.models.orders.lags import MOST, whole
 from sysid.models.orders.ranges import IntRange
 from sysid.models.orders.structure import AbstractStructure
 
@@ -77,7 +77,7 @@ class LinearStateSpace(AbstractStructure):
             )
         if self.nk == AUTO:
             return
-        object.__setattr__(self, "nk", per_input(self.nk))
+        self._listed(*self.per_input)
         if not all(whole(k) and self.shortest <= k <= MOST for k in self.nk):
             direct = " (0 with feedthrough: true)" * (not self.feedthrough)
             raise ConfigError(

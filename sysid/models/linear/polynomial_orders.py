@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError, shortened
 from sysid.models.converting.realisation import ObserverBlock
 from sysid.models.linear.innovations import Innovations
-from sysid.models.orders.lags import per_input, whole
+from sysid.models.orders.lags import whole
 from sysid.models.orders.ranges import IntRange
 from sysid.models.orders.structure import AbstractStructure
 
@@ -111,8 +111,7 @@ class AbstractPolynomial(AbstractStructure):
 
     def _check(self, example: str) -> None:
         """Bring fields for each input into their form, and refuse what are no orders."""
-        for name in self.per_input:
-            object.__setattr__(self, name, per_input(getattr(self, name)))
+        self._listed(*self.per_input)
         m = len(self.nb)
         # All that is not a list of whole numbers is refused before it is added up.
         numbers = [*self.nb, *self.nk, *getattr(self, "nf", ()), *(getattr(self, name, 0) for name in _SHARED)]
@@ -123,8 +122,8 @@ class AbstractPolynomial(AbstractStructure):
             given = {name: getattr(self, name) for name in ("na", *self.per_input, "nc", "nd") if hasattr(self, name)}
             raise ConfigError(
                 f"not the orders of {self.kind}",
-                expected="one nb from 1 on, one nk and, where there is one, one nf for each input, whole numbers from "
-                f"0 on, all of them together at most {MOST_LAGS}",
+                expected="one nb from 1 on, one nk and, where there is one, one nf for each input or for all, whole "
+                f"numbers from 0 on, all of them together at most {MOST_LAGS}",
                 got=", ".join(f"{name} = {shortened(value)}" for name, value in given.items()),
                 remedy=f"write for example {example}",
             )

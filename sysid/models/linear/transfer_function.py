@@ -26,7 +26,7 @@ from sysid.models.linear.linear_forms import LinearForms
 from sysid.models.linear.polynomial_moves import Polynomials
 from sysid.models.linear.state_space import StateSpace
 from sysid.models.orders.intersample import HELD, InterSample, intersample_of, marked, moving, to_fields
-from sysid.models.orders.lags import MOST, per_input, whole
+from sysid.models.orders.lags import MOST, whole
 from sysid.models.orders.ranges import IntRange
 from sysid.models.orders.structure import AbstractStructure
 
@@ -36,7 +36,7 @@ MOST_POLES = 100
 
 @dataclass(frozen=True, kw_only=True)
 class TransferFunction(AbstractStructure):
-    """Orders of a transfer function, as in MATLAB's ``tfest``: one number for each input.
+    """Orders of a transfer function, as in MATLAB's ``tfest``: one number for each input, or one for all.
 
     Args:
         poles: Number of poles.
@@ -69,14 +69,9 @@ class TransferFunction(AbstractStructure):
     per_input = ("poles", "zeros", "delays")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "poles", per_input(self.poles))
-        object.__setattr__(self, "zeros", per_input(self.zeros))
         delays: object = self.delays
-        object.__setattr__(
-            self,
-            "delays",
-            None if delays is None or delays == "auto" else per_input(delays),
-        )
+        object.__setattr__(self, "delays", None if delays == "auto" else delays)
+        self._listed("poles", "zeros", *["delays"] * (self.delays is not None))
         object.__setattr__(self, "domain", _domain(self.domain))
         object.__setattr__(self, "intersample", intersample_of(self.intersample))
         if self.domain is Domain.DISCRETE and self.intersample != HELD:
@@ -92,7 +87,7 @@ class TransferFunction(AbstractStructure):
             raise ConfigError(
                 "not the orders of a transfer function",
                 expected=f"for each input 1 to {MOST_POLES} poles, no more zeros than poles, and a dead time of 0 to "
-                f"{MOST:,} samples, a whole number",
+                f"{MOST:,} samples, a whole number; or one for all inputs",
                 got=f"poles {shortened(list(self.poles))}, zeros {shortened(list(self.zeros))}, "
                 f"delays {shortened(self.delays)}",
                 remedy="write for example poles: [2, 2], zeros: [1, 1], delays: [1, 1]",

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, Self, cast
 
 from sysid.errors import ConfigError
 from sysid.models.channels.history import Start
 from sysid.models.channels.mapping import Mapping
-from sysid.models.orders.lags import Lagged
+from sysid.models.orders.lags import Lagged, per_input, whole
 from sysid.models.orders.typed_fields import Switches
 
 
@@ -38,7 +39,7 @@ class AbstractStructure(Switches):
     """Whether what an input does at each of its levels is learnt from records alone, and no equation says it."""
 
     per_input: tuple[str, ...] = ()
-    """Fields that hold one number per input."""
+    """Fields that hold one number per input, or one for all of them."""
 
     @property
     def learns_start(self) -> bool:
@@ -85,6 +86,30 @@ class AbstractStructure(Switches):
         """
         del n_outputs
         return self
+
+    def for_inputs(self, n_inputs: int) -> Self:
+        """What is fitted where this structure is asked for with so many inputs.
+
+        Args:
+            n_inputs: Inputs of the mapping.
+
+        Returns:
+            The structure; one number of a field that has one for each input stands for all of them.
+
+        Raises:
+            ConfigError: If a field has neither one entry nor one per input.
+        """
+        self.check_inputs(n_inputs)
+        given = {name: getattr(self, name) for name in self.per_input}
+        short = {name: one * n_inputs for name, one in given.items() if _is_one(one) and n_inputs > 1}
+        return cast("Self", replace(cast("Any", self), **short)) if short else self
+
+    def _listed(self, *names: str) -> None:
+        """Bring fields that hold one number per input into their form; a number beside lists stands for all inputs."""
+        listed = {name: per_input(getattr(self, name)) for name in names}
+        n = max(map(len, listed.values()), default=0)
+        for name, given in listed.items():
+            object.__setattr__(self, name, given * n if whole(getattr(self, name)) else given)
 
     def mappings(self, mapping: Mapping) -> tuple[Mapping, ...]:
         """What its models map, of a mapping of any number of outputs.
@@ -141,15 +166,25 @@ class AbstractStructure(Switches):
             n_inputs: Inputs of the mapping.
 
         Raises:
-            ConfigError: If a field does not have one entry per input.
+            ConfigError: If a field has neither one entry, for all inputs, nor one per input.
         """
         for name in self.per_input:
             given = getattr(self, name)
-            if given is not None and len(given) != n_inputs:
+            if given is not None and len(given) != n_inputs and not (n_inputs and len(given) == 1):
                 raise ConfigError(
                     "the orders do not match the inputs",
                     where=name,
-                    expected=f"{n_inputs} values of {name}, one for each input",
-                    got=f"{len(given)} values",
-                    remedy=f"give one {name} for each input of the mapping",
+                    expected=f"{n_inputs} values of {name}, one for each input, or one for all"
+                    if n_inputs
+                    else "an input",
+                    got=f"{len(given)} values" if n_inputs else f"{name} for a mapping without input",
+                    remedy=f"give one {name} for each input of the mapping, or one for all" if n_inputs else _WITHOUT,
                 )
+
+
+_WITHOUT = "name an input; of records without one an AR model is ARX with nb: [] and nk: []"
+
+
+def _is_one(given: object) -> bool:
+    """Whether a field says one number, whatever it stands for."""
+    return isinstance(given, tuple) and len(given) == 1

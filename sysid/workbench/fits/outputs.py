@@ -45,9 +45,10 @@ def models_of(fit: FitConfig, config: PipelineConfig) -> tuple[FitModel, ...]:
         config: Its pipeline.
 
     Returns:
-        The models; of a mapping of one output the fit and the pipeline as they are.
+        The models; of a mapping of one output the fit under its own name and the pipeline as it is.
     """
     mapping = config.mapping
+    fit = fit.model_copy(update={"structure": fit.structure.for_inputs(len(mapping.inputs))})
     if len(mapping.outputs) == 1:
         return (FitModel(fit=fit, config=config, outputs=(FitOutput(fit=fit, config=config),)),)
     outputs = tuple(FitOutput(fit=_named(fit, one.output, config), config=_of(config, one)) for one in mapping.each)

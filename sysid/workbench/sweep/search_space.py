@@ -111,19 +111,9 @@ class Alternative:
         for name, written in self.written.items():
             entries = [values.get(f"{name}[{i}]", entry) for i, entry in enumerate(written)] if _many(written) else None
             fields[name] = values.get(name, written if entries is None else entries)
-        structure = _checked(self._for_all_inputs(fields), self.where)
-        structure.check_inputs(self.n_inputs)
+        structure = _checked(fields, self.where).for_inputs(self.n_inputs)
         options = {name: values.get(TRAINING + name, written) for name, written in self.training.items()}
         return Point(number=number, structure=structure, training=options, values=dict(values))
-
-    def _for_all_inputs(self, fields: dict[str, Any]) -> dict[str, Any]:
-        """One number for a field that has one per input stands for all of them."""
-        row = ESTIMATORS.get(str(fields.get("kind")))
-        many = () if row is None else row.structure.per_input
-        return {
-            name: [value] * self.n_inputs if name in many and isinstance(value, int) else value
-            for name, value in fields.items()
-        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

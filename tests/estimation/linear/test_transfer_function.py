@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import optimize, signal
 
-from sysid.errors import TraceError
+from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Status, fit_transfer_function
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.models import Domain, Mapping, Start, StartKind, TransferFunction
@@ -165,8 +165,8 @@ def test_the_result_says_what_was_done() -> None:
 
 
 def test_orders_that_do_not_fit_the_inputs_are_refused() -> None:
-    with pytest.raises(TraceError, match="do not match the inputs"):
-        fit_transfer_function([record(Domain.DISCRETE, 0, 40.0)], TWO, TransferFunction(poles=(2,), zeros=(1,)))
+    with pytest.raises(ConfigError, match="do not match the inputs"):
+        fit_transfer_function([record(Domain.DISCRETE, 0, 40.0)], TWO, TransferFunction(poles=(2, 2, 2), zeros=1))
 
 
 def test_too_few_samples_are_refused() -> None:

@@ -87,9 +87,9 @@ MISTAKES = [
     pytest.param("nb: [2, 2]", "nb: two", ["orders of an ARX model", "two", "fits[0].structure"], id="text for orders"),
     pytest.param(
         "nb: [2, 2], nk: [1, 1]",
-        "nb: [2], nk: [1]",
+        "nb: [2, 2, 2], nk: 1",
         ["do not match the inputs", "2 values"],
-        id="orders for one input of two",
+        id="orders for three inputs of two",
     ),
     pytest.param(NETWORK, NETWORK.replace("6", "many"), ["number of neurons", "'many'"], id="text for neurons"),
     pytest.param(NETWORK, NETWORK.replace("[1, 2, 4]", "[0, 1]"), ["not a set of lags"], id="output delay 0"),

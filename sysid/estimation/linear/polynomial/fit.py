@@ -97,11 +97,12 @@ def fit_polynomial(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
-        TraceError: If there are fewer samples than parameters, or the orders do not fit the inputs.
+        ConfigError: If the orders do not fit the inputs.
+        TraceError: If there are fewer samples than parameters.
         FitDivergedError: If no start gives a finite prediction.
     """
     began, training = now(), training or PolynomialTraining()
-    orders.check_inputs(len(mapping.inputs))
+    orders = orders.for_inputs(len(mapping.inputs))
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = experiments_of(traces, mapping, start or Start(), rest)
     _check(orders, experiments)

@@ -60,10 +60,12 @@ def fit_state_space(
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
+        ConfigError: If the dead times do not fit the inputs.
         TraceError: If there are fewer samples than parameters, or no record is long enough.
         FitDivergedError: If no start gives a finite prediction.
     """
     began, training = now(), training or StateSpaceTraining()
+    orders = orders.for_inputs(len(mapping.inputs))
     given = (
         rest_output if isinstance(rest_output, Dict) else {} if rest_output is None else {mapping.output: rest_output}
     )
