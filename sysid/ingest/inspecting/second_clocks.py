@@ -16,15 +16,10 @@ from sysid.errors import UnitError
 from sysid.ingest.tables.clocks import since_1970
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.table import RawTable
-from sysid.ingest.tables.time_columns import is_called_time, is_time_unit
+from sysid.ingest.tables.time_columns import is_called_time, is_counter, is_time_unit
 from sysid.units import convert
 
 _NUMBERED = re.compile(r"(?:t|time|zeit|temps|tiempo)(?:[ _]?\d+|[ _.][^\W_]{1,12})", re.IGNORECASE)
-_COUNTED = r"id|idx|index|row|line|zeile|sample|frame|scan|record|point|data[ _]?point|step|messung"
-_COUNTER = re.compile(
-    rf"(?:(?:lfd\.?|{_COUNTED})s?[ _.]*)?(?:#|no\.?|nr\.?|num|number|index|id|count(?:er)?)|n|k|i|{_COUNTED}",
-    re.IGNORECASE,
-)
 _NAMELESS = re.compile(r"column_1|level_0|unnamed: \d+(?:\.\d+)*", re.IGNORECASE)
 """What a first column without a name is called, as those of indices that pandas wrote."""
 _EVEN = 0.25
@@ -35,18 +30,6 @@ _ORIGIN = 1e6
 """Seconds that two clocks may be apart before one of them is taken to count from another origin."""
 _FACTORS = (1e-9, 1e-6, 1e-3, 60.0, 3600.0, 86_400.0)
 """Seconds of the units in which one time may be written twice."""
-
-
-def is_counter(name: str) -> bool:
-    """Whether a column is called a number of rows.
-
-    Args:
-        name: Its name.
-
-    Returns:
-        Whether it is.
-    """
-    return _COUNTER.fullmatch(name.strip()) is not None
 
 
 def counts_rows(column: RawColumn) -> bool:

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from sysid.ingest.assembling.timing import Timing, even_step, round_step, rounded_step, survey
 from sysid.ingest.cells.headers import unit_in_name
-from sysid.ingest.inspecting.second_clocks import counts_rows, is_counter
+from sysid.ingest.inspecting.second_clocks import counts_rows
 from sysid.ingest.readers.leaves import step_in
 from sysid.ingest.tables.clocks import clock_of, since_1970
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, GridOptions, TimeOptions
 from sysid.ingest.tables.table import RawTable
-from sysid.ingest.tables.time_columns import is_time_unit
+from sysid.ingest.tables.time_columns import is_counter, is_time_unit
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one

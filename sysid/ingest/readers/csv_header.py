@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import compress, pairwise
 
 from sysid.errors import ReaderError, shortened
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, is_units, kind_of, trimmed
 from sysid.ingest.readers.csv_split import Split
+from sysid.ingest.readers.csv_widths import has_no_column, rises, without_name
 from sysid.ingest.tables.options import FileOptions
 from sysid.ingest.tables.time_columns import is_called_time
 
@@ -87,6 +87,7 @@ def _take_names(found: Header, above: list[Row], split: Split) -> bool:
         row, cells = above[-2], upper
     if cells is not None:
         found.names, found.line = [re.sub(r"^(?:%|//|!|;|\*)+\s*(?=\S)", "", cells[0]), *cells[1:]], row.line
+        _tell_width(found, row, split)
         return True
     if split.separator == "," and len(row.cells) > 1 and 2 * len(row.cells) == split.width:
         raise ReaderError(
@@ -103,6 +104,17 @@ def _take_names(found: Header, above: list[Row], split: Split) -> bool:
             "which are numbered; names: [...] names them"
         )
     return False
+
+
+def _tell_width(found: Header, row: Row, split: Split) -> None:
+    """Say which column has no name, or which name no column, and call the first what it is."""
+    written = trimmed(row.cells, split.width)
+    first = without_name(written, row, split) if len(written) == split.width - 1 and not found.names[0] else None
+    if first is not None:
+        found.names = [first, *found.names[1:]]
+        found.notes.append(f"line {row.line} has no name for the first column")
+    elif len(written) == split.width + 1 and written[1:] == [*found.names]:
+        found.notes.append(f"line {row.line} begins with {shortened(written[0].strip())}, for which there is no column")
 
 
 def _heads_joined(above: list[Row], split: Split) -> list[Row]:
@@ -159,7 +171,7 @@ def _is_units(above: list[Row], split: Split) -> bool:
     if units is None or names is None or not is_units(units):
         return False
     # Short names are units too (t, u, V): without brackets it is the line above that must look like names.
-    if any(is_called_time(cell) for cell in units[:1]) and not any(map(is_called_time, names)) and _rises(split):
+    if any(is_called_time(cell) for cell in units[:1]) and not any(map(is_called_time, names)) and rises(split):
         return False
     if _says_of_record(names):
         return False
@@ -174,25 +186,6 @@ def _says_of_record(cells: list[str]) -> bool:
     return bool(_DATE.fullmatch(filled[1]) or (_WORTH.fullmatch(filled[1]) and not is_called_time(filled[0])))
 
 
-def _rises(split: Split) -> bool:
-    """Whether the first column goes up from row to row, as time does."""
-    try:
-        values = [float(row.cells[0].replace(",", ".")) for row in compress(split.rows[:100], split.fitting)]
-    except ValueError:
-        return False
-    return len(values) > 2 and all(after > before for before, after in pairwise(values))
-
-
-def _counts(split: Split) -> bool:
-    """Whether the first column numbers the rows in quotes, as R writes names of rows and gives them no head."""
-    rows = split.run()[:100]
-    numbers = [row.cells[0].strip() for row in rows]
-    if len(rows) < 2 or not numbers[0].isdecimal():
-        return False
-    quoted = all(split.lines[row.line - 1].lstrip().startswith('"') for row in rows)
-    return quoted and numbers == [str(int(numbers[0]) + k) for k in range(len(rows))]
-
-
 def _units_above(above: list[Row], split: Split) -> bool:
     """Whether the line of units stands above the names: names as short as t and u are units too."""
     names, units = (_to_width(row, split) for row in (above[-1], above[-2]))
@@ -205,8 +198,6 @@ def _units_above(above: list[Row], split: Split) -> bool:
 def _to_width(row: Row, split: Split) -> list[str] | None:
     """A header brought to the width of the numbers, or ``None`` if it does not fit them."""
     cells, width = trimmed(row.cells, split.width), split.width
-    if len(cells) == width - 1 > 1 and _counts(split):
-        return ["row", *cells]
     if split.separator == BLANKS and len(cells) != width:
         text = split.lines[row.line - 1].strip().strip(_MARKS)
         for cut in (
@@ -216,6 +207,10 @@ def _to_width(row: Row, split: Split) -> list[str] | None:
         ):
             if len(cut) == width:
                 return cut
-    if len(cells) == width - 1 > 0 and split.kinds[-1] is Kind.NOTHING:
-        cells = [*cells, ""]
+    if 0 < len(cells) < width and all(kind is Kind.NOTHING for kind in split.kinds[len(cells) :]):
+        return [*cells, *[""] * (width - len(cells))]
+    if len(cells) == width - 1 > 1 and without_name(cells, row, split) is not None:
+        return ["", *cells]
+    if len(cells) == width + 1 > 2 and has_no_column(cells, split):
+        return cells[1:]
     return cells if len(cells) == width else None

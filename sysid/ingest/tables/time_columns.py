@@ -21,6 +21,11 @@ _TIME_NAMES = {
 }  # fmt: skip
 _TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
 
+_COUNTED = r"id|idx|index|row|line|zeile|sample|frame|scan|record|point|data[ _]?point|step|messung"
+_COUNTER = re.compile(
+    rf"(?:(?:lfd\.?|{_COUNTED})s?[ _.]*)?(?:#|no\.?|nr\.?|num|number|index|id|count(?:er)?)|n|k|i|{_COUNTED}",
+    re.IGNORECASE,
+)
 
 GOES_BACK = 0.25
 """Part of the steps that lead back, from which on a column moves as a signal does; stamps that do are out of order."""
@@ -98,6 +103,18 @@ def is_called_time(name: str) -> bool:
         if {plain, stem, plain.replace("_", " "), stem.replace("_", " ")} & _TIME_NAMES:
             return True
     return False
+
+
+def is_counter(name: str) -> bool:
+    """Whether a column is called a number of rows.
+
+    Args:
+        name: Its name.
+
+    Returns:
+        Whether it is.
+    """
+    return _COUNTER.fullmatch(name.strip()) is not None
 
 
 def is_time_unit(unit: str) -> bool:
