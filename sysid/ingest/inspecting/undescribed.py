@@ -16,6 +16,7 @@ from sysid.ingest.datasets.description import DatasetDescription
 from sysid.ingest.inspecting.findings import FileFinding, listed
 from sysid.ingest.inspecting.inspection import inspect_file
 from sysid.ingest.inspecting.proposal import propose_dataset
+from sysid.ingest.inspecting.second_clocks import without_clocks
 from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file
 from sysid.ingest.readers.text_source import bare_stem
 from sysid.ingest.reading import read_trace
@@ -31,9 +32,10 @@ class GuessedWarning(UserWarning):
 def load_file(path: Path) -> TraceSet:
     """Read one file of traces.
 
-    What the file says is taken as it stands. What it leaves out (units, the column of time, its unit, how numbers are
-    written, which rows are a record) is read as ``sysid ingest --propose`` would describe it, and told. Samples are
-    never repaired: a gap or a missing value is refused, with the command that describes the file.
+    What the file says is taken as it stands, but for second clocks and counters beside its time. What it leaves out
+    (units, the column of time, its unit, how numbers are written, which rows are a record) is read as
+    ``sysid ingest --propose`` would describe it, and told. Samples are never repaired: a gap or a missing value is
+    refused, with the command that describes the file.
 
     Args:
         path: The file.
@@ -45,13 +47,16 @@ def load_file(path: Path) -> TraceSet:
         UserError: If it cannot be read, or its samples need repairs.
 
     Warns:
-        GuessedWarning: If something was guessed.
+        GuessedWarning: If something was guessed or left out.
     """
     with remedies_of_a_file(path):
         try:
             trace = read_trace(path)
         except UserError as error:
             return _as_proposed(path, error)
+    trace, clocks = without_clocks(trace)
+    if clocks:
+        warnings.warn(f"{path}: left out: {listed(clocks)}", GuessedWarning, stacklevel=3)
     return TraceSet(name=bare_stem(path), traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
 
 
