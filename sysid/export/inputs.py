@@ -25,14 +25,12 @@ class InputOptions:
 
     Args:
         constants: Inputs that are a number and no column, by name, in the bundle's unit.
-        measured: Whether measured outputs are read where the file has them.
         files: How the file is read.
         grid: How its samples come onto the grid.
         repairs: Which repairs may be made.
     """
 
     constants: Dict[str, float] = field(default_factory=dict)
-    measured: bool = True
     files: FileOptions = field(default_factory=FileOptions)
     grid: GridOptions = field(default_factory=lambda: GridOptions(fewest_samples=2))
     repairs: RepairOptions = field(default_factory=RepairOptions)
@@ -47,7 +45,7 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
         options: How; a constant column is an input by default.
 
     Returns:
-        The inputs, and behind them the measured outputs where they are asked for and in the file. Samples at which one
+        The inputs, and behind them the measured outputs where they are in the file. Samples at which one
         of these is missing are masked.
 
     Raises:
@@ -83,7 +81,7 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
     if outputs:
         nan = {c.name: repairs.nan for c in wanted} if isinstance(repairs.nan, str) else dict(repairs.nan or {})
         repairs = repairs.model_copy(update={"nan": {**dict.fromkeys((c.name for c in outputs), "mask"), **nan}})
-    # What is said of an output holds for a run that does not read it.
+    # What is said of an output holds for a file that does not have it.
     files = files.without({str(entry["name"]) for entry in bundle.outputs} - {channel.name for channel in outputs})
     trace = assemble(
         table,
@@ -179,7 +177,7 @@ def _check_there(table: RawTable, wanted: list[Channel], options: InputOptions, 
 def _measured(bundle: Bundle, table: RawTable, options: InputOptions) -> tuple[Channel, ...]:
     """The outputs of which the file has values."""
     found = []
-    for output in map(channel_of, bundle.outputs) if options.measured else ():
+    for output in map(channel_of, bundle.outputs):
         given = options.files.columns.get(output.name)
         name = given.column if given else output.name
         if name in table.names and np.isfinite(table.find(name).values).any():

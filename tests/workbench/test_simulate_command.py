@@ -172,6 +172,10 @@ def test_with_the_measured_output_the_run_begins_where_the_plant_is(run, tmp_pat
     assert "estimated on the first 8 samples" in capsys.readouterr().out
     _, rest = simulated(run, file, "--start", "rest", out=tmp_path / "b.csv")
     assert abs(rest["y"][1] - DECAY[1]) > 1.0
+    assert "against the measured y: fit" in capsys.readouterr().out
+    simulated(run, file, "--initial", "3", out=tmp_path / "d.csv")
+    told = capsys.readouterr().out
+    assert "it begins where the output has stood at 3" in told and "on all samples" in told
     _, first = simulated(run, file, "--start", "first-sample", out=tmp_path / "c.csv")
     assert first["y"][0] == pytest.approx(0.9 * 5.0 + 0.6)
 

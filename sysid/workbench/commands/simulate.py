@@ -19,7 +19,7 @@ from sysid.export.reading import read_bundle
 from sysid.export.simulation import Simulation, simulate_bundle
 from sysid.ingest import find_dataset, load_dataset, write_trace
 from sysid.ingest.reading import is_file_of_traces
-from sysid.models import Start, StartKind
+from sysid.models import Start
 from sysid.names import distinct
 from sysid.traces import Trace
 from sysid.units import in_unit, squared
@@ -99,7 +99,7 @@ def simulate_command(wish: Wish) -> None:
         given: list[tuple[Path, Any]] = [(out, wish.command)]
         plot = plot or out.with_suffix(".png")
     else:
-        words, given = {}, _records(wish, read, start, constants)
+        words, given = {}, _records(wish, read, constants)
     for place, record in given:
         simulation = simulate_bundle(read, record, **words, initial=wish.initial, start=start, constants=constants)
         write_trace(replace(simulation.trace, name=place.stem), place)
@@ -110,14 +110,13 @@ def simulate_command(wish: Wish) -> None:
             console().print(f"drawn in {picture}", soft_wrap=True)
 
 
-def _records(wish: Wish, read: Bundle, start: Start | None, constants: dict[str, float]) -> list[tuple[Path, Trace]]:
+def _records(wish: Wish, read: Bundle, constants: dict[str, float]) -> list[tuple[Path, Trace]]:
     """The records to simulate, and the file to write of each: that of a file, or those of a data set."""
     source, out = Path(str(wish.inputs)), wish.written
     if not _is_record(source):
         return _of_dataset(wish, source)
-    measured = wish.initial is None and (start is None or start.kind is not StartKind.REST)
     with as_typed():
-        options = InputOptions(constants=constants, measured=measured, **reading_options(wish.reading))
+        options = InputOptions(constants=constants, **reading_options(wish.reading))
         inputs = read_inputs(read, source, options)
     for done in inputs.provenance[1:]:  # the first is the file itself
         console().print(done, soft_wrap=True, markup=False)
