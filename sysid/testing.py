@@ -6,13 +6,14 @@ Nothing here is compiled, cached or clever; each function is the formula written
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels.neurons import NEURONS
+from sysid.kernels.passages import ELSEWHERE
 from sysid.models import Cascade, Ends, GreyBoxModel, History, Limit, Member, NeuralForm, Recursion
 from sysid.models.grey_box.equation_reference import MemberTwin
 
@@ -157,6 +158,49 @@ def run_neural(form: NeuralForm, inputs: NDArray[np.float64], x: NDArray[np.floa
         y.append(np.clip(abs(output) if form.rectified else output, form.low, form.high))
         x = np.clip(M @ z + V @ activation(W @ z), -form.bound, form.bound)
     return np.array(y)
+
+
+def closest(features: NDArray[np.float64], drawn: NDArray[np.int64], end: int, apart: int) -> int:
+    """Twin of :func:`sysid.kernels.passages.closest`.
+
+    Args:
+        features: What places are compared by, shape ``(n_rows, n_features)``.
+        drawn: The places.
+        end: Row after the passage.
+        apart: Rows within which a place is passed over.
+
+    Returns:
+        The place.
+    """
+    away = np.sum((features[drawn] - features[min(end, len(features) - 1)]) ** 2, axis=1)
+    return int(drawn[np.argmin(away + ELSEWHERE * (np.abs(drawn - end) < apart))])
+
+
+def joined(
+    rows: NDArray[np.float64], passages: Sequence[tuple[int, float, float, int, bool]], over: int
+) -> NDArray[np.float64]:
+    """Twin of :func:`sysid.kernels.passages.joined`.
+
+    Args:
+        rows: The records, one below the other.
+        passages: Of each its first row, how many rows it goes over, the rows between its samples, their number, and
+            whether it is led over from the one before.
+        over: Samples over which.
+
+    Returns:
+        All passages together.
+    """
+    parts: list[NDArray[np.float64]] = []
+    for at, span, step, count, led in passages:
+        where = np.minimum(np.arange(count) * step, span)
+        where[-1] = span
+        below = np.minimum((where + at).astype(np.int64), len(rows) - 2)
+        share = (where + at - below)[:, None]
+        part = (1.0 - share) * rows[below] + share * rows[below + 1]
+        if led:
+            part = part + np.clip(1.0 - np.arange(count) / over, 0.0, 1.0)[:, None] * (parts[-1][-1] - part[0])
+        parts.append(part)
+    return np.clip(np.concatenate(parts), rows.min(axis=0), rows.max(axis=0))
 
 
 def finite_difference_jacobian(

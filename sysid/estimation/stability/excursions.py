@@ -29,6 +29,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.stability.sequences import AbstractSequences, InputSequence, plateaus
+from sysid.kernels import passages
+from sysid.kernels.arrays import read_only
 from sysid.traces import Trace
 
 AT_REST = 0.05
@@ -93,7 +95,7 @@ class Excursions(AbstractSequences):
     _to_plateau: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        rows = self.records[0] if len(self.records) == 1 else np.concatenate(self.records)
+        rows = np.ascontiguousarray(self.records[0] if len(self.records) == 1 else np.concatenate(self.records))
         span = np.ptp(rows, axis=0)
         scale = np.where(span > 0.0, span, 1.0)
         slopes, left, still = [], [], []
@@ -136,6 +138,11 @@ class Excursions(AbstractSequences):
             content.update(repr(record.shape).encode())
             content.update(np.ascontiguousarray(record, dtype="<f8").data)
         return content.digest()
+
+    @cached_property
+    def _bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and greatest value of each column."""
+        return self._rows.min(axis=0), self._rows.max(axis=0)
 
     @cached_property
     def _places(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
@@ -237,7 +244,7 @@ class Excursions(AbstractSequences):
 
     def draw(self, count: int, seed: int) -> Iterator[InputSequence]:
         """The sequences; each depends on the seed and its own number alone."""
-        low, high = self._rows.min(axis=0), self._rows.max(axis=0)
+        low, high = self._bounds
         m = len(self.inputs)
         middle = (low[self._moving] + high[self._moving]) / 2.0
         kept = _kept(self._content, m, seed)
@@ -246,7 +253,6 @@ class Excursions(AbstractSequences):
                 yield kept[number]
                 continue
             rows, held = self._sequence(np.random.default_rng([seed, number]))
-            rows = np.clip(rows, low, high)
             rows[:, self._fixed] = rows[0, self._fixed]  # to the last bit, whatever interpolation has rounded
             if self.amplitude != 1.0:
                 rows[:, self._moving] = middle + self.amplitude * (rows[:, self._moving] - middle)
@@ -263,7 +269,8 @@ class Excursions(AbstractSequences):
     def _sequence(self, rng: np.random.Generator) -> tuple[NDArray[np.float64], int]:
         """Rows of inputs and outputs, and how many of them at the end are held."""
         at = int(rng.choice(self._firsts))
-        parts: list[NDArray[np.float64]] = []
+        # Of each passage the row, how many rows it goes over and at which steps, its samples, and whether it is led.
+        parts: list[tuple[int, float, float, int, bool]] = []
         total = 0
         long, ends = self._places[self._group[at]]
         while total < self.samples:
@@ -271,39 +278,34 @@ class Excursions(AbstractSequences):
                 at = self._match(rng, at, long)
             faster = self.warp ** rng.uniform(-1.0, 1.0)
             span = min(int(rng.integers(*self.passage)) * faster, int(self._left[at]) - 1)
-            part = self._passage(at, span, max(2, round(span / faster)))
-            parts.append(_led_over(parts[-1][-1], part, self.passage[0]) if parts else part)
+            count = max(2, round(span / faster))
+            parts.append((at, span, span / (count - 1), count, bool(parts)))
             at += int(span)
-            total += len(part)
+            total += count
         if not len(ends):
-            return np.concatenate(parts), 0
+            return self._joined(parts), 0
         at = self._match(rng, at, ends)
         rest = int(self._to_plateau[at])
         # At least so long a way that the plateau is reached from the record, and not by the leading over.
-        way = self._rows[at : rest + 1]
-        if len(way) < 2 * self.passage[0]:
-            way = np.concatenate([way, np.repeat(way[-1:], 2 * self.passage[0] - len(way), axis=0)])
-        parts += [
-            _led_over(parts[-1][-1], way, self.passage[0]),
-            np.repeat(self._rows[rest : rest + 1], self.hold, axis=0),
-        ]
-        return np.concatenate(parts), self.hold
+        way = max(rest + 1 - at, 2 * self.passage[0])
+        parts += [(at, rest - at, 1.0, way, True), (rest, 0.0, 0.0, self.hold, False)]
+        return self._joined(parts), self.hold
 
     def _match(self, rng: np.random.Generator, end: int, places: NDArray[np.int64]) -> int:
         """Of some places one like that where a passage ended, but not that one."""
         drawn = places[rng.integers(0, len(places), CANDIDATES)]
-        away = np.sum((self._features[drawn] - self._features[min(end, len(self._features) - 1)]) ** 2, axis=1)
-        near = np.abs(drawn - end) < self.passage[0]
-        return int(drawn[np.argmin(away + 1e3 * near)])
+        return int(passages.closest(self._features, drawn, end, self.passage[0]))
 
-    def _passage(self, at: int, span: float, count: int) -> NDArray[np.float64]:
-        """Rows from ``at`` over ``span`` samples, read at ``count`` even places."""
-        where = np.arange(count) * (span / (count - 1))  # as linspace has it, which takes twice as long
-        where[-1] = span
-        where += at
-        below = np.minimum(where.astype(np.int64), len(self._rows) - 2)
-        share = (where - below)[:, None]
-        return np.asarray((1.0 - share) * self._rows[below] + share * self._rows[below + 1])
+    def _joined(self, parts: list[tuple[int, float, float, int, bool]]) -> NDArray[np.float64]:
+        """The passages side by side, within the bounds of the records."""
+        at, span, step, count, led = zip(*parts, strict=True)
+        rows = np.empty((sum(count), self._rows.shape[1]))
+        lengths = np.array(span, dtype=np.float64), np.array(step, dtype=np.float64)
+        passages.joined(
+            read_only(self._rows), np.array(at), *lengths, np.array(count), np.array(led), self.passage[0],
+            *self._bounds, rows,
+        )  # fmt: skip
+        return rows
 
 
 def usable_parts(trace: Trace, names: Sequence[str]) -> list[NDArray[np.float64]]:
@@ -333,9 +335,3 @@ def _next(flags: NDArray[np.bool_]) -> NDArray[np.int64]:
     following = np.where(flags, np.arange(n), n)
     nearest = np.minimum.accumulate(following[::-1])[::-1]
     return np.asarray(np.where(nearest < n, nearest, -1))
-
-
-def _led_over(last: NDArray[np.float64], part: NDArray[np.float64], over: int) -> NDArray[np.float64]:
-    """A passage that begins where the one before ended, and is itself again after some samples."""
-    share = np.clip(1.0 - np.arange(len(part)) / over, 0.0, 1.0)[:, None]
-    return np.asarray(part + share * (last - part[0]))

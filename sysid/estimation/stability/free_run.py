@@ -324,8 +324,10 @@ def free_runs(
         return np.concatenate([before, variant.simulate(one.inputs[at.first :], at.history)])
 
     waiting, turns = iter(sequences), cycle(dealt)
-    with ThreadPoolExecutor(2) as pool:
+    with ThreadPoolExecutor(1) as pool:
         while some := list(islice(waiting, AT_ONCE)):
-            variants = list(islice(turns, len(some)))
-            places = [begins(one, variant) for one, variant in zip(some, variants, strict=True)]
-            yield from zip(some, pool.map(run, some, variants, places), strict=True)
+            jobs = [(one, variant, begins(one, variant)) for one, variant in zip(some, turns, strict=False)]
+            half = len(jobs) // 2
+            # Half of them at once: to hand over each by itself took as long as a short run.
+            others = pool.submit(lambda dealt: [run(*job) for job in dealt], jobs[half:])
+            yield from zip(some, [run(*job) for job in jobs[:half]] + others.result(), strict=True)
