@@ -43,6 +43,9 @@ def test_a_surrogate_that_is_ended_ten_times_goes_on_and_runs_nothing_twice(tmp_
     assert [first[name] for name in ("scenes", "subjects", "told")] == [
         second[name] for name in ("scenes", "subjects", "told")
     ]
+    told_of = [line for line in done.stdout.splitlines() if line.startswith(("note: ", "Error of "))]
+    assert len(told_of) == 4
+    assert told_of[:2] == told_of[2:], "a session that ends, first and last, says the same of the proof"
     # Nothing half done is left.
     files = [
         {str(one.relative_to(place)) for one in (place / "out").rglob("*") if TRIALS not in one.parts}

@@ -33,11 +33,10 @@ from sysid.workbench.cli import run_cli
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.experiments.run import Experimented, Experiments
 from sysid.workbench.experiments.run import program_of as experiment_program
-from sysid.workbench.runner.events import Event, StepDone, StepProgress, StepStarted, Watcher
+from sysid.workbench.runner.events import Event, StepDone, StepProgress
 from sysid.workbench.runner.program import carry_out
 from sysid.workbench.surrogates import work
-from sysid.workbench.surrogates.asked import surrogate_of, wish_of
-from sysid.workbench.surrogates.make import Made
+from sysid.workbench.surrogates.asked import surrogate_of
 from sysid.workbench.surrogates.plan import times
 from sysid.workbench.surrogates.proof import Proof, _begun_until, fmu_of, prove
 from sysid.workbench.surrogates.told import beginning_of, poor, restless, short_of_time, unlike, without_effect
@@ -177,68 +176,6 @@ def test_the_page_of_a_search_is_made_once_and_has_the_proof(tmp_path: Path, mon
     more = sysid.surrogate(tmp_path / "lag.yaml", tmp_path / "out", iterations=20, proof=5)
     assert len(made_of) == 2
     assert "Of 5 new random experiments" in more.report.read_text(encoding="utf-8")
-
-
-class Killed(BaseException):
-    """What ends a run wherever it is."""
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_surrogate_that_was_killed_again_and_again_goes_on_and_runs_nothing_twice(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each time a step further on; experiments that are killed half-way are tested where they are run."""
-    lag = Family(kind="ARX", linear=True, first=lambda _: [Try(structure=sysid.ARX(na=1, nb=(1,), nk=(0,)))])
-    monkeypatch.setattr("sysid.workbench.auto.ledger.FAMILIES", (lag,))
-    monkeypatch.setattr("sysid.workbench.auto.plan.suggested", lambda *_, **__: [])
-    text = """
-def lag(time, inputs, parameters):
-    with open(__file__ + ".log", "a") as log:
-        log.write("run\\n")
-    y, out = 0.0, inputs.copy()
-    for k, u in enumerate(inputs[:, 0]):
-        out[k] = y = 0.8 * y + 0.2 * u
-    return out
-"""
-    content = {"kind": "experiment", "name": "lag", "workers": 1}
-    content["experiment"] = {"duration": 20.0, "runs": {"estimation": 4, "selection": 2, "test": 1}}
-    content["reference"] = {**REFERENCE, "python": "lag.py:lag", "folder": "."}
-    for name in ("whole", "killed"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "lag.py").write_text(text, encoding="utf-8")
-        (tmp_path / name / "lag.yaml").write_text(json.dumps(content), encoding="utf-8")
-
-    def made(name: str, watch: Watcher) -> Made:
-        place = tmp_path / name
-        monkeypatch.setenv("SYSID_CACHE", str(place / "cache"))
-        return surrogate_of(
-            place / "lag.yaml", wish_of([], [], [], sample_time=None, duration=None), place / "out", minutes=1.0,
-            perform=lambda program, folder: carry_out(program, folder, command="test", watchers=[watch]),
-            proof=6, rounds=None, workers=None, seed=0, iterations=20, watch=watch,
-        )  # fmt: skip
-
-    def runs(name: str) -> int:
-        return (tmp_path / name / "lag.py.log").read_text(encoding="utf-8").count("run")
-
-    def kill(at: str, event: Event) -> None:
-        half = isinstance(event, StepProgress) and event.fraction is not None and event.fraction >= 0.5
-        if isinstance(event, StepStarted | StepProgress) and event.step.startswith(at) and (half or at != "Proving"):
-            raise Killed
-
-    whole = made("whole", lambda _: None)
-    ran = []
-    for at in ("Searching", "Fitting best", "Exporting", "Proving", "Writing the report"):
-        with pytest.raises(Killed):
-            made("killed", partial(kill, at))
-        ran.append(runs("killed"))
-    after = made("killed", lambda _: None)
-    np.testing.assert_array_equal(after.proof.errors, whole.proof.errors)
-    assert after.notes == whole.notes
-    assert ran[0] == ran[1] == ran[2], "no experiment is run again for the sake of a search, a fit or an export"
-    # With one worker one run of the proof may be on its way when it is killed: that has no result, and is run again.
-    assert 0 <= ran[4] - runs("whole") <= 1
-    assert runs("killed") == ran[4]
-    assert "Of 6 new random experiments" in after.report.read_text(encoding="utf-8")
 
 
 def test_a_proof_ends_with_its_time_and_says_what_gave_no_record(
