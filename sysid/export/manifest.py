@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 import sysid
 from sysid.estimation.results.result import FitResult
@@ -20,11 +21,12 @@ from sysid.export.expected_runs import ParityCase
 from sysid.export.exporter import ExportedFile
 from sysid.export.forms.layout import HiddenState
 from sysid.export.forms.stage import Port, Stage
+from sysid.export.heeded import heeded
 from sysid.export.parity import Parity
 from sysid.export.ranges import example_of, range_of
 from sysid.export.surrogate import Surrogate
 from sysid.extras import has
-from sysid.models import Start
+from sysid.models import EquationModel, Start
 from sysid.traces import Role, Trace, TraceSet
 from sysid.units import Reference
 
@@ -131,13 +133,12 @@ def of_another(manifest: Dict[str, Any], surrogate: Surrogate) -> dict[str, Any]
     stored, fits = surrogate.source.to_dict(), {stage["mapping"]: stage["fit"] for stage in manifest["stages"]}
     levels = {port.name: port.level for port in surrogate.channels}
     first = np.array([port.start for port in surrogate.inputs])
-    values = dict(zip(levels, surrogate.levels(first).tolist(), strict=True))
     changed = {
         "structure": stored["structure"],
         "stages": [_stage(one, None) | {"fit": fits.get(str(one.model.mapping))} for one in surrogate.stages],
         "model": stored,
         "n_parameters": surrogate.source.n_parameters,
-        "initialisation": manifest["initialisation"] | {"levels": levels, "values": values},
+        "initialisation": manifest["initialisation"] | {"levels": levels, "values": _at_rest(surrogate, first)},
     }
     return {**manifest, **{name: _json(value) for name, value in changed.items()}}
 
@@ -327,16 +328,29 @@ def _initialisation(surrogate: Surrogate, example: Trace) -> dict[str, Any]:
     lines = "a system at rest: every number of a channel's delay line is (its value at rest - offset) / scale"
     spaces = [stage for stage in surrogate.stages if isinstance(stage.state, HiddenState)]
     equations = any(stage.searched for stage in surrogate.stages)
-    levels = surrogate.levels(first).tolist()
     return {
         "rule": lines
         + ("; equations are where they are declared to be, or where nothing changes" if equations else "")
         + ("; a state space is where its inputs, and in a neural one its output, hold it" if spaces else ""),
         "levels": {port.name: port.level for port in surrogate.channels},
-        "values": {port.name: value for port, value in zip(surrogate.channels, levels, strict=True)},
-        "values_from": f"the inputs' first sample in {example.name}, and the levels: numbers, or inputs",
+        "values": _at_rest(surrogate, first),
+        "values_from": f"the inputs' first sample in {example.name}, and the levels: numbers, or inputs; an output "
+        "whose states rest where the inputs alone say is what these give",
         "state": surrogate.at_rest(first).tolist(),
     }
+
+
+def _at_rest(surrogate: Surrogate, first: NDArray[np.float64]) -> dict[str, float]:
+    """Every channel of a system at rest: its level, or what states give that heed none, or are declared."""
+    names = [port.name for port in surrogate.channels]
+    values, run = surrogate.levels(first), surrogate.simulate(first[np.newaxis])[0]
+    equations = [model for model in surrogate.source.models if isinstance(model, EquationModel)]
+    declared = {name: model.grey.begins[name].start for model in equations for name in model.grey.begins}
+    for column, given, says in zip(surrogate.columns, run, heeded(surrogate), strict=True):
+        value = declared.get(names[column], given)
+        if not says and np.isfinite(value):
+            values[column] = value
+    return dict(zip(names, values.tolist(), strict=True))
 
 
 def _data(traces: TraceSet) -> dict[str, Any]:

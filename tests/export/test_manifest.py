@@ -8,8 +8,10 @@ import math
 from dataclasses import replace
 
 import jsonschema
+import numpy as np
 import pytest
 
+import sysid
 from sysid.export import Surrogate, export_bundle, read_bundle
 from sysid.export.card import model_card
 from sysid.export.expected_runs import random_cases
@@ -65,6 +67,26 @@ def test_every_file_in_the_bundle_is_hashed(bundle):
     listed = [entry["name"] for key in ("files", "attachments") for entry in bundle.metadata[key]]
     there = {path.relative_to(bundle.folder).as_posix() for path in bundle.folder.rglob("*") if path.is_file()}
     assert there == {*listed, bundle.metadata["card"]["name"], "model.json"}
+
+
+@pytest.mark.parametrize(
+    ("structure", "value"),
+    [
+        pytest.param(sysid.ARX(na=1, nb=1, nk=1), 1.0, id="a level of its own"),
+        pytest.param(sysid.TransferFunction(poles=1, zeros=0, delays=1), 8.0, id="held by its inputs"),
+        pytest.param(sysid.GreyBox(equations="y[k+1] = a*y + b*u + c", parameters={"a": 0.9, "b": 0.1, "c": 0.5},
+                                   initial={"y": 7.0}), 7.0, id="declared"),
+    ],
+)  # fmt: skip
+def test_the_values_at_rest_are_those_of_the_state_beside_them(structure, value, tmp_path):
+    """The declared output at rest had stood there for states that heed none, and are at rest elsewhere."""
+    u, y = 3.0 + np.repeat(np.random.default_rng(0).normal(size=40), 10), np.full(400, 7.0)
+    u[0] = 3.0
+    for k in range(1, 400):
+        y[k] = 0.9 * y[k - 1] + 0.1 * u[k - 1] + 0.5
+    fit = sysid.fit(sysid.data((u, y), sample_time=1.0), "u -> y", structure, rest_output=1.0)
+    about = fit.save(tmp_path / "b", formats=("c",)).metadata["initialisation"]
+    assert about["values"]["y"] == pytest.approx(value, abs=1e-3)
 
 
 def test_amplification_is_told(bundle):

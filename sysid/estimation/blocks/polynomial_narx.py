@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -59,7 +60,8 @@ def fit_polynomial_narx(
         structure: The structure.
         training: How the coefficients are refined; options for lagged regressors do not apply.
         start: What stands before each trace; at rest by default.
-        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        rest_output: Output at rest in its unit, at which a run from rest begins; by default it begins where the inputs
+            hold it, for ever.
         selection: Traces whose free run says how many terms; without them Schwarz's criterion over the fitted ones.
         vet: Whether a model's free run is stable.
         on_progress: Called after every iteration, from the threads that train.
@@ -75,6 +77,7 @@ def fit_polynomial_narx(
     began = now()
     training = (training or Training()).with_starts(1)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
+    begins = {} if rest_output is None else {mapping.output: rest_output}
     start = start or Start()
     lags = structure.lags(len(mapping.inputs))
     experiments = experiments_of(traces, mapping, start, rest)
@@ -88,11 +91,11 @@ def fit_polynomial_narx(
         until=began + CHOOSING * training.max_time_s,
     )  # fmt: skip
     best, tried = _best(
-        found, structure, mapping, data=(traces, selection), start=start, rest=rest, origin=origin,
+        found, structure, mapping, data=(traces, selection), start=start, begins=begins, origin=origin,
         until=began + COUNTING * training.max_time_s,
     )  # fmt: skip
     fitted = fit_equations(
-        *built_template(traces, mapping, best.grey, built_of=structure, start=start, rest_output=rest),
+        *built_template(traces, mapping, best.grey, built_of=structure, start=start, rest_output=rest_output),
         training, (traces, selection, start),
         scattered=frozenset(), began=began, vet=vet, on_progress=on_progress,
     )  # fmt: skip
@@ -159,7 +162,7 @@ def _best(
     *,
     data: tuple[Sequence[Trace], Sequence[Trace]],
     start: Start,
-    rest: float,
+    begins: Dict[str, float],
     origin: Array,
     until: float,
 ) -> tuple[_Candidate, int]:
@@ -170,7 +173,8 @@ def _best(
     traces, selection = data
     tried: list[_Candidate] = []
     for n, coefficients in enumerate(found.coefficients, start=1):
-        grey = equations(structure, mapping, found.terms[:n], coefficients, origin)
+        grey = equations(structure, mapping, found.terms[:n], coefficients, origin, begins=begins)
+        rest = begins.get(mapping.output)
         template, _ = built_template(traces, mapping, grey, built_of=structure, start=start, rest_output=rest)
         squares, count = 0.0, 0
         with np.errstate(over="ignore", invalid="ignore"):  # polynomials explode
@@ -199,6 +203,8 @@ def equations(
     terms: Sequence[Term],
     coefficients: Sequence[float],
     origin: Array | None = None,
+    *,
+    begins: Dict[str, float] | None = None,
 ) -> GreyBox:
     """A polynomial as equations, its coefficients to be estimated.
 
@@ -208,6 +214,7 @@ def equations(
         terms: Its terms.
         coefficients: Where they start, in units.
         origin: What each channel is counted from, inputs first; nothing by default.
+        begins: Where the output has stood before a run from rest; where nothing changes by default.
 
     Returns:
         The grey box.
@@ -219,7 +226,9 @@ def equations(
         for i, (term, c) in enumerate(zip(terms, coefficients, strict=True), start=1)
     ]
     text.lines.append(f"{written_name(mapping.output)} = {' + '.join(level + parts)}")
-    return GreyBox(equations="\n".join(text.lines), parameters=tuple(text.parameters))
+    recurs = any(place >= len(names) - len(structure.output_delays) for term in terms for place in term)
+    initial = begins if begins and recurs else {}
+    return GreyBox(equations="\n".join(text.lines), parameters=tuple(text.parameters), initial=initial)
 
 
 def _written(term: Term, names: Sequence[str]) -> str:

@@ -39,8 +39,9 @@ class GreyBox(AbstractStructure):
         equations: One a line: ``dx/dt = ...``, ``x[k+1] = ...``, and what is computed now, ``y = ...``, the outputs
             among it. Names that are neither states, definitions nor parameters are inputs of the mapping.
         parameters: By name the start, or ``{start:, low:, high:, prior:, fixed:, unit:, per:}``.
-        initial: By state its value before the first sample, or ``{start:, low:, high:, fixed:}``. What is not named is
-            at equilibrium in a record that begins at rest, and estimated in others.
+        initial: By state its value before the first sample, or ``{start:, low:, high:, fixed:}``; of what is computed
+            and read later, as ``y[k-1]``, the value of its past. What is not named is at equilibrium in a record that
+            begins at rest, and estimated in others.
         tables: By name the points ``[[x, y], ...]`` of a function that is interpolated between them.
         substeps: Steps of the solver from sample to sample; by default as many as the records need, which is told.
         solver: ``runge-kutta``, or ``rosenbrock`` for stiff equations (implicit, as ``ode23s``); by default the one
@@ -121,12 +122,14 @@ class GreyBox(AbstractStructure):
                 expected=f"intersample: {HELD}, or an equation dx/dt = ...", got=self.intersample,
                 remedy="remove intersample",
             )  # fmt: skip
-        lowered(self, system.others, (*system.states, *system.definitions), None, self.solver or RUNGE_KUTTA)
+        low = lowered(self, system.others, (*system.states, *system.definitions), None, self.solver or RUNGE_KUTTA)
+        past = [name for name in system.definitions if f"{name}[k-1]" in low.states]
+        known = (*system.states, *past)
         for one in self._states_given:
-            if one.name not in system.states:
+            if one.name not in known:
                 raise ConfigError(
-                    f"{one.name} is no state", where="initial", expected=f"one of {', '.join(system.states) or 'none'}",
-                    got=one.name, remedy=did_you_mean(one.name, system.states, "remove it"),
+                    f"{one.name} is no state", where="initial", expected=f"one of {', '.join(known) or 'none'}",
+                    got=one.name, remedy=did_you_mean(one.name, known, "remove it"),
                 )  # fmt: skip
 
     @property
@@ -170,7 +173,7 @@ class GreyBox(AbstractStructure):
 
     @property
     def begins(self) -> dict[str, InitialState]:
-        """By state what is known of it before the first sample."""
+        """By state, and by what is read later, what is known of it before the first sample."""
         return {one.name: one for one in self._states_given}
 
     @property

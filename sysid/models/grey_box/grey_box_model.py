@@ -191,8 +191,10 @@ class EquationModel(AbstractModel):
     @property
     def state_terms(self) -> StateTerms:
         """What is known of the states."""
-        begins, names = self.grey.begins, self.lowered.states
-        given = [begins.get(name) for name in names]
+        begins = self.grey.begins
+        # Past samples of what is computed begin where it is said to have stood; those of a state are at equilibrium.
+        stood = {name: one for name, one in begins.items() if name not in self.grey.system.states}
+        given = [begins.get(name) or stood.get(name.rpartition("[k-")[0]) for name in self.lowered.states]
         return StateTerms(
             level=np.array(
                 [level if one is None else one.start for one, level in zip(given, self.levels, strict=True)]

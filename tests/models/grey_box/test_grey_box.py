@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+import sysid
 from sysid.errors import ConfigError
-from sysid.models import GreyBox, Mapping, structure_from_dict
+from sysid.models import GreyBox, History, Mapping, structure_from_dict
 
 TANKS = {
     "kind": "GreyBox",
@@ -75,6 +77,21 @@ def test_fields_that_cannot_be_are_refused(fields: dict[str, object], words: str
     with pytest.raises(ConfigError, match=words) as caught:
         GreyBox(**{"equations": EQUATION, "parameters": {"k": 1.0}, **fields})  # type: ignore[arg-type]
     assert caught.value.remedy
+
+
+def test_what_is_read_later_begins_where_it_is_said_to_have_stood() -> None:
+    """Past samples of an output are states, and had no name to say so by."""
+    delayed = "y = a*y[k-1] + b*y[k-2] + u[k-1]"
+    grey = GreyBox(equations=delayed, parameters={"a": 0.5, "b": 0.2}, initial={"y": 3.0})
+    u = np.r_[np.zeros(5), np.ones(45)]
+    y = np.full(52, 3.0)
+    for k in range(2, 52):
+        y[k] = 0.5 * y[k - 1] + 0.2 * y[k - 2] + (u[k - 3] if k > 2 else 0.0)
+    model = sysid.fit(sysid.data((u, y[2:]), sample_time=1.0), "u -> y", grey).model
+    run = model.simulate(u, History.at_rest(inputs=u[:1], output=0.0))
+    np.testing.assert_allclose(run, y[2:], atol=1e-6)
+    with pytest.raises(ConfigError, match="expected: one of y"):
+        GreyBox(equations=delayed, parameters={"a": 0.5, "b": 0.2}, initial={"u": 3.0})
 
 
 def test_a_mapping_of_other_channels_is_refused() -> None:
