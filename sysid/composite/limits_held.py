@@ -48,7 +48,7 @@ def holding(
     Returns:
         Of each output that has a limit how often it is there; of a mean, each of its parts.
     """
-    told = [name for out in outputs for name, limit in whole.limits.items() if out in (name, limit.tells)]
+    told = [name for out in outputs for name, limit in whole.limits.items() if limit.tells_of(name, out)]
     if not told:
         return []
     over_cases, over_sequences = _counted(whole, cases), _counted(whole, sequences)

@@ -10,6 +10,7 @@ import pytest
 from sysid.composite import committee, doubt_figures, doubt_threshold
 from sysid.errors import ChannelError, ConfigError
 from sysid.export import Flag, Surrogate, expected_flags
+from sysid.export.flags import limits_reached
 from sysid.models import Cascade, Limit
 from sysid.models.store import cascade_from_dict
 from sysid.testing import simulate_cascade
@@ -99,6 +100,18 @@ def test_a_mean_answers_as_all_do_and_its_spread_is_how_far_they_are_apart(count
     of_pipe = Surrogate.of(both, outputs=["BP"])  # of what does not leave it nobody is told
     assert not (expected_flags(of_pipe, handle, of_pipe.compute(handle)) & Flag.AT_LIMIT).any()
     assert cascade_from_dict(both.to_dict()).to_dict() == both.to_dict()
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_how_a_spread_or_a_median_is_computed_is_no_limit_to_be_told_of(count: int) -> None:
+    """Where all that is computed comes out, the lesser of two is one of them, and had been told to be held."""
+    models = [network("u -> y", seed=seed) for seed in range(count)]
+    u = np.random.default_rng(0).uniform(64.0, 90.0, size=(50, 1))
+    for both in (committee(models, mean=["y"]), committee(models, {"y": 100.0})):
+        for one in (both, cascade_from_dict(both.to_dict())):
+            surrogate = Surrogate.of(one)
+            assert not expected_flags(surrogate, u, surrogate.compute(u)).any()
+            assert limits_reached(surrogate, u, surrogate.compute(u)) == []
 
 
 def test_what_holds_a_part_of_a_mean_of_means_is_told_of_the_outermost() -> None:

@@ -29,6 +29,7 @@ import numpy as np
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.models import NARX, AbstractModel, Cascade, Limit, Mapping, NARXModel, Scaling
+from sysid.models.lagged.cascade_program import NOBODY
 from sysid.models.cascades.cascade_run import Level
 from sysid.models.cascades.wiring import Member
 
@@ -301,7 +302,7 @@ class _Made:
     def _held(self, output: str, channel: str, behind: str, limit: Limit) -> str:
         name = _free(f"{output}{behind}", self.taken)
         self._sum({channel: 1.0}, name, output)
-        self.limits[name] = limit
+        self.limits[name] = replace(limit, tells=NOBODY)
         return name
 
     def _sum(self, gains: Dict[str, float], name: str, output: str) -> None:

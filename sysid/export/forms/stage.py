@@ -229,7 +229,7 @@ def stages_of(
 
 
 def _told(name: str, limit: Limit, outputs: Sequence[str]) -> bool:
-    return name in outputs or limit.doubt or limit.tells in outputs
+    return limit.doubt or any(limit.tells_of(name, output) for output in outputs)
 
 
 def _sides(limit: Limit, columns: Dict[str, int]) -> tuple[Side, ...]:

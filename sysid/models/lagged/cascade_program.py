@@ -20,6 +20,10 @@ from sysid.models.contract.column_recursion import ColumnEquation, ColumnRecursi
 _Number = TypeVar("_Number", np.int64, np.float64)
 
 
+NOBODY = ""
+"""What a limit tells that is how something is computed."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Limit:
     """Values between which an output is held.
@@ -30,7 +34,7 @@ class Limit:
         doubt: Whether an output that is there says that the whole does not know its answer: its exports raise a flag
             of their own for it. See :func:`sysid.composite.committee`.
         tells: The output of which this one is a part, as of a mean: that it is held is told where that one leaves the
-            whole too.
+            whole too. :data:`NOBODY` where it is no limit to anybody, but how a lesser of two is computed.
 
     Example:
         >>> Limit(low=0.0, high="BP").to_dict()
@@ -41,6 +45,18 @@ class Limit:
     high: float | str | None = None
     doubt: bool = False
     tells: str | None = None
+
+    def tells_of(self, name: str, output: str) -> bool:
+        """Whether it is told of an output that a channel is held.
+
+        Args:
+            name: The channel that it holds.
+            output: The output.
+
+        Returns:
+            Whether it is: of the channel itself, and of what that is a part of.
+        """
+        return output == self.tells or (output == name and self.tells != NOBODY)
 
     @property
     def channels(self) -> tuple[str, ...]:
