@@ -29,9 +29,9 @@ import numpy as np
 
 from sysid.errors import ChannelError, ConfigError
 from sysid.models import NARX, AbstractModel, Cascade, Limit, Mapping, NARXModel, Scaling
-from sysid.models.lagged.cascade_program import NOBODY
 from sysid.models.cascades.cascade_run import Level
 from sysid.models.cascades.wiring import Member
+from sysid.models.lagged.cascade_program import NOBODY
 
 APART = "_apart"
 """Behind the name of an output: the channel of its difference."""

@@ -38,6 +38,10 @@ from sysid.ingest.tables.time_columns import recognise_time
 from sysid.names import from_csv_cell
 
 
+_MOST_TOLD = 6
+"""Columns that are named in one note."""
+
+
 def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     tries = encodings(path, options.encoding)
     problem: Exception = ValueError("it has no encoding")
@@ -215,7 +219,7 @@ def _finished(
     dates = None if calendar is None else _take_dates(columns, calendar)
     if dates is not None and calendar is not None:
         notes.append(f"time is {headers[dates].name} and {headers[calendar].name} together")
-    found = []
+    found, nothing, nameless = list[RawColumn](), list[int](), list[int]()
     for index, (header, column) in enumerate(zip(headers, columns, strict=True)):
         where = f"{path}, column {header.name or index + 1}"
         if index == dates:
@@ -226,19 +230,31 @@ def _finished(
                 guess, notes[len(notes) :] = zone, told
         elif isinstance(column, Texts):
             words = column.collector.finish()
-            nothing = np.full(len(words.codes), np.nan)
+            blank = np.full(len(words.codes), np.nan)
             problem = words.problem(where) if words.texts else None
-            raw = RawColumn(name=header.name, values=nothing, unit=header.unit, problem=problem, words=words)
+            raw = RawColumn(name=header.name, values=blank, unit=header.unit, problem=problem, words=words)
         else:
             raw = _numbers(header, column, layout, path)
         if not header.name:
             if raw.words is None and raw.problem is None and not np.isfinite(raw.values).any():
-                notes += [f"column {index + 1} has neither name nor values"] if index + 1 < len(headers) else []
+                nothing += [index + 1] if index + 1 < len(headers) else []
                 continue
             raw = replace(raw, name=f"column_{index + 1}")
-            notes.append(f"column {index + 1} has no name: called column_{index + 1}")
+            nameless.append(index + 1)
         found.append(raw)
+    notes += _of_columns(nothing, "neither name nor values") + _of_columns(nameless, "no name", called=True)
     return tuple(found), guess
+
+
+def _of_columns(places: Sequence[int], what: str, *, called: bool = False) -> list[str]:
+    """What some columns have in common, as one note; none of none."""
+    if not places:
+        return []
+    which, has = ("column", "has") if len(places) == 1 else ("columns", "have")
+    names = f": called {', '.join(f'column_{place}' for place in places[:_MOST_TOLD])}" if called else ""
+    more = f" and {len(places) - _MOST_TOLD} more" if len(places) > _MOST_TOLD else ""
+    shown = ", ".join(map(str, places[:_MOST_TOLD]))
+    return [f"{which} {shown}{more} {has} {what}{names}{' ...' if called and more else ''}"]
 
 
 def _without_empty_rows(

@@ -53,6 +53,16 @@ def test_a_clock_needs_no_name(write: Write, case: str) -> None:
     assert (found.time.column, found.sample_time) == (clock, 0.1)
 
 
+def test_what_columns_lack_is_told_in_one_line(write: Write) -> None:
+    """Of a table with two separators in a row each empty column had a line of its own."""
+    body = rows(lambda _, row: "||".join(row))
+    assert inspect_file(write("run.txt", "t||u||y\n" + body)).table.notes == (
+        "columns 2, 4 have neither name nor values",
+    )
+    told = inspect_file(write("run.csv", "t,,\n" + rows(lambda _, row: PLAIN(row)))).table.notes
+    assert told == ("columns 2, 3 have no name: called column_2, column_3",)
+
+
 NUMBERED = {
     "the last name is lost": "t,u\n" + rows(lambda _, row: PLAIN(row)),
     "a counter that has its name": "n,u\n" + rows(lambda k, row: f"{k},{row[1]},{row[2]}"),
