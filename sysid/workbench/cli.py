@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sysid.errors import SysidError
+from sysid.own_folders import tell_of_compiling
 from sysid.workbench.command_line import models, pipelines, records, surrogates, workspaces
 
 if TYPE_CHECKING:
@@ -47,6 +48,13 @@ STOPPED = 130
 
 RESUMED = ("run", "sweep", "auto", "surrogate")
 """What keeps what is done, and goes on there; of any other command a second one begins anew."""
+
+
+COMPILING = (
+    "note: compiling what computes. It is kept: only the first commands after an installation wait for it, up to half "
+    "a minute"
+)
+"""What a person at a terminal is told, who would wait without a word."""
 
 
 class _EndedError(SystemExit):
@@ -87,6 +95,8 @@ def run_cli(arguments: list[str]) -> int:
     from sysid.workbench.runner.console import speak_plainly
 
     speak_plainly()
+    if sys.stderr.isatty():
+        tell_of_compiling(lambda: _say(COMPILING))
     with warnings.catch_warnings():
         warnings.showwarning = _note
         warnings.simplefilter("default", FutureWarning)  # once each, whatever the caller's filters say

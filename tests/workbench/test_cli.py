@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -313,3 +314,16 @@ def test_ctrl_c_ends_a_fit_and_keeps_its_model(
     assert "Interrupted; this is the best model up to then" in told
     assert "Fitting closed loop" in told
     assert '"status": "INTERRUPTED"' in (workspace / "runs" / "first" / "results.json").read_text()
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_at_a_terminal_alone_it_is_told_that_kernels_are_compiled(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *, terminal: bool
+) -> None:
+    asked: list[Callable[[], None]] = []
+    monkeypatch.setattr("sysid.workbench.cli.tell_of_compiling", asked.append)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: terminal, raising=False)
+    run_cli(["--version"])
+    for one in asked:
+        one()
+    assert ("compiling what computes" in capsys.readouterr().err) == terminal

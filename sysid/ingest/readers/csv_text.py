@@ -37,7 +37,6 @@ from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import recognise_time
 from sysid.names import from_csv_cell
 
-
 _MOST_TOLD = 6
 """Columns that are named in one note."""
 
