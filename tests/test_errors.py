@@ -8,7 +8,7 @@ from sysid.errors import ChannelError, ConfigError, did_you_mean, near_words
 from sysid.export import EXPORTERS
 from sysid.export.exporters import ELSEWHERE, exporter
 from sysid.traces import Role
-from sysid.workbench.fits.config import parse_pipeline
+from tests.workbench.pipelines import parse_pipeline
 
 WORDS = ["BP", "AR", "outlet flow", "outlet temperature"]
 PIPELINE = "name: rig\ndata: rig\nmapping: u -> y\nfits: [{name: a, structure: {kind: ARX, na: 1, nb: [1], nk: [1]}}]\n"

@@ -24,8 +24,8 @@ from sysid.estimation import fit_narx
 from sysid.ingest import load_dataset
 from sysid.models import NARX, AbstractModel
 from sysid.traces import Trace
-from sysid.workbench.fits.config import parse_pipeline
 from tests.benchmarks._findings import found
+from tests.workbench.pipelines import parse_pipeline
 
 PIPELINE = Path("pipelines/mapping-stp-bp.yaml")
 STARTS, KEPT, WORKERS = 24, 8, 2

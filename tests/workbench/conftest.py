@@ -136,7 +136,7 @@ def empty_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A workspace whose pipeline has been run and its best network exported, to be copied."""
-    from sysid.workbench.fits.config import read_pipeline
+    from sysid.workbench.fits.config import Pipeline, PipelineConfig
     from sysid.workbench.fits.run import program_of
     from sysid.workbench.runner.program import carry_out
 
@@ -146,7 +146,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file.write_text(PIPELINE.replace("export: null", "export: {fit: closed loop, formats: [onnx]}"), encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sysid.reporting.report.write_report", stub_report)
-        carry_out(program_of(read_pipeline(file)), folder / "runs" / "first", command="sysid run first")
+        carry_out(program_of(Pipeline.read(PipelineConfig, file)), folder / "runs" / "first", command="sysid run first")
     return folder
 
 

@@ -17,7 +17,7 @@ from sysid.validation import CaseResult, Evaluation
 from sysid.validation.metrics import figures
 from sysid.workbench.annotation import annotated_set, by_state, find_annotator, weighted
 from sysid.workbench.cli import run_cli
-from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.record import read_scores
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner.program import carry_out
@@ -135,7 +135,7 @@ def train(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_pipeline_reports_by_state(tmp_path: Path) -> None:
     file = tmp_path / "brake.yaml"
     file.write_text(BRAKE, encoding="utf-8")
-    carry_out(program_of(read_pipeline(file)), tmp_path / "run", command="sysid run brake")
+    carry_out(program_of(Pipeline.read(PipelineConfig, file)), tmp_path / "run", command="sysid run brake")
     case = read_results(tmp_path / "run").fits[0].cases["VAL05"]
     assert case.by_state is not None
     assert {"release", "emergency"} <= set(case.by_state)
@@ -153,7 +153,9 @@ def test_weights_move_the_error_to_where_they_are_small(tmp_path: Path) -> None:
     for weight in (1, 50):
         file = tmp_path / "brake.yaml"
         file.write_text(BRAKE.replace("emergency: 4", f"emergency: {weight}"), encoding="utf-8")
-        results = carry_out(program_of(read_pipeline(file)), tmp_path / f"run{weight}", command="sysid run brake")
+        results = carry_out(
+            program_of(Pipeline.read(PipelineConfig, file)), tmp_path / f"run{weight}", command="sysid run brake"
+        )
         states = results.fits[0].cases["EST01"].by_state
         assert states is not None
         found.append(states)

@@ -21,7 +21,7 @@ from sysid.field_checks import check
 from sysid.models import Start, structure_from_dict
 from sysid.traces import Role, TraceSet
 from sysid.workbench.assembly.member_config import MemberConfig
-from sysid.workbench.fits.config import Pipeline, parse_pipeline
+from sysid.workbench.fits.config import Pipeline
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner.program import carry_out
@@ -31,6 +31,7 @@ from sysid.workbench.sweep.run import Sweep
 from sysid.workbench.sweep.run import program_of as program_of_sweep
 from sysid.workbench.sweep.workers import InThisProcess
 from sysid.yaml_files import yaml_text
+from tests.workbench.pipelines import parse_pipeline
 
 MAPPING = "inlet+valve -> outlet"
 STABILITY = {"count": 15}

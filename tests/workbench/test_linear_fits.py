@@ -10,8 +10,9 @@ from sysid.errors import UserError
 from sysid.estimation import Loop
 from sysid.models import Domain, TransferFunction
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import find_pipeline, parse_pipeline, read_pipeline
+from sysid.workbench.fits.config import Pipeline, PipelineConfig, find_pipeline
 from sysid.workbench.fits.data import load_data
+from tests.workbench.pipelines import parse_pipeline
 
 ARX = "structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}"
 TF = "structure: {kind: TransferFunction, poles: [1, 1], zeros: [0, 0], delays: [1, 1]}"
@@ -68,7 +69,7 @@ def test_continuous_transfer_functions_are_written_by_their_domain(workspace: Pa
 
 
 def test_the_linearity_pipeline_is_readable() -> None:
-    config = read_pipeline(find_pipeline("linearity")).config
+    config = Pipeline.read(PipelineConfig, find_pipeline("linearity")).config
     kinds = [fit.structure.kind for fit in config.fits]
     assert kinds.count("TransferFunction") == 3
     assert {"ARX", "NARX"} <= set(kinds)

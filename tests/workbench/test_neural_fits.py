@@ -9,8 +9,8 @@ import pytest
 from sysid.errors import UserError
 from sysid.models import NeuralStateSpace
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import parse_pipeline
 from sysid.workbench.fits.data import load_data
+from tests.workbench.pipelines import parse_pipeline
 
 ARX = "structure: {kind: ARX, na: 1, nb: [1, 1], nk: [1, 1]}"
 NSS = "structure: {kind: NSS, states: 1, neurons: 3}, training: {max_iterations: 30}"

@@ -30,7 +30,7 @@ from sysid.workbench.assembly.stage_config import (
     names_in,
 )
 from sysid.workbench.fields import as_field_error
-from sysid.workbench.fits.config import ExportConfig
+from sysid.workbench.fits.shared_config import ExportConfig
 from sysid.workbench.old_words import ASSEMBLY, STRICT, Words
 from sysid.workbench.stability import ExcursionConfig
 

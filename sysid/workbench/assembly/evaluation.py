@@ -38,7 +38,7 @@ from sysid.workbench.runner.store import LINE, digest, strict, write_json
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
-    from sysid.workbench.fits.config import ExportConfig
+    from sysid.workbench.fits.shared_config import ExportConfig
 
 ASSEMBLY = "assembly.json"
 """In the run folder: the chosen whole."""

@@ -11,7 +11,7 @@ from sysid.models import Cascade, Start
 from sysid.traces import TraceSet
 from sysid.validation import evaluate, evaluate_cascade
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.fits.config import ExportConfig
+from sysid.workbench.fits.shared_config import ExportConfig
 
 if TYPE_CHECKING:
     from sysid.export import Bundle

@@ -2,66 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import BaseModel, Field, FiniteFloat, model_validator
+from pydantic import Field, model_validator
 
-from sysid.field_checks import FieldError, FolderName
-from sysid.models import AbstractStructure, Start, StartKind
+from sysid.field_checks import FieldError
+from sysid.models import AbstractStructure
 from sysid.workbench.auto.finish import drawn_in
-from sysid.workbench.fields import MappingField, StartField
-from sysid.workbench.fits.config import ExportConfig, ReportConfig
-from sysid.workbench.old_words import STRICT
-from sysid.workbench.stability import StabilityConfig
+from sysid.workbench.fits.shared_config import SharedConfig
 from sysid.workbench.sweep.config import SweepConfig
 
 MINUTES = 10.0
 """Spent where nothing is said."""
 
 
-class AutoConfig(BaseModel):
-    """A search for a model.
+class AutoConfig(SharedConfig):
+    """A search for a model; what others say as well stands in :class:`SharedConfig`.
+
+    Where no traces are given that choose, parts of the estimation traces are held out.
 
     Args:
         kind: ``auto``.
-        name: Name of the run folder; letters, digits, dots, dashes and underscores.
-        description: What it is for.
-        data: Name of a data set, path of its ``dataset.yaml``, or a file with traces.
-        selection: Data set with traces that choose. Where there are none, parts of the estimation traces are held out;
-            validation and test cases never choose.
-        mapping: Inputs and outputs, such as ``u1+u2 -> y``.
-        start: How each free run begins.
-        rest: Value at rest of the output, by channel name, in its unit.
-        seed: Seed of everything random.
         minutes: Wall time of all but loading: a look at the data, search, last fits, scores, export and report.
         iterations: In place of minutes: iterations of training, all starts together. The same search then comes to the
             same result on every machine.
         workers: Processes that train, one thread each; 1 trains in this process.
         tolerance: Share of each output's range: what chooses is first over how many traces the root mean square error
             of the free run stays within it, then the error; the error alone where none is given.
-        stability: How a network's free run is checked.
-        export: What leaves the workbench; ``null`` for nothing.
-        report: What the report shows.
     """
 
-    model_config = STRICT
-
     kind: Literal["auto"]
-    name: FolderName
-    description: str = ""
-    data: str
-    selection: str | None = None
-    mapping: MappingField
-    start: StartField = Start(kind=StartKind.ESTIMATED)
-    rest: dict[str, FiniteFloat] = Field(default_factory=dict)
-    seed: int = Field(default=0, ge=0)
     minutes: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     iterations: int | None = Field(default=None, ge=1)
     workers: int = Field(default=2, ge=1)
     tolerance: float | None = Field(default=None, gt=0.0, lt=1.0)
-    stability: StabilityConfig = StabilityConfig()
-    export: ExportConfig | None = ExportConfig()
-    report: ReportConfig = ReportConfig()
 
     @model_validator(mode="after")
     def _one_budget(self) -> AutoConfig:
@@ -88,10 +62,8 @@ class AutoConfig(BaseModel):
         Returns:
             Its configuration.
         """
-        names = ("name", "description", "data", "selection", "mapping", "start", "rest", "seed", "workers")
-        given: dict[str, Any] = {name: getattr(self, name) for name in (*names, "stability", "export")}
         drawn = self.report.drawn or drawn_in(self.wall_s, len(self.mapping.outputs))
-        given["report"] = self.report.model_copy(update={"drawn": drawn})
+        given = {**self.shared, "report": self.report.model_copy(update={"drawn": drawn}), "workers": self.workers}
         return SweepConfig(kind="sweep", structure=(structure.to_dict(),), objectives=OBJECTIVES, **given)
 
 

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from sysid.estimation import FitResult
-from sysid.field_checks import check
 from sysid.models.store import structure_from_dict
 from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord, write_sweep
@@ -36,11 +35,11 @@ from sysid.workbench.runner import events
 from sysid.workbench.runner.program import Closing, Program, carry_out
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Done, Estimate, Outlined, Step, Work
-from sysid.workbench.runner.store import digest, strict, write_bytes
+from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.sweep.store import TRIALS, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess, LocalWorkers, NoWorkers
-from sysid.yaml_files import read_yaml
+from sysid.workbench.written import Written
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
@@ -64,21 +63,15 @@ def hire(bench: Bench, workers: int) -> AbstractWorkers:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Auto:
+class Auto(Written[AutoConfig]):
     """A search and where it was read from.
 
     Args:
-        config: The checked fields.
-        text: The YAML as written.
-        path: Its file, or the one that it would have.
         load: Gives the traces where they are at hand; by default they are loaded as the YAML says.
         page: Whether a page is made of the results.
         before_page: Writes what the page shows beside the results of the search.
     """
 
-    config: AutoConfig
-    text: str
-    path: Path
     load: Callable[[], Data] | None = None
     page: bool = True
     before_page: Callable[[], object] | None = None
@@ -131,9 +124,7 @@ def program(request: RunRequest) -> Program[Searched]:
     Raises:
         ConfigError: If the pipeline cannot be used.
     """
-    config = check(AutoConfig, read_yaml(request.path), where=request.path)
-    text = request.path.read_text(encoding="utf-8-sig")
-    return program_of(Auto(config=config, text=text, path=request.path.resolve()))
+    return program_of(Auto.read(AutoConfig, request.path))
 
 
 def program_of(auto: Auto, *, find_workers: Hire = hire, verb: str = "run") -> Program[Searched]:
@@ -150,7 +141,7 @@ def program_of(auto: Auto, *, find_workers: Hire = hire, verb: str = "run") -> P
     work = _AutoSteps(auto=auto, find_workers=find_workers)
     return Program(
         name=auto.config.name,
-        keep=lambda folder: write_bytes(folder / "pipeline.yaml", auto.text.encode()),
+        keep=auto.keep,
         steps=work.run,
         outline=work.outline,
         closing=closing,
@@ -255,12 +246,8 @@ class _AutoSteps:
 
     def outline(self) -> list[Outlined]:
         """All steps, as far as they are known before a trial is."""
-        data, *rest = FitSteps(pipeline=self._first).outline()
-        # Of which structure the chosen one is, nobody knows.
-        named = [
-            replace(one, title=one.title.partition(",")[0]) if one.name.startswith("fit-") else one for one in rest
-        ]
-        return [data, Outlined(name=TRIALS, title=TITLE, estimate=self._estimate), *named]
+        trials = Outlined(name=TRIALS, title=TITLE, estimate=self._estimate)
+        return FitSteps(pipeline=self._first).outline_around(trials)
 
     def run(self, run: Run) -> Searched:
         """Every step, in order."""

@@ -9,8 +9,10 @@ from sysid.errors import ConfigError
 from sysid.workbench.fits.config import find_pipeline
 from sysid.workbench.kinds import KINDS, RunRequest, kind_of
 from sysid.workbench.listeners import perform
-from sysid.workbench.sweep.run import program, read_sweep_file
+from sysid.workbench.sweep.config import SweepConfig
+from sysid.workbench.sweep.run import program
 from sysid.workbench.sweep.store import TRIALS, TrialStore
+from sysid.workbench.sweep.sweep_steps import Sweep
 
 
 def sweep_command(
@@ -42,7 +44,7 @@ def sweep_command(
             got=f"kind: {kind}",
             remedy=f"run it with: sysid run {shlex.quote(pipeline)}" if kind in KINDS else "correct the kind",
         )
-    folder = out or Path("runs") / read_sweep_file(path).config.name
+    folder = out or Path("runs") / Sweep.read(SweepConfig, path).config.name
     if resume and TrialStore(path=folder / TRIALS).count() == 0:
         raise ConfigError(
             "there is no sweep to go on with",

@@ -10,7 +10,9 @@ from sysid.ingest.datasets.dataset import Unmade
 from sysid.references.candidates import Candidates
 from sysid.references.runs import Case, Progress, ReferenceRuns
 from sysid.traces import Role, Trace, TraceSet
-from sysid.workbench.experiments.run import SHOWN, Experiments, read_config, records
+from sysid.workbench.experiments.config import ExperimentConfig
+from sysid.workbench.experiments.run import SHOWN, Experiments, records
+from sysid.workbench.written import Written
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,8 +38,8 @@ class ExperimentData:
         Raises:
             ConfigError: If it is no such pipeline.
         """
-        config = read_config(path)
-        return cls(work=Experiments(config=config, reference=config.reference.at(path.resolve().parent)))
+        read = Written.read(ExperimentConfig, path)
+        return cls(work=Experiments(config=read.config, reference=read.config.reference.at(read.path.parent)))
 
     def load(self, progress: Progress | None = None) -> TraceSet:
         """Run what has yet to be run.

@@ -15,6 +15,7 @@ from sysid.traces import TraceSet
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.workbench.experiments.run import Experimented, program_of
 from sysid.workbench.runner.program import carry_out
+from sysid.workbench.written import Written
 from sysid.yaml_files import yaml_text
 
 COMMAND = "sysid.experiment(...)"
@@ -33,7 +34,8 @@ def experimented(
     }
     config = check(ExperimentConfig, fields, where="sysid.experiment")
     text = yaml_text(config.model_dump(mode="json", exclude_defaults=True))
-    return carry_out(program_of(config, text=text, folder=Path.cwd()), folder, command=COMMAND)
+    pipeline = Written(config=config, text=text, path=Path.cwd() / f"{config.name}.yaml")
+    return carry_out(program_of(pipeline), folder, command=COMMAND)
 
 
 def experiment(

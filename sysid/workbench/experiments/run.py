@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sysid.errors import ConfigError
-from sysid.field_checks import check
 from sysid.ingest import load_dataset, write_csv
 from sysid.references.config import ReferenceConfig
 from sysid.references.design import designed
@@ -25,7 +24,8 @@ from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Estimate, NotKnownError, Outlined, Step, Work
 from sysid.workbench.runner.store import write_bytes, write_json
-from sysid.yaml_files import read_yaml, yaml_text
+from sysid.workbench.written import Written
+from sysid.yaml_files import yaml_text
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
@@ -73,40 +73,23 @@ def program(request: RunRequest) -> Program[Experimented]:
     Raises:
         UserError: If the pipeline cannot be used.
     """
-    config = read_config(request.path)
-    return program_of(config, text=request.path.read_text(encoding="utf-8-sig"), folder=request.path.resolve().parent)
+    return program_of(Written.read(ExperimentConfig, request.path))
 
 
-def read_config(path: Path) -> ExperimentConfig:
-    """The pipeline in a file.
-
-    Args:
-        path: The YAML.
-
-    Returns:
-        It, checked.
-
-    Raises:
-        ConfigError: If it is not one.
-    """
-    return check(ExperimentConfig, read_yaml(path), where=path)
-
-
-def program_of(config: ExperimentConfig, *, text: str, folder: Path) -> Program[Experimented]:
+def program_of(pipeline: Written[ExperimentConfig]) -> Program[Experimented]:
     """Experiments as a program.
 
     Args:
-        config: The checked fields.
-        text: The YAML as written.
-        folder: Of the YAML: paths in it are relative to it.
+        pipeline: What to do; paths in it are relative to the folder of its file.
 
     Returns:
         The program.
     """
-    work = Experiments(config=config, reference=config.reference.at(folder))
+    config = pipeline.config
+    work = Experiments(config=config, reference=config.reference.at(pipeline.path.parent))
     return Program(
         name=config.name,
-        keep=lambda place: write_bytes(place / "pipeline.yaml", text.encode()),
+        keep=pipeline.keep,
         steps=work.run,
         outline=lambda: [Outlined(name="runs", title=TITLE, how_long=work.estimate), LOADING],
         closing=closing,

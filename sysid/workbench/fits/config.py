@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,7 +9,6 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     Field,
-    FiniteFloat,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     field_validator,
@@ -22,24 +20,20 @@ from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation.estimator import Options
 from sysid.estimation.estimators import check as check_request
 from sysid.estimation.estimators import estimator_of
-from sysid.field_checks import FieldError, FolderName, check
-from sysid.models import Start, StartKind
+from sysid.field_checks import FieldError
 from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
-    FormatField,
-    MappingField,
     OptionsConfig,
-    StartField,
     StructureField,
     as_field_error,
     given_options,
     options_config,
 )
 from sysid.workbench.fits.orders import OrdersConfig
+from sysid.workbench.fits.shared_config import SharedConfig
 from sysid.workbench.old_words import STRICT
-from sysid.workbench.stability import StabilityConfig
-from sysid.yaml_files import parse_yaml, read_yaml
+from sysid.workbench.written import Written
 
 
 class FitConfig(BaseModel):
@@ -82,88 +76,25 @@ class FitConfig(BaseModel):
         return estimator_of(self.structure).options(given_options(self.training), seed=seed)
 
 
-class ExportConfig(BaseModel):
-    """What leaves the workbench.
-
-    Args:
-        fit: Name of a fit, or ``best``: least free-run error on the selection traces.
-        formats: File formats; by default ONNX and C, as far as they can be written here.
-        tolerance: Largest difference allowed between a file and its model, in the output's unit; by default 1e-9 of the
-            largest value that each output has over the cases.
-        run_times: Whether every file is timed beside the model's own free run; some seconds a format.
-        case: Of parameters that differ by case, the case whose values the files have; by default they are inputs.
-        unstable: Whether a fit whose free run is unstable (status ``UNSTABLE``) may leave. Without, ``best`` is the
-            best of the others, and nothing is exported where there is none.
-    """
-
-    model_config = STRICT
-
-    fit: str = "best"
-    formats: tuple[FormatField, ...] | None = None
-    tolerance: float | None = Field(default=None, gt=0.0)
-    run_times: bool = False
-    case: str | None = None
-    unstable: bool = True
-
-
-class ReportConfig(BaseModel):
-    """What the report shows beside our own figures.
-
-    Args:
-        published: Name of a table of published figures.
-        drawn: Cases of each fit that are drawn at most, the worst of those that were not fitted first; 12 by default,
-            and fewer where a search has little time.
-    """
-
-    model_config = STRICT
-
-    published: str | None = None
-    drawn: int | None = Field(default=None, ge=1)
-
-
 def _as_list(value: object) -> object:
     return [value] if isinstance(value, str) else value
 
 
-class PipelineConfig(BaseModel):
-    """A pipeline.
+class PipelineConfig(SharedConfig):
+    """A pipeline; what others say as well stands in :class:`SharedConfig`.
 
     Args:
         kind: ``fits``; other kinds of pipelines are in :mod:`sysid.workbench.kinds`.
-        name: Name of the run folder; letters, digits, dots, dashes and underscores.
-        description: What it is for.
-        data: Name of a data set, or path of its ``dataset.yaml``.
-        selection: Data set with traces that choose between fits; validation cases never do.
-        mapping: Inputs and outputs, such as ``BP+AR -> BC`` or ``STP -> BP+AR``.
-        start: How each free run begins.
-        rest: Value at rest of the output, by channel name, in its unit.
-        seed: Seed of everything random.
         fits: What is fitted, in order.
         tolerance: Share of each output's range: the best fit is first that whose free run stays within it (root mean
             square) over most selection traces, then that of the least error; the error alone where none is given.
-        export: What leaves the workbench; ``null`` for nothing.
-        report: What the report shows.
-        stability: Over which sequences a network's free run has to stay bounded and to settle.
         orders: A search over the orders of ARX models for the report; ``null`` for none.
         annotate: Who says in which state each sample is, for errors by state and weights.
     """
 
-    model_config = STRICT
-
     kind: Literal["fits"] = "fits"
-    name: FolderName
-    description: str = ""
-    data: str
-    selection: str | None = None
-    mapping: MappingField
-    start: StartField = Start(kind=StartKind.ESTIMATED)
-    rest: dict[str, FiniteFloat] = Field(default_factory=dict)
-    seed: int = Field(default=0, ge=0)
     fits: Annotated[tuple[FitConfig, ...], BeforeValidator(_as_list)] = Field(min_length=1)
     tolerance: float | None = Field(default=None, gt=0.0, lt=1.0)
-    export: ExportConfig | None = ExportConfig()
-    report: ReportConfig = ReportConfig()
-    stability: StabilityConfig = StabilityConfig()
     orders: OrdersConfig | None = None
     annotate: AnnotateConfig | None = None
 
@@ -201,15 +132,6 @@ class PipelineConfig(BaseModel):
                 got=self.export.fit,
                 remedy=did_you_mean(self.export.fit, names, "correct the name"),
             )
-        outputs = self.mapping.outputs
-        strangers = sorted(set(self.rest) - set(outputs))
-        if strangers:
-            raise FieldError(
-                f"rest names {', '.join(strangers)}, which is not {'the' if len(outputs) == 1 else 'an'} output",
-                expected=", ".join(outputs),
-                got=", ".join(strangers),
-                remedy=f"write rest: {{{outputs[0]}: 0}}; inputs rest at their first sample",
-            )
         return self
 
     @model_validator(mode="after")
@@ -244,19 +166,8 @@ class PipelineConfig(BaseModel):
         return self.rest.get(self.mapping.output) if len(self.mapping.outputs) == 1 else dict(self.rest)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Pipeline:
-    """A pipeline and where it was read from.
-
-    Args:
-        config: The checked fields.
-        text: The YAML as written.
-        path: Its file.
-    """
-
-    config: PipelineConfig
-    text: str
-    path: Path
+Pipeline = Written[PipelineConfig]
+"""A pipeline of fits and where it was read from."""
 
 
 def find_pipeline(name_or_path: str) -> Path:
@@ -312,45 +223,3 @@ def find_pipeline(name_or_path: str) -> Path:
         got=name_or_path,
         remedy=f"did you mean {near}?" if near else "make a workspace with one: sysid init DIR",
     )
-
-
-def read_pipeline(path: Path) -> Pipeline:
-    """Read and check a pipeline.
-
-    Args:
-        path: Its YAML file.
-
-    Returns:
-        The pipeline.
-
-    Raises:
-        ConfigError: Naming the file, the field and what is wrong with it.
-    """
-    config = check(PipelineConfig, read_yaml(path), where=path)
-    return Pipeline(config=config, text=path.read_text(encoding="utf-8-sig"), path=path.resolve())
-
-
-def parse_pipeline(text: str, *, where: object = "text") -> PipelineConfig:
-    """Check a pipeline that is not in a file.
-
-    Args:
-        text: The YAML.
-        where: Named in errors.
-
-    Returns:
-        The checked fields.
-
-    Raises:
-        ConfigError: Naming the field and what is wrong with it.
-
-    Example:
-        >>> text = '''
-        ... name: first
-        ... data: tank
-        ... mapping: pump -> level
-        ... fits: [{name: ARX, structure: {kind: ARX, na: 1, nb: [1], nk: [1]}}]
-        ... '''
-        >>> parse_pipeline(text).fits[0].structure.label
-        'ARX [1; 1; 1]'
-    """
-    return check(PipelineConfig, parse_yaml(text, where=where), where=where)

@@ -17,7 +17,7 @@ from sysid.reporting.results import Results, parse_results
 from sysid.reporting.sweep_record import has_sweep, read_sweep
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.choice import Choice, choose
-from sysid.workbench.fits.config import ExportConfig, FitConfig, Pipeline, PipelineConfig
+from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data, load_data, unmade_data
 from sysid.workbench.fits.estimates import how_long
 from sysid.workbench.fits.evidence import curves, residuals
@@ -34,6 +34,7 @@ from sysid.workbench.fits.record import (
     write_residuals,
     write_scores,
 )
+from sysid.workbench.fits.shared_config import ExportConfig
 from sysid.workbench.fits.words import cases_told, fit_title, how_ended, looked_told, worst_told
 from sysid.workbench.runner import events
 from sysid.workbench.runner.run import REPORT, Run
@@ -97,6 +98,21 @@ class FitSteps:
     @property
     def _names(self) -> tuple[str | None, ...]:
         return (self.config.data, self.config.selection, self.config.stability.sequences)
+
+    def outline_around(self, trials: Outlined) -> list[Outlined]:
+        """All steps of a search, as far as they are known before it: of which structure a fit is, nobody knows.
+
+        Args:
+            trials: The search, between the loading and the fits.
+
+        Returns:
+            The steps in order.
+        """
+        data, *rest = self.outline()
+        named = [
+            replace(one, title=one.title.partition(",")[0]) if one.name.startswith("fit-") else one for one in rest
+        ]
+        return [data, trials, *named]
 
     def outline(self) -> list[Outlined]:
         """All steps, as far as they are known before the traces are."""

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from sysid.reporting.results import Results
 from sysid.workbench.fits.choice import Choice
-from sysid.workbench.fits.config import Pipeline, read_pipeline
+from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
 from sysid.workbench.fits.table import table_of_fits, told_of_fits
 from sysid.workbench.runner.program import Closing, Program
-from sysid.workbench.runner.store import write_bytes
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
@@ -30,7 +29,7 @@ def program(request: RunRequest) -> Program[Results]:
     Raises:
         ConfigError: If the pipeline cannot be used.
     """
-    return program_of(read_pipeline(request.path))
+    return program_of(Pipeline.read(PipelineConfig, request.path))
 
 
 def program_of(
@@ -49,7 +48,7 @@ def program_of(
     work = FitSteps(pipeline=pipeline, given=given or {}, chosen=chosen)
     return Program(
         name=pipeline.config.name,
-        keep=lambda folder: write_bytes(folder / "pipeline.yaml", pipeline.text.encode()),
+        keep=pipeline.keep,
         steps=work.run,
         outline=work.outline,
         closing=closing,

@@ -23,8 +23,8 @@ from sysid.workbench.runner.naming import nearby
 from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import REPORT, Run
 from sysid.workbench.runner.steps import NOT_KNOWN, Estimate, Outlined, Step, Work
-from sysid.workbench.runner.store import digest, strict, write_bytes, write_json
-from sysid.yaml_files import read_yaml
+from sysid.workbench.runner.store import digest, strict, write_json
+from sysid.workbench.written import Written
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
@@ -47,8 +47,9 @@ def program(request: RunRequest) -> Program[JudgementResults]:
     Raises:
         UserError: If the pipeline or an option cannot be used.
     """
-    config = check(JudgementConfig, read_yaml(request.path), where=request.path)
-    judge, text = find_judge(config.kind, where=request.path), request.path.read_bytes()
+    written = Written.read(JudgementConfig, request.path)
+    config = written.config
+    judge = find_judge(config.kind, where=request.path)
     for subject in config.subjects:
         for part in subject.parts:
             check(judge.part_options, part.options, where=f"{request.path}, {subject.name}, options")
@@ -56,7 +57,7 @@ def program(request: RunRequest) -> Program[JudgementResults]:
     work = _Judging(config=config, judge=judge, options=options)
     return Program(
         name=config.name,
-        keep=lambda folder: write_bytes(folder / "pipeline.yaml", text),
+        keep=written.keep,
         steps=work.run,
         outline=lambda: [LOADING, Outlined(name=TITLE, title=TITLE), REPORT],
         closing=lambda results, folder: closing(judgement_headline(results.judgement), folder),

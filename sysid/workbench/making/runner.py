@@ -20,7 +20,7 @@ from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Outlined, Step, Work
 from sysid.workbench.runner.store import write_bytes
-from sysid.yaml_files import read_yaml
+from sysid.workbench.written import Written
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
@@ -42,14 +42,14 @@ def program(request: RunRequest) -> Program[TraceSet]:
     Raises:
         UserError: If the pipeline or an option cannot be used.
     """
-    config = check(MakingConfig, read_yaml(request.path), where=request.path)
+    written = Written.read(MakingConfig, request.path)
+    config = written.config
     maker = find_maker(config.kind, where=request.path)
     options = check(maker.options, config.options, where=f"{request.path}, options")
     work = _Making(config=config, maker=maker, options=options)
-    text = request.path.read_bytes()
     return Program(
         name=config.name,
-        keep=lambda folder: write_bytes(folder / "pipeline.yaml", text),
+        keep=written.keep,
         steps=work.run,
         outline=lambda: [Outlined(name=TITLE, title=TITLE), LOADING],
         closing=closing,

@@ -50,6 +50,7 @@ from sysid.workbench.surrogates.known import program_of as known_program
 from sysid.workbench.surrogates.plan import PROOF, RUNNING, SEARCHING, Times, times
 from sysid.workbench.surrogates.proof import FEWEST, Proof, fmu_of, prove
 from sysid.workbench.surrogates.told import beginning_of, failed, restless, unlike, without_effect
+from sysid.workbench.written import Written
 from sysid.yaml_files import read_yaml
 
 Perform = Callable[[Program[Any], Path], Any]
@@ -122,8 +123,8 @@ class Work:
 
     def experimented(self) -> Experimented:
         """The experiments."""
-        text, beside = self.pipeline.read_text(encoding="utf-8-sig"), self.pipeline.resolve().parent
-        found: Experimented = self.perform(experiment_program(self.config, text=text, folder=beside), self.place)
+        asked = replace(Written.read(ExperimentConfig, self.pipeline), config=self.config)
+        found: Experimented = self.perform(experiment_program(asked), self.place)
         return found
 
     def noted(self, found: Experimented) -> list[str]:

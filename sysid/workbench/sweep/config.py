@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field, FiniteFloat, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
 
 from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation import Training
-from sysid.field_checks import FieldError, FolderName
-from sysid.models import Start, StartKind
+from sysid.field_checks import FieldError
 from sysid.reporting.sweep_record import FIGURES
-from sysid.workbench.fields import MappingField, StartField, as_field_error, with_short_kind
-from sysid.workbench.fits.config import ExportConfig, FitConfig, PipelineConfig, ReportConfig
+from sysid.workbench.fields import as_field_error, with_short_kind
+from sysid.workbench.fits.config import FitConfig, PipelineConfig
+from sysid.workbench.fits.shared_config import SharedConfig
 from sysid.workbench.old_words import STRICT, TRAINING, with_new_words
-from sysid.workbench.stability import StabilityConfig
 from sysid.workbench.sweep.search_space import Space, parse_space
 
 WINNER = "sweep winner"
@@ -109,20 +108,15 @@ def _as_list(value: object) -> object:
     return [value] if isinstance(value, dict) else value
 
 
-class SweepConfig(BaseModel):
-    """A sweep.
+class SweepConfig(SharedConfig):
+    """A sweep; what others say as well stands in :class:`SharedConfig`.
+
+    Of several outputs errors count over their variances. Each trial's own seed follows from the sweep's and from the
+    trial's point. A network's free run is checked where it is one of the best, until one is stable, and of every trial
+    that chooses among several starts.
 
     Args:
         kind: ``sweep``.
-        name: Name of the run folder; letters, digits, dots, dashes and underscores.
-        description: What it is for.
-        data: Name of a data set, or path of its ``dataset.yaml``.
-        selection: Data set with traces that choose; validation cases do not.
-        mapping: Inputs and outputs, such as ``BP+AR -> BC`` or ``STP -> BP+AR``; of several outputs errors count over
-            their variances.
-        start: How each free run begins.
-        rest: Value at rest of the output, by channel name, in its unit.
-        seed: Seed of everything random; each trial's own follows from it and from the trial's point.
         structure: One structure or several, each with a range in any of its fields.
         training: How networks are trained, with a range in any field.
         method: How the points are gone through.
@@ -134,25 +128,11 @@ class SweepConfig(BaseModel):
         workers: Processes that train, one thread each.
         cluster: Address of a Dask scheduler, whose workers then train instead.
         storage: URL of a database that Optuna's own tools can read the trials from.
-        stability: How a network's free run is checked: that of the best trials until one is stable, and of every trial
-            that chooses among several starts.
         beside: Structures, chosen by hand, that are trained like the trials and set beside the winner.
         reproduces: Which published sweep this one repeats to the letter, if it does.
-        export: What leaves the workbench; ``null`` for nothing.
-        report: What the report shows.
     """
 
-    model_config = STRICT
-
     kind: Literal["sweep"]
-    name: FolderName
-    description: str = ""
-    data: str
-    selection: str | None = None
-    mapping: MappingField
-    start: StartField = Start(kind=StartKind.ESTIMATED)
-    rest: dict[str, FiniteFloat] = Field(default_factory=dict)
-    seed: int = Field(default=0, ge=0)
     structure: Annotated[
         tuple[Annotated[dict[str, Any], BeforeValidator(with_short_kind)], ...],
         BeforeValidator(_as_list, json_schema_input_type=dict[str, Any] | tuple[dict[str, Any], ...]),
@@ -168,11 +148,8 @@ class SweepConfig(BaseModel):
     workers: int = Field(default=2, ge=1)
     cluster: str | None = None
     storage: str | None = None
-    stability: StabilityConfig = StabilityConfig()
     beside: tuple[Annotated[dict[str, Any], BeforeValidator(with_short_kind)], ...] = ()
     reproduces: str | None = None
-    export: ExportConfig | None = ExportConfig()
-    report: ReportConfig = ReportConfig()
 
     @field_validator("objectives")
     @classmethod
@@ -257,7 +234,5 @@ class SweepConfig(BaseModel):
         Returns:
             Its configuration.
         """
-        shared = ("name", "description", "data", "selection", "mapping", "start", "rest", "seed", "report", "stability")
-        given = {name: getattr(self, name) for name in shared}
         export = None if self.export is None else self.export.model_copy(update={"fit": fits[0].name})
-        return PipelineConfig(**given, fits=tuple(fits), export=export)
+        return PipelineConfig(**{**self.shared, "export": export}, fits=tuple(fits))

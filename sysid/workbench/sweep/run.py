@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sysid.field_checks import check
 from sysid.workbench.fits.table import table_of_fits, told_of_fits
 from sysid.workbench.runner.program import Closing, Program
-from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.sweep_steps import Hire, Sweep, SweepSteps, Swept
 from sysid.workbench.sweep.table import table_of_trials
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, LocalWorkers
-from sysid.yaml_files import read_yaml
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
-
-
-def read_sweep_file(path: Path) -> Sweep:
-    """Read and check a sweep.
-
-    Args:
-        path: Its YAML file.
-
-    Returns:
-        The sweep.
-
-    Raises:
-        ConfigError: Naming the file, the field and what is wrong with it.
-    """
-    config = check(SweepConfig, read_yaml(path), where=path)
-    return Sweep(config=config, text=path.read_text(encoding="utf-8-sig"), path=path.resolve())
 
 
 def hire(bench: Bench, config: SweepConfig) -> AbstractWorkers:
@@ -68,10 +50,9 @@ def program(request: RunRequest) -> Program[Swept]:
     Raises:
         ConfigError: If the pipeline cannot be used.
     """
-    sweep = read_sweep_file(request.path)
+    sweep = Sweep.read(SweepConfig, request.path)
     if request.workers is not None:
-        config = sweep.config.model_copy(update={"workers": request.workers})
-        sweep = Sweep(config=config, text=sweep.text, path=sweep.path)
+        sweep = replace(sweep, config=sweep.config.model_copy(update={"workers": request.workers}))
     return program_of(sweep)
 
 
@@ -88,7 +69,7 @@ def program_of(sweep: Sweep, *, find_workers: Hire = hire) -> Program[Swept]:
     work = SweepSteps(sweep=sweep, find_workers=find_workers)
     return Program(
         name=sweep.config.name,
-        keep=lambda folder: write_bytes(folder / "pipeline.yaml", sweep.text.encode()),
+        keep=sweep.keep,
         steps=work.run,
         outline=work.outline,
         closing=closing,

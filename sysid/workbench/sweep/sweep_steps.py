@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from sysid.errors import ConfigError
@@ -16,7 +15,7 @@ from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import FIGURES, TRACES, SweepRecord, Trial, write_sweep
 from sysid.units import squared
 from sysid.workbench.fits.choice import Choice, against
-from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
+from sysid.workbench.fits.config import FitConfig, Pipeline
 from sysid.workbench.fits.data import Data
 from sysid.workbench.fits.estimates import how_long
 from sysid.workbench.fits.fit_steps import FitSteps, GivenFit
@@ -32,24 +31,12 @@ from sysid.workbench.sweep.search_space import Space, parse_space, trained_rows
 from sysid.workbench.sweep.store import TRIALS, Clock, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, NoWorkers
+from sysid.workbench.written import Written
 
 Hire = Callable[[Bench, SweepConfig], AbstractWorkers]
 """Finds workers for a sweep."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Sweep:
-    """A sweep and where it was read from.
-
-    Args:
-        config: The checked fields.
-        text: The YAML as written.
-        path: Its file.
-    """
-
-    config: SweepConfig
-    text: str
-    path: Path
+Sweep = Written[SweepConfig]
+"""A sweep and where it was read from."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -102,21 +89,14 @@ class SweepSteps:
 
     def outline(self) -> list[Outlined]:
         """All steps, as far as they are known before a trial is."""
-        winner = Pipeline(config=self._first(self.config.space()), text=self.sweep.text, path=self.sweep.path)
-        data, *rest = FitSteps(pipeline=winner).outline()
-        # Of which structure the winner is, nobody knows.
-        named = [
-            replace(one, title=one.title.partition(",")[0]) if one.name.startswith("fit-") else one for one in rest
-        ]
-        return [data, Outlined(name=TRIALS, title=self._title()), *named]
+        return FitSteps(pipeline=self._first()).outline_around(Outlined(name=TRIALS, title=self._title()))
 
     def run(self, run: Run) -> Swept:
         """Every step, in order."""
-        first = Pipeline(config=self._first(self.config.space()), text=self.sweep.text, path=self.sweep.path)
-        loaded = run.do(FitSteps(pipeline=first).loading())
+        loaded = run.do(FitSteps(pipeline=self._first()).loading())
         found = run.do(self._trials(run, loaded)).value
         fits = [found.fit_of(WINNER, found.winner)] + [found.fit_of(trial.label, trial) for trial in found.beside]
-        pipeline = Pipeline(config=self.config.pipeline(fits), text=self.sweep.text, path=self.sweep.path)
+        pipeline = self._pipeline(fits)
         given = {
             model.fit.name: made
             for fit, trial in zip(fits, found.shown, strict=True)
@@ -175,7 +155,7 @@ class SweepSteps:
         return Bench(
             # Workers of a cluster may have another disk.
             folder=run.store.path if self.config.cluster is None else None,
-            pipeline=self._first(self.config.space()).model_dump(mode="json"),
+            pipeline=self._first().config.model_dump(mode="json"),
             traces=data.traces,
             selection=data.selection,
             sequences=data.sequences,
@@ -221,9 +201,12 @@ class SweepSteps:
         beside = self._beside(driver, tried, len(space.points()))
         return self._choose(driver, bench, tried=tried, beside=beside, wall_s=clock.total)
 
-    def _first(self, space: Space) -> PipelineConfig:
+    def _first(self) -> Pipeline:
         """The pipeline of the first point: what all points share."""
-        return self.config.pipeline([FitConfig(name=WINNER, structure=space.points()[0].structure)])
+        return self._pipeline([FitConfig(name=WINNER, structure=self.config.space().points()[0].structure)])
+
+    def _pipeline(self, fits: list[FitConfig]) -> Pipeline:
+        return Pipeline(config=self.config.pipeline(fits), text=self.sweep.text, path=self.sweep.path)
 
     def _checked(self, data: Data) -> Data:
         """The data, if there is something to choose by."""

@@ -19,7 +19,9 @@ from sysid.workbench.commands.run import run_request
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.kinds import RunRequest
 from sysid.workbench.runner.program import carry_out
-from sysid.workbench.sweep.run import program_of, read_sweep_file
+from sysid.workbench.sweep.config import SweepConfig
+from sysid.workbench.sweep.run import program_of
+from sysid.workbench.sweep.sweep_steps import Sweep
 from tests.workbench.assembly.conftest import PIPELINE, assembly_results
 
 BASE = (
@@ -186,7 +188,9 @@ def sweep(workspace: Path, text: str) -> SweepRecord:
     """The record of a sweep that was run."""
     file = workspace / "pipelines" / "few.yaml"
     file.write_text(text, encoding="utf-8")
-    return carry_out(program_of(read_sweep_file(file)), workspace / "runs" / "few", command="sysid sweep few").record
+    return carry_out(
+        program_of(Sweep.read(SweepConfig, file)), workspace / "runs" / "few", command="sysid sweep few"
+    ).record
 
 
 def test_candidates_are_the_best_of_a_sweep(workspace: Path) -> None:

@@ -15,8 +15,9 @@ from sysid.estimation import Loop, Training
 from sysid.field_checks import check
 from sysid.models import NARX, StartKind
 from sysid.workbench.assembly.extending import read_joined
-from sysid.workbench.fits.config import PipelineConfig, find_pipeline, parse_pipeline
+from sysid.workbench.fits.config import PipelineConfig, find_pipeline
 from sysid.workbench.kinds import kind_of, kinds
+from tests.workbench.pipelines import parse_pipeline
 
 GOOD = """\
 name: first

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from sysid.reporting.results import Results
-from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner.events import Event, StepProgress
@@ -36,7 +36,7 @@ class Watcher:
 
 
 def run(workspace: Path, name: str, watcher: Watcher, **options: Any) -> Results:
-    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    read = Pipeline.read(PipelineConfig, workspace / "pipelines" / "first.yaml")
     return carry_out(program_of(read), workspace / name, command="sysid run first", watchers=[watcher], **options)
 
 

@@ -14,11 +14,12 @@ from sysid.reporting.residuals import read_residuals
 from sysid.traces import Role
 from sysid.validation import analyse_residuals
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import PipelineConfig, parse_pipeline
+from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data, load_data
 from sysid.workbench.fits.evidence import linearity, residuals
 from sysid.workbench.fits.record import write_residuals
 from sysid.workbench.runner.events import FitReady
+from tests.workbench.pipelines import parse_pipeline
 
 Fitted = tuple[PipelineConfig, Data, dict[str, FitResult]]
 

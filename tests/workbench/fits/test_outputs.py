@@ -19,7 +19,7 @@ from sysid.reporting.results import Results, read_results
 from sysid.reporting.sections.training import RELATIVE, error_unit, trained_models
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import table
-from sysid.workbench.fits.config import Pipeline, parse_pipeline
+from sysid.workbench.fits.config import Pipeline
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.fits.table import table_of_fits
@@ -29,6 +29,7 @@ from sysid.workbench.sweep.config import SweepConfig
 from sysid.workbench.sweep.run import Sweep
 from sysid.workbench.sweep.run import program_of as program_of_sweep
 from sysid.workbench.sweep.workers import InThisProcess
+from tests.workbench.pipelines import parse_pipeline
 
 DATASET = """\
 name: tanks

@@ -23,7 +23,7 @@ from sysid.models import Start
 from sysid.reporting.results import Results, read_results
 from sysid.validation import evaluate
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.data import load_data
 from sysid.workbench.fits.record import read_fit, read_scores
 from sysid.workbench.fits.run import program_of
@@ -42,7 +42,7 @@ def run(workspace: Path, *, fresh: bool = False) -> tuple[Results, dict[str, boo
         if isinstance(event, events.FitReady):
             stored[event.config.name] = event.stored
 
-    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    read = Pipeline.read(PipelineConfig, workspace / "pipelines" / "first.yaml")
     return carry_out(
         program_of(read), workspace / "run", command="sysid run first", fresh=fresh, watchers=[watch]
     ), stored
@@ -151,7 +151,7 @@ def test_a_report_is_written_again_only_if_something_changed(workspace: Path, fi
 def test_stored_results_are_the_computed_ones(workspace: Path) -> None:
     folder = RunFolder(path=workspace / "run").fit("closed-loop")
     fit, scores = read_fit(folder), read_scores(folder)
-    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    read = Pipeline.read(PipelineConfig, workspace / "pipelines" / "first.yaml")
     data = load_data(read.config, beside=read.path.parent, progress=lambda _: None)
     again = evaluate(fit.model, data.traces, Start())
     for name, case in again.cases.items():
@@ -248,7 +248,7 @@ import os, signal, sys
 from pathlib import Path
 import sysid.reporting.report
 from sysid.workbench.runner import store
-from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner.program import carry_out
 
@@ -258,7 +258,8 @@ def dying(path):
         os.kill(os.getpid(), signal.SIGKILL)
     return replacing(path)
 store.replacing = dying
-carry_out(program_of(read_pipeline(Path("pipelines/first.yaml"))), Path("run"), command="sysid run first")
+pipeline = Pipeline.read(PipelineConfig, Path("pipelines/first.yaml"))
+carry_out(program_of(pipeline), Path("run"), command="sysid run first")
 """
 
 
@@ -338,7 +339,7 @@ def test_a_run_that_is_killed_early_leaves_results_of_what_is_finished(workspace
         if isinstance(event, events.FitReady) and event.config.name == "closed loop":
             raise KeyboardInterrupt
 
-    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    read = Pipeline.read(PipelineConfig, workspace / "pipelines" / "first.yaml")
     with pytest.raises(KeyboardInterrupt):
         carry_out(program_of(read), workspace / "run", command="sysid run first", watchers=[stop])
     left = read_results(workspace / "run")
@@ -359,7 +360,7 @@ def test_progress_of_several_starts_never_falls(workspace: Path) -> None:
         if isinstance(event, events.StepProgress) and "closed loop" in event.step and event.fraction is not None:
             shares.append(event.fraction)
 
-    read = read_pipeline(workspace / "pipelines" / "first.yaml")
+    read = Pipeline.read(PipelineConfig, workspace / "pipelines" / "first.yaml")
     carry_out(program_of(read), workspace / "run", command="", watchers=[watch])
     assert len(shares) > 10
     assert (np.diff(shares) >= 0.0).all()

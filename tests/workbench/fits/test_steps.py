@@ -15,8 +15,9 @@ from sysid.models import ARX, ARXModel, Mapping
 from sysid.traces import Role
 from sysid.validation import CaseResult, Evaluation, Figures
 from sysid.workbench.fits import choice, steps
-from sysid.workbench.fits.config import PipelineConfig, parse_pipeline
+from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import Data, load_data
+from tests.workbench.pipelines import parse_pipeline
 
 
 def load(config: PipelineConfig, workspace: Path) -> Data:

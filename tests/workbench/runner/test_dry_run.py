@@ -12,7 +12,7 @@ import pytest
 
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.data import load_data
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner import dry_run
@@ -25,7 +25,7 @@ PIPELINE = Path("pipelines/first.yaml")
 
 
 def planned(*, fresh: bool = False) -> tuple[PlannedStep, ...]:
-    program = program_of(read_pipeline(PIPELINE))
+    program = program_of(Pipeline.read(PipelineConfig, PIPELINE))
     return foretell(program, Path("runs/first"), command="sysid run first", fresh=fresh)
 
 
@@ -95,7 +95,7 @@ def test_a_fit_that_was_cut_off_has_less_to_go(done: Path) -> None:
     store = RunFolder(path=Path("runs/first").resolve())
     (before,) = [step for step in of("Fitting") if not step.stored]
     assert before.seconds
-    read = read_pipeline(PIPELINE)
+    read = Pipeline.read(PipelineConfig, PIPELINE)
     data = load_data(read.config, beside=PIPELINE.resolve().parent, progress=lambda _: None)
     closed, opened = read.config.fits[2], read.config.fits[1]
     key = steps.fit_key(closed, read.config, data, steps.fit_key(opened, read.config, data, None))
@@ -107,7 +107,7 @@ def test_a_fit_that_was_cut_off_has_less_to_go(done: Path) -> None:
 def test_a_few_iterations_foretell_many(workspace: Path) -> None:
     change("{loop: closed, max_iterations: 8}", "{max_iterations: 300, patience: 300, tolerance: 0}")
     change("neurons: 2", "neurons: 12")
-    read = read_pipeline(PIPELINE)
+    read = Pipeline.read(PipelineConfig, PIPELINE)
     (step,) = [one for one in of("Fitting") if "closed loop" in one.step]
     found = re.fullmatch(r"at most: .+, then 300 iterations of (.+) ms, 1 at a time", step.basis)
     assert found

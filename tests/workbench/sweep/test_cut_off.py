@@ -19,8 +19,9 @@ from sysid.workbench.runner.program import carry_out
 from sysid.workbench.runner.store import RunFolder
 from sysid.workbench.sweep import trial
 from sysid.workbench.sweep.config import SweepConfig
-from sysid.workbench.sweep.run import Swept, program_of, read_sweep_file
+from sysid.workbench.sweep.run import Swept, program_of
 from sysid.workbench.sweep.store import TrialStore
+from sysid.workbench.sweep.sweep_steps import Sweep
 from sysid.workbench.sweep.trial import Bench, Job, forget_checkpoint
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
 from tests.estimation.least_squares.test_checkpoints import beside
@@ -54,7 +55,9 @@ def run(workspace: Path, folder: str) -> Swept:
     file = workspace / "pipelines" / "tries.yaml"
     file.write_text(SWEEP, encoding="utf-8")
     return carry_out(
-        program_of(read_sweep_file(file), find_workers=here), workspace / "runs" / folder, command="sysid sweep tries"
+        program_of(Sweep.read(SweepConfig, file), find_workers=here),
+        workspace / "runs" / folder,
+        command="sysid sweep tries",
     )
 
 

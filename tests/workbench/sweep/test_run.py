@@ -19,7 +19,8 @@ from sysid.workbench.cli import run_cli
 from sysid.workbench.runner.events import Event, StepProgress, Warned
 from sysid.workbench.runner.program import carry_out
 from sysid.workbench.sweep.config import SweepConfig
-from sysid.workbench.sweep.run import Swept, program_of, read_sweep_file
+from sysid.workbench.sweep.run import Swept, program_of
+from sysid.workbench.sweep.sweep_steps import Sweep
 from sysid.workbench.sweep.table import table_of_trials
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess
@@ -59,7 +60,7 @@ def run(place: Path, text: str = SWEEP, *watchers: object) -> Swept:
     file = place / "pipelines" / "tries.yaml"
     file.write_text(text, encoding="utf-8")
     return carry_out(
-        program_of(read_sweep_file(file), find_workers=here),
+        program_of(Sweep.read(SweepConfig, file), find_workers=here),
         place / "runs" / "tries",
         command="sysid sweep tries",
         watchers=watchers,

@@ -146,6 +146,7 @@ WRONG_SWEEPS = {
         "do not follow",
     ),
     "a misspelt field": ({"methd": "grid"}, "unknown field"),
+    "a rest of no output": ({"rest": {"u": 0.0}}, "rest names u, which is not the output"),
     "no range that can be read": ({"structure": CHAPTER | {"neurons": {"from": 9}}}, "is not a range"),
     "something by hand that is no structure": ({"beside": [{"kind": "NARX", "neurons": 3}]}, "lacks"),
 }
@@ -165,9 +166,10 @@ def test_validation_cases_choose_only_in_a_reproduction_that_says_so() -> None:
 @pytest.mark.parametrize("name", ["open-loop-sweep", "closed-loop-sweep"])
 def test_the_built_in_sweeps_try_five_hundred_networks(name: str) -> None:
     from sysid.workbench.fits.config import find_pipeline
-    from sysid.workbench.sweep.run import read_sweep_file
+    from sysid.workbench.sweep.config import SweepConfig
+    from sysid.workbench.sweep.sweep_steps import Sweep
 
-    config = read_sweep_file(find_pipeline(name)).config
+    config = Sweep.read(SweepConfig, find_pipeline(name)).config
     assert len(config.space().points()) == 500
     assert (config.choose.on == "cases") == (config.reproduces is not None)
 

@@ -21,7 +21,7 @@ from sysid.models import History
 from sysid.names import tracking_key
 from sysid.reporting.results import Results
 from sysid.workbench.cli import run_cli
-from sysid.workbench.fits.config import read_pipeline
+from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner.program import carry_out
 from sysid.workbench.tracking import fit_values as tracked
@@ -42,7 +42,7 @@ def track(workspace: Path, name: str = "first", *, fresh: bool = False) -> tuple
     """Run a pipeline of the workspace with a tracker."""
     told: list[str] = []
     tracker = Tracker.of_workspace(workspace, told.append)
-    read = read_pipeline(workspace / "pipelines" / f"{name}.yaml")
+    read = Pipeline.read(PipelineConfig, workspace / "pipelines" / f"{name}.yaml")
     results = carry_out(
         program_of(read), workspace / "run", command=f"sysid run {name}", fresh=fresh, watchers=[tracker]
     )
