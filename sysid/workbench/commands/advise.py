@@ -23,15 +23,7 @@ STYLES = {Verdict.LOOK.value: "bold yellow", Verdict.UNKNOWN.value: "dim", Verdi
 
 
 def advise_command(source: str, *, mapping: str | None) -> None:
-    """Show what is in a data set, and draw it beside.
-
-    Args:
-        source: A data set's name or path, or a file with traces.
-        mapping: Inputs and output; needed where the data set has more than two channels.
-
-    Raises:
-        UserError: If the data cannot be read, or the mapping is missing or wrong.
-    """
+    """Show what is in a data set, and draw it beside."""
     traces = load(source)
     found = advise(traces, mapping_of(traces, mapping, option="--mapping "))
     several = found.outputs.items() if isinstance(found, SystemAdvice) else [("", found)]

@@ -20,16 +20,7 @@ from sysid.workbench.runner.store import write_bytes
 
 
 def annotate_command(source: str, *, annotator: str, out: Path | None) -> None:
-    """Annotate a data set.
-
-    Args:
-        source: Its name, or its ``dataset.yaml``.
-        annotator: Name of the annotator.
-        out: Folder for the annotated data set; ``None`` shows the states and writes nothing.
-
-    Raises:
-        UserError: If the data set or the annotator cannot be used.
-    """
+    """Annotate a data set; without a folder the states are shown and nothing is written."""
     path = Path(source)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:
         raise ConfigError(

@@ -21,21 +21,7 @@ from sysid.workbench.runner.console import console
 
 
 def auto_command(source: str, *, given: Mapping[str, Any], fresh: bool, out: Path | None, tracking: bool) -> int:
-    """Search for a model and show how it came out.
-
-    Args:
-        source: A data set's name or path, or a file with traces.
-        given: Options of the search as they were typed; ``None`` for what was not.
-        fresh: Do everything again.
-        out: The run folder.
-        tracking: Whether trials are tracked in MLflow.
-
-    Returns:
-        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
-
-    Raises:
-        UserError: If the data cannot be read, the mapping is missing or wrong, or nothing that was tried can be used.
-    """
+    """Search for a model and show how it came out; options that were not typed are ``None`` among those given."""
     traces = load(source)
     options = {name: value for name, value in given.items() if value is not None}
     options["mapping"] = mapping_of(traces, options.get("mapping"), option="--mapping ")

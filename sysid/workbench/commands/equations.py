@@ -10,14 +10,7 @@ from sysid.workbench.kinds import DEFAULT
 
 
 def equations_command(pipeline: str) -> None:
-    """Print the fixed submodels of an assembly as equations, for a pipe or its YAML file.
-
-    Args:
-        pipeline: Its name or file.
-
-    Raises:
-        UserError: If it cannot be read, or nothing is fixed in it.
-    """
+    """Print the fixed submodels of an assembly as equations, for a pipe or its YAML file."""
     from sysid.field_checks import check
     from sysid.workbench.assembly.config import AssemblyConfig
     from sysid.workbench.assembly.extending import read_joined

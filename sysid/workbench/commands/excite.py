@@ -15,20 +15,7 @@ from sysid.workbench.runner.console import console
 def excite_command(
     kind: str, out: Path, *, given: Mapping[str, Any], span: str, band: str | None, names: str, units: str
 ) -> None:
-    """Draw an excitation and write it.
-
-    Args:
-        kind: Name of the kind.
-        out: File to write.
-        given: Length, sample time, seed and options of the kind; those that are ``None`` are as by default.
-        span: The range, ``low:high``.
-        band: In Hz, ``low:high``.
-        names: Of the channels, by commas.
-        units: Of the channels, by commas.
-
-    Raises:
-        UserError: If an option is out of range, or the file cannot be written.
-    """
+    """Draw an excitation and write it; what was not typed is ``None`` among the options given."""
     low, high = _pair(span, "--range", "two numbers, as 0:10")
     options = {key: value for key, value in given.items() if value is not None}
     if band is not None:

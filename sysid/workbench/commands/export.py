@@ -38,22 +38,7 @@ def export_command(
     doubt: Path | None = None,
     mean: Path | None = None,
 ) -> None:
-    """Export a result that is stored, in a run or in a bundle.
-
-    Args:
-        pipeline: Name or file of the pipeline, or a bundle's folder or zip.
-        fit: Name of the fit, the member or the whole.
-        out: Folder of the bundle.
-        run_folder: The run folder.
-        formats: Of a bundle what is written, with commas.
-        pack: Whether to write the bundle as one zip too.
-        doubt: A YAML with what the whole of a bundle is to doubt, as in the section ``doubt`` of a pipeline.
-        mean: A YAML with the wholes whose mean with that of a bundle is to answer, as in the section ``mean``.
-
-    Raises:
-        ConfigError: If there is no such result, or it has not been run as the pipeline now stands.
-        ParityError: If a file differs from the model by more than the tolerance.
-    """
+    """Export a result that is stored, in a run or in a bundle."""
     if fit is None and _is_bundle(Path(pipeline)):
         _tell(_renewed(find_bundle(Path(pipeline)), out, formats, doubt=doubt, mean=mean), pack=pack)
         return

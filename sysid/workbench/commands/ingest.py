@@ -32,17 +32,7 @@ _PATHS = {".yaml", ".yml", *(suffix for reader in READERS for suffix in reader.s
 def ingest_command(
     source: str, *, propose: Path | None, given: Mapping[str, Any] | None = None, split: str | None = None
 ) -> None:
-    """Show what a file or a data set holds.
-
-    Args:
-        source: A file with traces, a data set's name, or its ``dataset.yaml``.
-        propose: Where to write the proposed ``dataset.yaml``.
-        given: Options of the readers, as plain data.
-        split: Shares of the proposed cases, as ``0.7`` or ``0.6,0.2,0.2``.
-
-    Raises:
-        UserError: If it cannot be read.
-    """
+    """Show what a file or a data set holds; ``given`` are options of the readers, as plain data."""
     path = Path(source)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:
         with as_typed(whole=False):

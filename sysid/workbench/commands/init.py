@@ -12,17 +12,7 @@ from sysid.workbench.workspace import make_workspace
 
 
 def init_command(folder: Path, *, reference: str | None, wish: Wish) -> None:
-    """Make a workspace and say what to do next.
-
-    Args:
-        folder: Where.
-        reference: A slow model that the workspace is for, as :func:`~sysid.references.sources.source_of` takes it. It
-            is read, not run.
-        wish: What is said beside it.
-
-    Raises:
-        ConfigError: If one is there already, the folder cannot be written to, or something is not said.
-    """
+    """Make a workspace and say what to do next; a reference is read, not run."""
     target = console()
     if reference is None:
         no_options(wish, "the command line", "there is no --reference that ports and times could be of")

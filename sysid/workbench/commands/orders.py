@@ -32,18 +32,7 @@ ROWS = 15
 def orders_command(
     source: str, *, mapping: str | None, ranges: dict[str, int | None], structures: str = "", most: int = MOST
 ) -> None:
-    """Show which orders a data set asks for: a table on the screen, a picture beside.
-
-    Args:
-        source: A data set's name or path, or a file with traces.
-        mapping: Inputs and output; needed where the data set has more than two channels.
-        ranges: ``max_na``, ``max_nb`` and ``max_nk`` of the ARX models.
-        structures: Kinds beside ARX, with commas between; ``all`` for every one.
-        most: Largest order of those.
-
-    Raises:
-        UserError: If the data cannot be read, or the mapping is missing or wrong.
-    """
+    """Show which orders a data set asks for: a table on the screen, a picture beside."""
     traces = load(source)
     chosen = mapping_of(traces, mapping, option="--mapping ")
     kinds = (

@@ -10,15 +10,7 @@ from sysid.workbench.tracking.registry import promote
 
 
 def promote_command(name: str, *, version: str | None) -> None:
-    """Promote a version and say how to load it.
-
-    Args:
-        name: Name of the registered model, its mapping, or the pipeline or run that exported it.
-        version: The version; by default the candidate, of a pipeline or run the newest that it exported.
-
-    Raises:
-        ConfigError: If there is no such model or version.
-    """
+    """Promote a version and say how to load it."""
     done = promote(connect(store_uri(Path.cwd())), name, version)
     target = console()
     before = "" if done.before in {None, done.version} else f", in place of version {done.before}"

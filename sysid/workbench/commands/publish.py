@@ -9,17 +9,7 @@ from sysid.workbench.runner.naming import meant
 
 
 def publish_command(run_folder: Path, *, name: str | None, into: Path, bundle: bool) -> None:
-    """Publish a run.
-
-    Args:
-        run_folder: The run folder.
-        name: Name of the report; the pipeline's by default.
-        into: Folder of the published reports.
-        bundle: Whether the frozen surrogate goes with it.
-
-    Raises:
-        UserError: If the folder holds no results, or no whole bundle that was asked for.
-    """
+    """Publish a run."""
     from sysid.reporting import publish_run
 
     console().print(f"Published: {publish_run(meant(run_folder), into, name=name, bundle=bundle)}", soft_wrap=True)

@@ -9,16 +9,7 @@ from sysid.workbench.runner.naming import meant
 
 
 def report_command(run_folder: Path, *, against: Path | None, pdf: bool) -> None:
-    """Write a run's report.
-
-    Args:
-        run_folder: The run folder.
-        against: The folder of a run that it is compared with; ``None`` reports the run alone.
-        pdf: Whether to print it as PDF too.
-
-    Raises:
-        ConfigError: If a folder holds no results, the runs have nothing in common, or nothing can print.
-    """
+    """Write a run's report."""
     from sysid.reporting import write_comparison, write_pdf, write_report
 
     run = meant(run_folder)

@@ -23,17 +23,7 @@ RESULTS = "results.json"
 
 
 def response_command(model: Path, *, fit: str | None, seconds: float | None, out: Path | None) -> None:
-    """Print poles, gains and times, and write tables and pictures.
-
-    Args:
-        model: A run folder, or a bundle's folder or zip.
-        fit: Name of a fit of the run; the best by default.
-        seconds: Length of the step response.
-        out: Folder of what is written.
-
-    Raises:
-        ConfigError: If there is no such fit, or it is not linear.
-    """
+    """Print poles, gains and times, and write tables and pictures."""
     model = meant(model)
     run = (model / RESULTS).is_file()
     asked, title = (_fits(model, fit), fit or model.name) if run else (_bundle(model, fit), model.stem)

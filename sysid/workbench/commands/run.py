@@ -13,20 +13,7 @@ from sysid.workbench.runner.screen import duration, table_of_steps
 
 
 def run_command(pipeline: str, *, fresh: bool, out: Path | None, tracking: bool) -> int:
-    """Run a pipeline and show how it came out.
-
-    Args:
-        pipeline: Its name or file.
-        fresh: Do everything again.
-        out: The run folder.
-        tracking: Whether fits are tracked in MLflow.
-
-    Returns:
-        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
-
-    Raises:
-        UserError: If the pipeline, its data or its options cannot be used.
-    """
+    """Run a pipeline and show how it came out."""
     return run_request(
         RunRequest(path=find_pipeline(pipeline), typed=pipeline, fresh=fresh, out=out, tracking=tracking)
     )
@@ -48,16 +35,7 @@ def run_request(request: RunRequest) -> int:
 
 
 def plan_command(pipeline: str, *, fresh: bool, out: Path | None) -> None:
-    """Say what a run would do and how long it would take, without doing it.
-
-    Args:
-        pipeline: Its name or file.
-        fresh: Whether everything would be done again.
-        out: The run folder.
-
-    Raises:
-        UserError: If the pipeline, its data or its options cannot be used.
-    """
+    """Say what a run would do and how long it would take, without doing it."""
     request = RunRequest(path=find_pipeline(pipeline), typed=pipeline, fresh=fresh, out=out)
     planned = foresee(kinds()[kind_of(request.path)].load_program()(request), request)
     target, whole = console(), together(planned)

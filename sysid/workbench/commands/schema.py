@@ -11,11 +11,7 @@ from sysid.workbench.schemas import write_schemas
 
 
 def schema_command(folder: Path) -> None:
-    """Write the schemas of data sets and pipelines into a workspace, in place of older ones.
-
-    Args:
-        folder: The workspace.
-    """
+    """Write the schemas of data sets and pipelines into a workspace, in place of older ones."""
     for file in write_schemas(folder):
         console().print(f"Wrote {file}", soft_wrap=True)
 

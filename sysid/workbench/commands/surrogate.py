@@ -18,26 +18,9 @@ def surrogate_command(
     source: str, wish: Wish, *, minutes: float, proof: int | None, rounds: int | None, workers: int | None, seed: int,
     out: Path | None, tracking: bool, began: float,
 ) -> int:  # fmt: skip
-    """Make a surrogate and say how it does.
+    """Make a surrogate and say how it does; ``began`` is when the time began, by ``time.monotonic``.
 
-    Args:
-        source: A reference, as :func:`~sysid.references.sources.source_of` takes it, or a pipeline of kind
-            ``experiment``. **It is code, and is run.**
-        wish: What is said beside a reference.
-        minutes: Time for all.
-        proof: New experiments.
-        rounds: Rounds of added experiments, in place of those of the pipeline.
-        workers: Processes; as the pipeline says, and two of a reference, by default.
-        seed: Of everything random.
-        out: Folder of the results.
-        tracking: Whether fits are tracked.
-        began: When the time began, by ``time.monotonic``.
-
-    Returns:
-        Exit code.
-
-    Raises:
-        UserError: If the reference cannot be used, or does not say enough.
+    The source **is code, and is run**.
     """
     listeners = Listeners.of(tracking=tracking)
     target = listeners.target

@@ -18,22 +18,7 @@ from sysid.workbench.sweep.sweep_steps import Sweep
 def sweep_command(
     pipeline: str, *, workers: int | None, resume: bool, fresh: bool, out: Path | None, tracking: bool
 ) -> int:
-    """Run a sweep and show how it came out.
-
-    Args:
-        pipeline: Its name or file.
-        workers: Processes that train; what the YAML says by default.
-        resume: Only go on with a sweep that was begun.
-        fresh: Do everything again.
-        out: The run folder.
-        tracking: Whether trials are tracked in MLflow.
-
-    Returns:
-        Exit code: 0, or 1 if everything is done and stored but something could not be tracked.
-
-    Raises:
-        UserError: If the pipeline is no sweep, cannot be used, or there is nothing to go on with.
-    """
+    """Run a sweep and show how it came out."""
     path = find_pipeline(pipeline)
     kind = kind_of(path)
     if kind != "sweep":

@@ -29,18 +29,7 @@ START_LIMIT_S = 60.0
 
 
 def ui_command(port: int, *, browser: bool) -> int:
-    """Serve the tracking store until Ctrl-C.
-
-    Args:
-        port: The port to begin looking at.
-        browser: Whether to open a browser.
-
-    Returns:
-        Exit code.
-
-    Raises:
-        SysidError: If the server does not come up.
-    """
+    """Serve the tracking store until Ctrl-C."""
     uri, target = store_uri(Path.cwd()), console()
     experiment = latest_experiment(uri)
     if uri.startswith(("http://", "https://")):

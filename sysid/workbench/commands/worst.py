@@ -25,20 +25,7 @@ QUANTILES = (0.5, 0.9, 0.99)
 
 
 def worst_command(bundle: Path, *, like: str, case: str | None, seeds: str, output: str, keep: int, into: Path) -> None:
-    """Run a surrogate beside the reference on new sequences, and write those that it is worst at as a data set.
-
-    Args:
-        bundle: The surrogate: folder or zip of its bundle.
-        like: Data set as one of whose cases the sequences are drawn.
-        case: That case; the first by default.
-        seeds: Seeds of the new sequences, as ``130000:132999``.
-        output: The output that counts.
-        keep: How many are kept.
-        into: Folder of the data set that is written.
-
-    Raises:
-        UserError: If bundle, data set or options cannot be used.
-    """
+    """Run a surrogate beside the reference on new sequences, and write those that it is worst at as a data set."""
     numbers, file, source = _seeds(seeds), into / "dataset.yaml", find_dataset(like)
     if file.exists():
         raise ConfigError("there is a data set already", where=file, remedy="name another folder with --into")
