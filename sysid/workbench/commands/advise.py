@@ -14,10 +14,9 @@ from sysid.names import slug
 from sysid.reporting.advice.words import lines
 from sysid.reporting.figures.advice_figure import advice_figure
 from sysid.reporting.figures.style import styled
-from sysid.reporting.figures.svg import as_file, svg
+from sysid.reporting.figures.svg import svg
+from sysid.workbench.commands.pictures import kept_picture
 from sysid.workbench.runner.console import console
-from sysid.workbench.runner.naming import nearby
-from sysid.workbench.runner.store import write_bytes
 
 STYLES = {Verdict.LOOK.value: "bold yellow", Verdict.UNKNOWN.value: "dim", Verdict.FINE.value: "green"}
 
@@ -53,10 +52,4 @@ def _picture(found: Advice, which: str) -> str:
         return "none, as there is no response to draw"
     with styled():
         drawing = svg(figure, title=f"First look at {found.data}", description=str(found.mapping), name="advice")
-    target = Path(f"{slug(found.data)}{which}.advice.svg")
-    try:
-        write_bytes(target, as_file(drawing))
-    except OSError as error:
-        # A folder that is not ours to write in shall still be looked into.
-        return f"none, as {target} cannot be written ({error.strerror})"
-    return str(nearby(target))
+    return kept_picture(Path(f"{slug(found.data)}{which}.advice.svg"), drawing)

@@ -16,9 +16,9 @@ from sysid.ingest.assembling.in_units import stamps_in_seconds
 from sysid.ingest.inspecting.findings import ColumnFinding
 from sysid.ingest.readers.text_source import bare_stem
 from sysid.reporting.figures.record_picture import record_picture
-from sysid.reporting.figures.svg import as_file
 from sysid.traces import TraceSet
 from sysid.units import Reference
+from sysid.workbench.commands.pictures import kept_picture
 from sysid.workbench.commands.reader_options import as_typed, files_from
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import nearby
@@ -162,13 +162,7 @@ def _picture(found: FileFinding, folder: Path) -> str:
         title=found.path.name,
         description=", ".join(labels.values()),
     )
-    target = folder / f"{bare_stem(found.path)}.ingest.svg"
-    try:
-        write_bytes(target, as_file(drawing))
-    except OSError as error:
-        # A folder that is not ours to write in shall still be looked into.
-        return f"none, as {target} cannot be written ({error.strerror})"
-    return str(target)
+    return kept_picture(folder / f"{bare_stem(found.path)}.ingest.svg", drawing)
 
 
 def _show_dataset(traces: TraceSet, path: Path) -> None:

@@ -16,14 +16,13 @@ from sysid.estimation.linear.order_search import Criterion
 from sysid.models import AbstractStructure
 from sysid.names import slug
 from sysid.reporting.figures.style import styled
-from sysid.reporting.figures.svg import as_file, svg
+from sysid.reporting.figures.svg import svg
 from sysid.reporting.numbers import number, pole
 from sysid.units import squared
 from sysid.validation.metrics import percent
 from sysid.validation.structure_search import KINDS, MOST
+from sysid.workbench.commands.pictures import kept_picture
 from sysid.workbench.runner.console import console
-from sysid.workbench.runner.naming import nearby
-from sysid.workbench.runner.store import write_bytes
 
 ROWS = 15
 """Structures that the table shows."""
@@ -45,9 +44,8 @@ def orders_command(
         console().print(f"note: {note}", soft_wrap=True)
     with styled():
         drawing = svg(found.plot(), title="Orders", description=f"Loss against size, {chosen}", name="orders")
-    picture = Path(f"{slug(traces.name)}.orders.svg")
-    write_bytes(picture, as_file(drawing))
-    console().print(f"picture: {nearby(picture)}", soft_wrap=True)
+    picture = kept_picture(Path(f"{slug(traces.name)}.orders.svg"), drawing)
+    console().print(f"picture: {picture}", soft_wrap=True, markup=False)
     if found.states is not None:
         sizes = ", ".join(f"{size:.3f}" for size in found.states.correlations[: most + 3])
         console().print(f"canonical correlations of past and future: {sizes}: those that stand out are states")
