@@ -11,7 +11,6 @@ from typing import Any, Protocol
 from pydantic import BaseModel
 
 from sysid.models import AbstractModel, Cascade, Interpolation
-from sysid.plugins import find_plugin
 from sysid.workbench.runner.kept_steps import KeptStep
 
 GROUP = "sysid.judges"
@@ -41,20 +40,3 @@ class Judge(Protocol):
 
     def document(self, options: Any, subjects: Subjects, results: Mapping[str, Any]) -> dict[str, Any]:
         """All results, by name of their step, as :class:`sysid.reporting.judging.results.JudgementRecord` has them."""
-
-
-def find_judge(name: str, *, where: object) -> Judge:
-    """The judge of a name.
-
-    Args:
-        name: Kind of the pipeline.
-        where: The file that asks for it, for errors.
-
-    Returns:
-        The judge.
-
-    Raises:
-        ConfigError: If none of that name is installed.
-    """
-    judge: Judge = find_plugin(GROUP, name, what="judge", where=where)
-    return judge

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from sysid.errors import ConfigError
 from sysid.field_checks import check
 from sysid.names import slug
+from sysid.plugins import find_plugin
 from sysid.reporting.judging.results import FOLDER, JudgementResults, SubjectRecord, parse_judgement
 from sysid.reporting.judging.tables import judgement_headline
 from sysid.reporting.records import DataSetRecord
 from sysid.workbench.judging.config import JudgementConfig
-from sysid.workbench.judging.judge import Judge, find_judge
+from sysid.workbench.judging.judge import GROUP, Judge
 from sysid.workbench.judging.sources import Found, find_model, run_folder_of
 from sysid.workbench.runner.events import JudgementReady, Warned
 from sysid.workbench.runner.kept_steps import kept_steps
@@ -49,7 +50,7 @@ def program(request: RunRequest) -> Program[JudgementResults]:
     """
     written = Written.read(JudgementConfig, request.path)
     config = written.config
-    judge = find_judge(config.kind, where=request.path)
+    judge: Judge = find_plugin(GROUP, config.kind, what="judge", where=request.path)
     for subject in config.subjects:
         for part in subject.parts:
             check(judge.part_options, part.options, where=f"{request.path}, {subject.name}, options")

@@ -10,7 +10,6 @@ from typing import Any, Protocol
 
 from pydantic import BaseModel
 
-from sysid.plugins import find_plugin
 from sysid.workbench.runner.kept_steps import KeptStep
 
 GROUP = "sysid.makers"
@@ -31,20 +30,3 @@ class Maker(Protocol):
 
     def dataset(self, options: Any, results: Mapping[str, Any]) -> dict[str, Any]:
         """The data set of all results, by name of their step: the fields of a ``dataset.yaml`` but for its name."""
-
-
-def find_maker(name: str, *, where: object) -> Maker:
-    """The maker of a name.
-
-    Args:
-        name: Kind of the pipeline.
-        where: The file that asks for it, for errors.
-
-    Returns:
-        The maker.
-
-    Raises:
-        ConfigError: If none of that name is installed.
-    """
-    maker: Maker = find_plugin(GROUP, name, what="maker", where=where)
-    return maker

@@ -11,9 +11,10 @@ import yaml
 
 from sysid.field_checks import check
 from sysid.ingest import load_dataset
+from sysid.plugins import find_plugin
 from sysid.traces import TraceSet
 from sysid.workbench.making.config import MakingConfig
-from sysid.workbench.making.maker import Maker, find_maker
+from sysid.workbench.making.maker import GROUP, Maker
 from sysid.workbench.runner.kept_steps import kept_steps
 from sysid.workbench.runner.naming import cases_of
 from sysid.workbench.runner.program import Closing, Program
@@ -44,7 +45,7 @@ def program(request: RunRequest) -> Program[TraceSet]:
     """
     written = Written.read(MakingConfig, request.path)
     config = written.config
-    maker = find_maker(config.kind, where=request.path)
+    maker: Maker = find_plugin(GROUP, config.kind, what="maker", where=request.path)
     options = check(maker.options, config.options, where=f"{request.path}, options")
     work = _Making(config=config, maker=maker, options=options)
     return Program(

@@ -104,7 +104,7 @@ class OvershootJudge:
 @pytest.fixture
 def judge(monkeypatch: pytest.MonkeyPatch) -> OvershootJudge:
     found = OvershootJudge()
-    monkeypatch.setattr(runner, "find_judge", lambda *_, **__: found)
+    monkeypatch.setattr(runner, "find_plugin", lambda *_, **__: found)
     return found
 
 

@@ -65,7 +65,7 @@ class RampMaker:
 def test_the_product_is_a_data_set_that_loads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     maker, file = RampMaker(tmp_path), tmp_path / "ramp.yaml"
     file.write_text(PIPELINE, encoding="utf-8")
-    monkeypatch.setattr(runner, "find_maker", lambda *_, **__: maker)
+    monkeypatch.setattr(runner, "find_plugin", lambda *_, **__: maker)
     for _ in range(2):
         request = RunRequest(path=file, typed="ramp.yaml", out=tmp_path / "made")
         assert perform(runner.program(request), request) == 0
