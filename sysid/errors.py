@@ -134,7 +134,15 @@ class SysidError(Exception):
 
     @classmethod
     def unknown(
-        cls, what: str, given: str, known: Iterable[str], otherwise: str, *, where: object = None, none: str = ""
+        cls,
+        what: str,
+        given: str,
+        known: Iterable[str],
+        otherwise: str,
+        *,
+        where: object = None,
+        none: str = "",
+        also: Mapping[str, Sequence[str]] | None = None,
     ) -> Self:
         """Of a word that is none of those that are known.
 
@@ -145,6 +153,7 @@ class SysidError(Exception):
             otherwise: What to do where none of them was probably meant.
             where: Where it stands.
             none: What would be accepted where nothing is known.
+            also: What other words mean, as of other tools.
 
         Returns:
             The error, which tells what is known, and which of it was probably meant.
@@ -158,7 +167,8 @@ class SysidError(Exception):
         """
         names = list(known)
         expected = f"one of {', '.join(names)}" if names or not none else none
-        return cls(what, where=where, expected=expected, got=given, remedy=did_you_mean(given, names, otherwise))
+        remedy = did_you_mean(given, names, otherwise, also=also)
+        return cls(what, where=where, expected=expected, got=given, remedy=remedy)
 
 
 class UserError(SysidError):

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.export.c.arduino_exporter import ArduinoExporter
 from sysid.export.c.cpp_exporter import CppExporter
 from sysid.export.c.exporter import CExporter
@@ -144,9 +144,6 @@ def exporter(name: str) -> AbstractExporter:
     try:
         return EXPORTERS[name]
     except KeyError:
-        raise ConfigError(
-            "unknown export format",
-            expected=f"one of {', '.join(EXPORTERS)}",
-            got=name,
-            remedy=did_you_mean(name, EXPORTERS, "correct the name in formats", also=ELSEWHERE),
+        raise ConfigError.unknown(
+            "unknown export format", name, EXPORTERS, "correct the name in formats", also=ELSEWHERE
         ) from None

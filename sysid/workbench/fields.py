@@ -107,12 +107,8 @@ def _structure(value: object) -> AbstractStructure:
     parameters = inspect.signature(STRUCTURES[kind]).parameters
     for name in value:
         if name != "kind" and name not in parameters:
-            raise FieldError(
-                f"unknown field {name!r} of the structure {kind}",
-                expected=f"one of {', '.join(parameters)}",
-                got=str(name),
-                remedy=did_you_mean(name, parameters, "remove it"),
-            )
+            what = f"unknown field {name!r} of the structure {kind}"
+            raise as_field_error(ConfigError.unknown(what, name, parameters, "remove it"))
     missing = [p.name for p in parameters.values() if p.default is p.empty and p.name not in value]
     if missing:
         raise FieldError(
@@ -354,12 +350,8 @@ def options_config(structure: AbstractStructure, value: object) -> Any:
     named: Dict[str, Any] = with_new_words(value, getattr(config, "OLD", {}))
     for name in named:
         if name not in config.model_fields:
-            raise FieldError(
-                f"unknown field {name!r}",
-                expected=f"one of {', '.join(config.model_fields)}",
-                got=str(name),
-                remedy=did_you_mean(name, config.model_fields, f"remove it: {row.name} has no such option"),
-            )
+            otherwise = f"remove it: {row.name} has no such option"
+            raise as_field_error(ConfigError.unknown(f"unknown field {name!r}", name, config.model_fields, otherwise))
     checked = config.model_validate(named)
     try:
         row.options(given_options(checked), seed=0)

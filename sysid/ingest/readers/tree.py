@@ -14,7 +14,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from sysid.errors import ReaderError, did_you_mean
+from sysid.errors import ReaderError
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.readers.forms import understood
 from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, step_in, texts_of
@@ -110,13 +110,8 @@ def _group(tree: Any, name: str, walk: _Walk, step: float | None) -> tuple[Any, 
             match = max(heads, key=lambda pair: len(pair[0]), default=None)
         if match is None:
             names = list(_group_names(tree, walk.separator))[:40]
-            raise ReaderError(
-                f"there is no group {name}",
-                where=walk.where,
-                expected=f"one of {', '.join(names) or 'none: all stands at the top'}",
-                got=name,
-                remedy=did_you_mean(name, names, "correct group, or leave it out"),
-            )
+            otherwise, none = "correct group, or leave it out", "none: all stands at the top"
+            raise ReaderError.unknown(f"there is no group {name}", name, names, otherwise, where=walk.where, none=none)
         rest, here = rest[len(match[0]) :].removeprefix(walk.separator), match[1]
         beside = walk.step_beside(here, beside)
     return here, beside

@@ -7,7 +7,7 @@ from collections.abc import Mapping as Dict
 from dataclasses import dataclass, fields
 from typing import Any
 
-from sysid.errors import ConfigError, did_you_mean, shortened
+from sysid.errors import ConfigError, shortened
 
 MOST_PARAMETERS = 500
 CASE = "case"
@@ -172,10 +172,7 @@ def entries(given: Any, kind: Any, where: str) -> tuple[Any, ...]:
         written = entry if isinstance(entry, Dict) else {"start": entry}
         for key in written:
             if key not in known:
-                raise ConfigError(
-                    f"unknown field {key!r}", where=f"{where}, {name}", expected=f"one of {', '.join(known)}",
-                    got=shortened(key), remedy=did_you_mean(key, known, "remove it"),
-                )  # fmt: skip
+                raise ConfigError.unknown(f"unknown field {key!r}", key, known, "remove it", where=f"{where}, {name}")
         if "start" not in written:
             raise ConfigError(
                 f"{name} has no start", where=f"{where}, {name}", expected="a start, as in {start: 0.5}",

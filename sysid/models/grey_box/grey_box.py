@@ -127,10 +127,9 @@ class GreyBox(AbstractStructure):
         known = (*system.states, *past)
         for one in self._states_given:
             if one.name not in known:
-                raise ConfigError(
-                    f"{one.name} is no state", where="initial", expected=f"one of {', '.join(known) or 'none'}",
-                    got=one.name, remedy=did_you_mean(one.name, known, "remove it"),
-                )  # fmt: skip
+                raise ConfigError.unknown(
+                    f"{one.name} is no state", one.name, known, "remove it", where="initial", none="none"
+                )
 
     @property
     def named(self) -> tuple[Parameter, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.api.responses import bode, poles, step
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
@@ -52,13 +52,8 @@ def _fits(folder: Path, name: str | None) -> list[FitResult]:
     wanted = name or (best.system or best.name if best is not None else "")
     known = dict.fromkeys(one for fit in results.fits for one in (fit.system, fit.name) if one)
     if wanted not in known:
-        raise ConfigError(
-            f"there is no fit named {wanted}",
-            where=folder,
-            expected=f"one of {'; '.join(known)}",
-            got=wanted,
-            remedy=did_you_mean(wanted, known, "name one of them with --fit"),
-        )
+        otherwise = "name one of them with --fit"
+        raise ConfigError.unknown(f"there is no fit named {wanted}", wanted, known, otherwise, where=folder)
     slugs = dict.fromkeys(one.model_slug or one.slug for one in results.fits if wanted in {one.system, one.name})
     return [read_fit(RunFolder(path=folder).fit(place)) for place in slugs]
 

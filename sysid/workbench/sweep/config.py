@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, field_validator, model_validator
 
-from sysid.errors import ConfigError, did_you_mean
+from sysid.errors import ConfigError
 from sysid.estimation import Training
 from sysid.field_checks import FieldError
 from sysid.reporting.sweep_record import FIGURES
@@ -91,12 +91,7 @@ class MethodConfig(BaseModel):
 
 def _figure(name: str) -> str:
     if name not in FIGURES:
-        raise FieldError(
-            "unknown figure of merit",
-            expected=f"one of {', '.join(FIGURES)}",
-            got=repr(name),
-            remedy=did_you_mean(name, FIGURES, "choose one of these"),
-        )
+        raise as_field_error(ConfigError.unknown("unknown figure of merit", name, FIGURES, "choose one of these"))
     return name
 
 
