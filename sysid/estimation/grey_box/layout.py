@@ -12,7 +12,7 @@ from sysid.equations import Net
 from sysid.estimation.grey_box.preparing import WINDOW
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.networks.initialise import AbstractLayout
+from sysid.estimation.networks.initialise import AbstractLayout, spread
 from sysid.estimation.parameters.named import FLAT_ALPHA, Named, precision_of
 
 Array = NDArray[np.float64]
@@ -73,16 +73,10 @@ class EquationLayout(AbstractLayout):
         return np.asarray(self.begun[:p] * self.provider.scale)
 
     def prior(self, centre: Array, *, alpha: float, beta: float) -> Prior:
-        """The prior a fit begins with.
+        """The prior a fit begins with; see the base class.
 
-        Args:
-            centre: What the parameters are drawn to.
-            alpha: Precision of the networks' weights.
-            beta: Precision of the residuals.
-
-        Returns:
-            The prior: what is declared of a parameter is known, of the others and of initial states nothing is, and
-            the networks' weights are the evidence's.
+        What is declared of a parameter is known, of the others and of initial states nothing is, and the networks'
+        weights are the evidence's.
         """
         p, w = len(self.provider.scale), self.first_weight
         vague = [one.place for one in self.named if one.parameter.prior is None]
@@ -108,37 +102,17 @@ class EquationLayout(AbstractLayout):
         )
 
     def draw(self, rng: np.random.Generator, centre: Array) -> Array:
-        """Networks of hidden weights after Nguyen and Widrow 1990 that hardly do anything, the rest as it is.
-
-        Args:
-            rng: Source of randomness.
-            centre: What is trained.
-
-        Returns:
-            What is trained.
-        """
+        """Networks that hardly do anything, the rest as it is; see the base class."""
         theta, w = centre.copy(), self.first_weight
         for net in self.nets:
             k, n = net.neurons, net.arguments
-            directions = rng.uniform(-1.0, 1.0, (k, n))
-            length = 0.7 * k ** (1.0 / n)
-            weights = length * directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
-            biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
+            weights, biases = spread(rng.uniform(-1.0, 1.0, (k, n)), n)
             theta[w + net.hidden.start : w + net.hidden.stop] = np.column_stack([weights, biases]).ravel()
             theta[w + net.readout.start : w + net.readout.stop] = READOUT_SPREAD * rng.standard_normal(k)
         return theta
 
     def start(self, number: int, rng: np.random.Generator, centre: Array) -> tuple[Array, Array]:
-        """The declared start first, and parameters around it after; the initial states suit each.
-
-        Args:
-            number: Which start, from 0 on.
-            rng: Source of randomness.
-            centre: Ignored: initial states are no parameters of the model.
-
-        Returns:
-            What is trained, and what it is drawn to.
-        """
+        """The declared start first, and parameters around it after; initial states suit each. See the base class."""
         del centre
         begun = self.draw(rng, self.begun)
         if number < len(self.begins):

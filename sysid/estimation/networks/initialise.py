@@ -18,6 +18,23 @@ READOUT_SPREAD = 1e-3
 with gradients that mean something."""
 
 
+def spread(directions: NDArray[np.float64], reads: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A hidden layer after Nguyen and Widrow 1990: its active regions tile the unit cube of what it reads.
+
+    Args:
+        directions: Of the weights of each neuron, shape ``(neurons, n)``; of any length.
+        reads: Dimensions of the cube.
+
+    Returns:
+        Weights of length ``0.7 * neurons ** (1 / reads)``, of the same shape, and the biases, spread over it.
+    """
+    neurons = len(directions)
+    length = 0.7 * neurons ** (1.0 / reads)
+    weights = length * directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
+    biases = length * np.linspace(-1.0, 1.0, neurons) * np.sign(weights[:, 0]) if neurons > 1 else np.zeros(1)
+    return weights, biases
+
+
 class AbstractLayout(ABC):
     """Where the parameters of a network stand: what draws them, where they start."""
 
@@ -190,16 +207,7 @@ class Layout(AbstractLayout):
         return centre
 
     def prior(self, centre: NDArray[np.float64], *, alpha: float, beta: float) -> Prior:
-        """The prior a fit begins with.
-
-        Args:
-            centre: What the parameters are drawn to, shape ``(n_parameters,)``.
-            alpha: Precision of every group.
-            beta: Precision of the residuals.
-
-        Returns:
-            The prior.
-        """
+        """The prior a fit begins with, its groups those of :meth:`groups`; see the base class."""
         groups = self.groups()
         return Prior(centre=centre, groups=groups, alphas=np.full(len(groups), alpha), beta=beta)
 
@@ -229,25 +237,11 @@ class Layout(AbstractLayout):
         return tuple(Group(name=before + name, members=first + at) for name, at in members.items() if len(at))
 
     def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A random start after Nguyen and Widrow 1990.
-
-        Directions are random, their length ``0.7 * neurons ** (1 / n_regressors)`` and the biases spread over it,
-        so that the active regions of the neurons tile the unit cube in which scaled regressors lie.
-
-        Args:
-            rng: Source of randomness.
-            centre: Where the linear part starts, shape ``(n_parameters,)``.
-
-        Returns:
-            Flat parameters.
-        """
+        """A random start, the linear part where it is; see the base class."""
         r, k = self.lags.n_regressors, self.neurons
         theta = centre.copy()
         if k:
-            directions = rng.uniform(-1.0, 1.0, (k, r))
-            length = 0.7 * k ** (1.0 / r)
-            weights = length * directions / np.linalg.norm(directions, axis=1, keepdims=True)
-            biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
+            weights, biases = spread(rng.uniform(-1.0, 1.0, (k, r)), r)
             theta[self.hidden] = np.concatenate([weights.ravel(), biases])
             theta[self.readout] = READOUT_SPREAD * rng.standard_normal(k * len(self.outputs))
             theta[self.gates] = READOUT_SPREAD * rng.standard_normal(self.gates.stop - self.gates.start)

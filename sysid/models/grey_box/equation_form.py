@@ -128,13 +128,6 @@ class EquationForm(EquationPrograms):
     def cased(self, history: History, case: str) -> History:
         """The history before a record, with the values of its case: known, or shown by the samples of the history.
 
-        Args:
-            history: The samples.
-            case: Name of the record.
-
-        Returns:
-            The history; as it is where no parameter differs by case.
-
         Raises:
             ConfigError: If the case was not fitted, and the history is a single sample.
             TraceError: If the samples of one that was not fitted do not show a value.

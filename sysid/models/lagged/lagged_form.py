@@ -143,13 +143,8 @@ class AbstractLaggedForm(AbstractForm):
     def refined(self, history: History) -> History:
         """Past outputs by Gauss-Newton on those before the first row, followed by the free run from there.
 
-        Masked outputs take no part. A single Gauss-Newton step is exact for a linear model.
-
-        Args:
-            history: Measured samples, oldest first.
-
-        Returns:
-            The history with the model's own outputs; as it is where it is no longer than the lags, or the run is lost.
+        Masked outputs take no part. A single Gauss-Newton step is exact for a linear model. The history is as it is
+        where it is no longer than the lags, or the run is lost; see the base class.
         """
         depth, own, n = self.columns.lags.depth, self._own, len(history.output)
         if own == 0 or n <= depth:

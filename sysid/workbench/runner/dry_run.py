@@ -78,14 +78,7 @@ class DryRun(Run):
             raise NotKnownError("work between the steps")
 
     def do(self, step: Step[T]) -> Done[T]:
-        """Look at a step.
-
-        Args:
-            step: The step.
-
-        Returns:
-            Its result, if that is stored or at hand; otherwise what raises :class:`NotKnownError` when it is asked for.
-        """
+        """Look at a step; what is neither stored nor at hand raises :class:`NotKnownError` when it is asked for."""
         done = self._looked_at(step)
         self.seen[step.name] = done
         return done
@@ -113,15 +106,7 @@ class DryRun(Run):
         return Done(step=step, get=unknown, find_key=find_key, stored=False)
 
     def do_all(self, title: str, steps: Sequence[Step[T]]) -> list[Done[T]]:
-        """Look at many small steps, which are told as one.
-
-        Args:
-            title: What they are together, for people.
-            steps: The steps.
-
-        Returns:
-            Their results, as :meth:`do` gives them.
-        """
+        """Look at many small steps, which are told as one; see the base class."""
         before = dict(self.planned)
         done = [self.do(step) for step in steps]
         each = [one for name, one in self.planned.items() if name not in before]

@@ -28,25 +28,11 @@ class LevenbergDamping(AbstractDamping):
     factor: float = 0.005
 
     def scaled_by(self, diagonal: NDArray[np.float64]) -> Self:
-        """The same damping for every parameter.
-
-        Args:
-            diagonal: Diagonal of the penalised Gauss-Newton matrix, shape ``(n_parameters,)``; its size alone counts.
-
-        Returns:
-            The damping for the next step.
-        """
+        """The same damping for every parameter: of the diagonal the size alone counts; see the base class."""
         return replace(self, scale=np.ones_like(diagonal))
 
     def accepted(self, gain: float) -> Self:  # noqa: ARG002 - it does not ask how good the step was
-        """A tenth.
-
-        Args:
-            gain: Actual over predicted decrease of the loss.
-
-        Returns:
-            The damping.
-        """
+        """A tenth; see the base class."""
         return replace(self, factor=max(0.1 * self.factor, 1e-12))
 
     def rejected(self) -> Self:

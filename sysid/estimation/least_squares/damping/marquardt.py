@@ -33,28 +33,14 @@ class MarquardtDamping(AbstractDamping):
     growth: float = 2.0
 
     def scaled_by(self, diagonal: NDArray[np.float64]) -> Self:
-        """The damping with its scale raised to this diagonal.
-
-        Args:
-            diagonal: Diagonal of the penalised Gauss-Newton matrix, shape ``(n_parameters,)``.
-
-        Returns:
-            The damping for the next step.
-        """
+        """The damping with its scale raised to this diagonal; see the base class."""
         # A slow forgetting of the running maximum: the free run's curvature falls by orders of magnitude once an
         # unstable start has been tamed, and a scale that remembers it for ever would freeze those parameters.
         scale = diagonal if self.scale is None else np.maximum(diagonal, 0.5 * self.scale)
         return replace(self, scale=scale)
 
     def accepted(self, gain: float) -> Self:
-        """The damping after a step that was taken.
-
-        Args:
-            gain: Actual over predicted decrease of the loss.
-
-        Returns:
-            Smaller damping the better the prediction was.
-        """
+        """Smaller damping the better the prediction was; see the base class."""
         return replace(self, factor=max(self.factor * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 1e-12), growth=2.0)
 
     def rejected(self) -> Self:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.networks.initialise import AbstractLayout
+from sysid.estimation.networks.initialise import AbstractLayout, spread
 from sysid.estimation.networks.neural.start import FLAT_ALPHA, LARGEST_POLE
 from sysid.models.networks.neural_sizes import Sizes
 
@@ -63,13 +63,7 @@ class NeuralLayout(AbstractLayout):
     def prior(self, centre: NDArray[np.float64], *, alpha: float, beta: float) -> Prior:
         """The prior a fit begins with; one group for each column of the hidden weights, as for NARX.
 
-        Args:
-            centre: What the parameters are drawn to, those of the records' initial states too.
-            alpha: Precision of every group but those of initial states, which are nearly free.
-            beta: Precision of the residuals.
-
-        Returns:
-            The prior.
+        The precision of initial states is its own: they are nearly free. See the base class.
         """
         s = self.sizes
         places = np.arange(len(centre))
@@ -100,13 +94,7 @@ class NeuralLayout(AbstractLayout):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The linear model for the first start; in turn random dynamics, and the linear model with loud neurons, after.
 
-        Args:
-            number: Which start, from 0 on.
-            rng: Source of randomness.
-            centre: Ignored: each start is drawn to its own linear model.
-
-        Returns:
-            Flat parameters, and what they are drawn to.
+        Each is drawn to its own linear model; see the base class.
         """
         if number == 0:
             return self.draw(rng, self.base), self.base
@@ -180,16 +168,9 @@ class NeuralLayout(AbstractLayout):
         return base
 
     def draw(self, rng: np.random.Generator, centre: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The linear model with neurons that hardly do anything: hidden weights after Nguyen and Widrow 1990.
+        """The linear model with neurons that hardly do anything; see the base class.
 
         States and inputs are taken to have the range 1.
-
-        Args:
-            rng: Source of randomness.
-            centre: The linear model, shape ``(n_parameters,)``.
-
-        Returns:
-            Flat parameters.
         """
         s = self.sizes
         theta = centre.copy()
@@ -201,10 +182,7 @@ class NeuralLayout(AbstractLayout):
         ):
             if k == 0:
                 continue
-            directions = rng.uniform(-1.0, 1.0, (k, n)) @ read
-            length = 0.7 * k ** (1.0 / n)
-            weights = length * directions / np.linalg.norm(directions, axis=1, keepdims=True)
-            biases = length * np.linspace(-1.0, 1.0, k) * np.sign(weights[:, 0]) if k > 1 else np.zeros(1)
+            weights, biases = spread(rng.uniform(-1.0, 1.0, (k, n)) @ read, n)
             theta[hidden] = np.column_stack([weights, biases]).ravel()
             theta[readout] = READOUT_SPREAD * rng.standard_normal(readout.stop - readout.start)
         return s.hold(theta)
