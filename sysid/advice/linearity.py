@@ -62,15 +62,8 @@ def _unknown(reason: str) -> Finding:
     return Finding(topic=Topic.LINEARITY, code="linearity.unknown", verdict=Verdict.UNKNOWN, reason=reason)
 
 
-def period_of(u: NDArray[np.float64]) -> int:
-    """The period of a signal.
-
-    Args:
-        u: Shape ``(n,)``.
-
-    Returns:
-        In samples; 0 where it does not come twice, to a thousandth of its size.
-    """
+def _period_of(u: NDArray[np.float64]) -> int:
+    """The period of a signal in samples; 0 where it does not come twice, to a thousandth of its size."""
     n = len(u)
     x = u - u.mean()
     power = float(x @ x)
@@ -93,7 +86,7 @@ def _periodic(record: Record) -> Finding | None:
         return None
     j = record.mapping.inputs.index(record.moving[0])
     segment = max(record.segments, key=len)
-    period = period_of(segment.inputs[: 2**18, j])
+    period = _period_of(segment.inputs[: 2**18, j])
     if period < 4 * NEIGHBOURS or len(segment) < 2 * period:
         return None
     # Between lines that lie so far apart a response is no parabola: its own bends would pass for distortion.

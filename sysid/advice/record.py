@@ -175,7 +175,7 @@ class Record:
             return self.some, 1
         seen, most, explained = _seen(found), (self.some, 1), found.explained
         for factor in SLOWER:
-            slow = blocks_of(self.traces, factor, self.mapping.output)
+            slow = _blocks_of(self.traces, factor, self.mapping.output)
             if sum(map(len, slow)) < FEWEST_BLOCKS:
                 break
             other = Record(traces=slow, mapping=self.some.mapping)
@@ -197,7 +197,7 @@ class Record:
         if isinstance(found, str) or (found.settled and not self.lasts):
             return False
         factor = -(-sum(map(len, self.some.traces)) // SAMPLES)
-        return integrates(blocks_of(self.some.traces, factor, self.mapping.output), self.some.mapping)
+        return integrates(_blocks_of(self.some.traces, factor, self.mapping.output), self.some.mapping)
 
     @property
     def explained(self) -> float:
@@ -274,16 +274,10 @@ class Residual:
     first: int
 
 
-def blocks_of(traces: Sequence[Trace], factor: int, output: str) -> tuple[Trace, ...]:
+def _blocks_of(traces: Sequence[Trace], factor: int, output: str) -> tuple[Trace, ...]:
     """Means over blocks of the samples that count: at least half of an output's, and all of an input's.
 
-    Args:
-        traces: The traces.
-        factor: Samples of a block.
-        output: Name of the output.
-
-    Returns:
-        The same, so many times slower; without traces of less than two blocks.
+    Traces of less than two blocks are left out.
     """
     slow = []
     for trace in traces:

@@ -105,17 +105,8 @@ def _steps_per_sample(
     return steps
 
 
-def charged_state(consist: Consist, variant: Variant, dt: float) -> State:
-    """State of a train that is charged throughout, with empty cylinders and the valves released.
-
-    Args:
-        consist: The train.
-        variant: The reading of the model.
-        dt: Step in s.
-
-    Returns:
-        The state.
-    """
+def _charged_state(consist: Consist, variant: Variant, dt: float) -> State:
+    """State of a train that is charged throughout, with empty cylinders and the valves released."""
     nodes, valves = consist.vehicles, consist.pairs
     pressures = np.full(nodes + 4 * valves, consist.charged)
     pressures[nodes + 2 * valves : nodes + 3 * valves] = STANDARD_ATMOSPHERE_PA
@@ -133,16 +124,8 @@ def charged_state(consist: Consist, variant: Variant, dt: float) -> State:
     )
 
 
-def stored_air(state: State, consist: Consist) -> float:
-    """Air in the train behind the leading locomotive, as P V in J.
-
-    Args:
-        state: The train's state.
-        consist: The train.
-
-    Returns:
-        The sum over all volumes.
-    """
+def _stored_air(state: State, consist: Consist) -> float:
+    """Air in the train behind the leading locomotive, as P V in J, the sum over all volumes."""
     nodes, valves = consist.vehicles, consist.pairs
     x, valve = state.pressures, consist.valve
     reservoirs = x[nodes:].reshape(4, valves).sum(axis=1)
@@ -216,7 +199,7 @@ class BrakedTrain:
         table = flow_table(laminar_ratio=variant.laminar_ratio) if table is None else table
         self.consist = consist
         self._steps = _steps_per_sample(time_step, sample_time, consist, variant, table)
-        self.state = charged_state(consist, variant, time_step)
+        self.state = _charged_state(consist, variant, time_step)
         self.gained = 0.0
         self._watch = _watch(probes, consist)
         self._constants = kernel_constants(consist, variant, time_step)
@@ -240,7 +223,7 @@ class BrakedTrain:
     @property
     def stored(self) -> float:
         """Air in the train behind the leading locomotive, as P V in J."""
-        return stored_air(self.state, self.consist)
+        return _stored_air(self.state, self.consist)
 
     def advance(
         self,

@@ -29,7 +29,7 @@ def step(fit: Any, *, seconds: float | None = None) -> StepResponse:
     Raises:
         ConfigError: If it is not linear, no input moves it, or the length is none.
     """
-    known = known_of(fit)
+    known = _known_of(fit)
     check_linear(known)
     if seconds is None:
         return step_of(known)
@@ -64,7 +64,7 @@ def bode(fit: Any, *, frequency: Any = None) -> Bode:
     Raises:
         ConfigError: If it is not linear, no input moves it, or a frequency is none.
     """
-    return bode_of(known_of(fit), frequency=frequency)
+    return bode_of(_known_of(fit), frequency=frequency)
 
 
 def poles(fit: Any) -> Poles:
@@ -79,20 +79,13 @@ def poles(fit: Any) -> Poles:
     Raises:
         ConfigError: If it is not linear.
     """
-    return poles_of(known_of(fit))
+    return poles_of(_known_of(fit))
 
 
-def known_of(fit: Any) -> Known:
+def _known_of(fit: Any) -> Known:
     """The models of what was given, each with the uncertainty of its parameters.
 
-    Args:
-        fit: A fit, several as one or in a list, a bundle, or a model.
-
-    Returns:
-        They.
-
-    Raises:
-        ConfigError: If it is something else, or a chain of models that read each other.
+    Refuses what is neither fit, bundle nor model, and a chain of models that read each other.
     """
     if isinstance(fit, FitResult):
         return [(fit.model, fit.uncertainty)]

@@ -286,17 +286,8 @@ def geometric_mean(errors: ArrayLike) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(errors, np.finfo(np.float64).tiny)))))
 
 
-def score_of(runs: Sequence[NDArray[np.float64]], traces: Sequence[Trace], outputs: Sequence[str]) -> float:
-    """How good some free runs are.
-
-    Args:
-        runs: Of each trace an array of shape ``(n_samples, n_outputs)``.
-        traces: The traces.
-        outputs: The outputs.
-
-    Returns:
-        Geometric mean over traces and outputs of the mean squared error.
-    """
+def _score_of(runs: Sequence[NDArray[np.float64]], traces: Sequence[Trace], outputs: Sequence[str]) -> float:
+    """Geometric mean over traces and outputs of the mean squared errors of some free runs."""
     return geometric_mean(mean_squares(runs, traces, outputs))
 
 
@@ -311,4 +302,4 @@ def whole_score(cascade: Cascade, traces: Sequence[Trace], outputs: Sequence[str
     Returns:
         Geometric mean over traces and outputs of the mean squared error of the free run.
     """
-    return score_of(free_runs(cascade, traces, outputs), traces, outputs)
+    return _score_of(free_runs(cascade, traces, outputs), traces, outputs)

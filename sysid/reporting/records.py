@@ -126,7 +126,7 @@ def parse_record(
     Raises:
         ConfigError: If they were written by a newer release, or a field is missing or wrong.
     """
-    refuse_newer(document, where=where, newest=newest, what=what)
+    _refuse_newer(document, where=where, newest=newest, what=what)
     try:
         return kind.model_validate(document)
     except ValidationError as error:
@@ -135,20 +135,10 @@ def parse_record(
         raise damaged(where, f"{field}: {first['msg']}", shortened(first["input"]), what=what, remedy=remedy) from error
 
 
-def refuse_newer(
+def _refuse_newer(
     document: Dict[str, Any], *, where: object, newest: int = SCHEMA_VERSION, what: str = "the results"
 ) -> None:
-    """Say so where a file is of a release that was not known yet.
-
-    Args:
-        document: Plain data.
-        where: The file they came from.
-        newest: The greatest ``schema_version`` that is known here.
-        what: What they are.
-
-    Raises:
-        ConfigError: If their ``schema_version`` is greater.
-    """
+    """Say so where a file has a ``schema_version`` above the newest that is known: it is of a later release."""
     version = document.get("schema_version", 1)
     if isinstance(version, int) and version > newest:
         raise ConfigError(

@@ -122,7 +122,7 @@ def _case(cascade: Cascade, trace: Trace, role: Role, timed: _Timed, name: str) 
     run = timed.run
     target, unit = trace.columns([name])[:, 0], cascade.units[name]
     counted = trace.usable_of([*cascade.inputs, name])
-    predicted = one_step_ahead(cascade, trace, run, name)
+    predicted = _one_step_ahead(cascade, trace, run, name)
     return CaseResult(
         case=trace.name,
         role=role,
@@ -136,20 +136,10 @@ def _case(cascade: Cascade, trace: Trace, role: Role, timed: _Timed, name: str) 
     )
 
 
-def one_step_ahead(cascade: Cascade, trace: Trace, run: CascadeRun, output: str) -> NDArray[np.float64]:
-    """What the member of an output predicts one step ahead, alone, from measured signals.
+def _one_step_ahead(cascade: Cascade, trace: Trace, run: CascadeRun, output: str) -> NDArray[np.float64]:
+    """What the member of an output predicts one step ahead from measured signals alone; NaN where it does not predict.
 
-    Args:
-        cascade: The cascade.
-        trace: The case; where it lacks a channel, the run's stands in for it.
-        run: The free run over it.
-        output: The output.
-
-    Returns:
-        Shape ``(n_samples,)``; NaN where the member does not predict.
-
-    Raises:
-        ChannelError: If no member writes the output.
+    Where the case lacks a channel, the free run's stands in for it.
     """
     model = cascade.member(output)
     ends = Ends.of(model)

@@ -34,7 +34,7 @@ def hammerstein_wiener(
     scaling = begun.scaling
     inputs = _inputs(text, structure.curves(len(mapping.inputs)), mapping, begun, structure.lags(len(mapping.inputs)))
     integrates = begun.integrates
-    linear = write_block(text, block, inputs, "g", fed=begun.constant(block) if integrates else None)
+    linear = _write_block(text, block, inputs, "g", fed=begun.constant(block) if integrates else None)
     level = "" if integrates else f" + {text.estimated('level', begun.level)}"
     inside = text.define("inside", f"{linear}{level}")
     in_units = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}"
@@ -71,7 +71,7 @@ def wiener_hammerstein(
     weights = structure.curve.weights(pair.x, pair.y / scale) if like else np.zeros(0)
     behind = replace(pair.behind, gains=scale * pair.behind.gains, direct=scale * pair.behind.direct)
     drift = 0.0 if begun.integrates else None
-    between = text.define("between", write_block(text, pair.before, inputs, "g1", known=True, fed=drift))
+    between = text.define("between", _write_block(text, pair.before, inputs, "g1", known=True, fed=drift))
     acts = text.curve(structure.curve, between, "f", bends)
     bent = text.define("bent", acts)
     more = _between(text, structure.between, pair.before, inputs, names=(between, bent), acts=acts)
@@ -81,7 +81,7 @@ def wiener_hammerstein(
         gains=np.pad(behind.gains, ((0, 0), (0, len(more)))),
         direct=np.pad(behind.direct, (0, len(more))),
     )
-    linear = write_block(text, behind, [(bent, True), *((one, True) for one in more)], "g2")
+    linear = _write_block(text, behind, [(bent, True), *((one, True) for one in more)], "g2")
     scaling = begun.scaling
     right = f"{number(scaling.output_offset)} + {number(scaling.output_scale)}*({linear} + {level})"
     text.lines.append(f"{written_name(mapping.output)} = {right}")
@@ -147,21 +147,13 @@ def _inputs(
     return found
 
 
-def write_block(
+def _write_block(
     text: Text, block: Block, inputs: Sequence[Input], tag: str, *, known: bool = False, fed: float | None = None
 ) -> str:
-    """Write a block; what its output is.
+    """Write a block; what its output is, as an expression.
 
-    Args:
-        text: The equations.
-        block: The block.
-        inputs: What it reads.
-        tag: Part of the names of its states and parameters.
-        known: Whether its largest gain has a prior, as wide as it is large.
-        fed: The constant that its last state is fed at first, of which an integrator makes a slope; ``None`` for none.
-
-    Returns:
-        The expression.
+    Its states and parameters have the tag in their names; where its largest gain is known, that has a prior as wide as
+    it is large; ``fed`` is the constant that its last state is fed at first, of which an integrator makes a slope.
     """
     states = [text.name(f"{tag}_x{i + 1}") for i in range(block.states)]
     largest = float(np.abs(block.gains).max(initial=0.0)) if known else 0.0

@@ -97,7 +97,7 @@ def shooting_terms(way: str, provider: EquationProvider) -> dict[str, Any]:
         return {"prepared": grown}
 
     def prepared(multistart: Multistart, number: int, theta: Array) -> Array:
-        return shot(multistart, number, theta) if way == MULTIPLE or number == 1 else theta
+        return _shot(multistart, number, theta) if way == MULTIPLE or number == 1 else theta
 
     def enough(candidate: Candidate) -> bool:
         return at_noise(provider, candidate.solution.theta)
@@ -146,17 +146,8 @@ def with_way(found: FitResult, chosen: Candidate, way: str, begun: Training, ask
     return replace(found, notes=(*found.notes, f"{note}."))
 
 
-def shot(multistart: Multistart, number: int, theta: Array) -> Array:
-    """A start after multiple shooting.
-
-    Args:
-        multistart: What the starts have in common, its residuals those of equations.
-        number: Which start.
-        theta: Where it begins.
-
-    Returns:
-        What is trained; as it began where the free run of what was found is none, or no window could be run.
-    """
+def _shot(multistart: Multistart, number: int, theta: Array) -> Array:
+    """A start after multiple shooting; as it began where what was found has no free run, or no window could be run."""
     whole, layout = multistart.provider, multistart.layout
     assert isinstance(whole, EquationProvider)  # noqa: S101 - made for them
     assert isinstance(layout, EquationLayout)  # noqa: S101 - likewise
@@ -185,7 +176,7 @@ def grown(multistart: Multistart, number: int, theta: Array) -> Array:
     record at once the error has a minimum wherever another number of slips falls together with the record's.
 
     Args:
-        multistart: As for :func:`shot`.
+        multistart: As for :func:`_shot`.
         number: Which start.
         theta: Where it begins.
 

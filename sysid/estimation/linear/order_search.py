@@ -42,15 +42,8 @@ ROUNDING = 1e-12
 had decided which orders a record without noise was given."""
 
 
-def rounding_of(experiments: Sequence[Experiment]) -> float:
-    """The mean squared error below which errors of an output are rounding.
-
-    Args:
-        experiments: Its records; samples without weight do not count.
-
-    Returns:
-        In its unit squared.
-    """
+def _rounding_of(experiments: Sequence[Experiment]) -> float:
+    """The mean squared error below which errors of an output are rounding, over the samples that count."""
     seen = [one.output if one.weights is None else one.output[one.weights > 0.0] for one in experiments]
     return float(ROUNDING**2 * np.mean(np.concatenate(seen) ** 2))
 
@@ -336,7 +329,7 @@ def search_orders(
             blocks.append(losses)
             on_progress(len(blocks) * per_block, grid.size(m))
     found = _collected(np.array(blocks) / rows, grid, dead_times, rows)
-    return replace(found, rounding=rounding_of(experiments))
+    return replace(found, rounding=_rounding_of(experiments))
 
 
 def _collected(

@@ -66,16 +66,10 @@ class LongArx:
         return np.asarray(np.roots([1.0, *(-self.a)]), dtype=np.complex128)
 
 
-def long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> LongArx:
-    """Fit the long model.
+def _long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> LongArx:
+    """Fit the long model to scaled records whose inputs are delayed by their dead times.
 
-    Args:
-        records: Data in scaled numbers, inputs delayed by their dead times.
-        n_lags: Lags of each channel.
-        more: Lags of the inputs beyond those: what a plant over time answers to a held input comes a sample later.
-
-    Returns:
-        The model.
+    Inputs have ``more`` lags than outputs: what a plant over time answers to a held input comes a sample later.
     """
     m, width = records[0].inputs.shape[1], n_lags + more
     samples, columns = sum(len(record.target) for record in records), n_lags + m * width + 1
@@ -128,7 +122,7 @@ def free_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...]) -> list
         The starts.
     """
     domain, sample_time = records[0].domain, records[0].sample_time
-    found = {"ARX of that order, as it is": long_arx(records, max(n_poles), more=1).raw_poles}
+    found = {"ARX of that order, as it is": _long_arx(records, max(n_poles), more=1).raw_poles}
     for n in range(1, min(2, max(n_poles)) + 1):
         found[f"{n} integrators"] = np.concatenate([np.ones(n), np.linspace(0.3, 0.8, max(n_poles) - n)]).astype(
             complex
@@ -157,12 +151,12 @@ def arx_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zeros:
     n_lags = max(2, min(LONGEST_ARX, max(2 * max(n_poles), 10), n_rows // (4 * (1 + len(n_poles)))))
     if records[0].free_start:
         n_lags = max(1, min(n_lags, max(len(record.target) for record in records) // 2))
-    model = long_arx(records, n_lags)
+    model = _long_arx(records, n_lags)
     pairs = list(enumerate(zip(n_poles, n_zeros, strict=True)))
     ways: dict[str, Callable[[], list[NDArray[np.complex128]]]] = {
         "long ARX, balanced truncation": lambda: [_balanced(model, j, n) for j, (n, _) in pairs],
         "long ARX, Sanathanan-Koerner": lambda: [_sk(model, j, n, zeros, records) for j, (n, zeros) in pairs],
-        "ARX of that order": lambda: [_padded(long_arx(records, min(max(n_poles), n_lags)).poles, n) for n in n_poles],
+        "ARX of that order": lambda: [_padded(_long_arx(records, min(max(n_poles), n_lags)).poles, n) for n in n_poles],
         "poles at a few samples": lambda: [_padded(np.empty(0, dtype=np.complex128), n) for n in n_poles],
     }
     starts: list[PoleStart] = []

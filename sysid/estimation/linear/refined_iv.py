@@ -34,19 +34,12 @@ PLAIN_ITERATIONS = 3
 """Least-squares iterations before instruments are used: a model's output is one as soon as it resembles the data."""
 
 
-def refined_poles(
+def _refined_poles(
     records: Sequence[TimeRecord], start: NDArray[np.complex128], n_zeros: int, *, iterations: int = 20
 ) -> NDArray[np.complex128]:
-    """Poles of a transfer function with one input.
+    """Stable poles of a transfer function with one input, as many as the start has.
 
-    Args:
-        records: With one input each; the target is filtered from its first sample.
-        start: Poles to begin with, as many as are wanted; the state-variable filter.
-        n_zeros: Degree of the numerator.
-        iterations: How many at most.
-
-    Returns:
-        Stable poles, the same number.
+    The target is filtered from its first sample; the start is the first state-variable filter.
     """
     domain, n = records[0].domain, len(start)
     poles = stabilised(start, domain)
@@ -129,7 +122,7 @@ def refined_sections(
         for j, zeros in enumerate(n_zeros):
             alone = [_left_for(record, j, tuple(current), n_zeros) for record in records]
             poles = np.concatenate([np.roots(d if domain is Domain.DISCRETE else d[::-1]) for d in current[j]])
-            current[j] = sections_of(refined_poles(alone, poles.astype(np.complex128), zeros), domain)
+            current[j] = sections_of(_refined_poles(alone, poles.astype(np.complex128), zeros), domain)
     return tuple(current)
 
 

@@ -54,7 +54,7 @@ def sk_poles(
     for _ in range(iterations):
         sections = sections_of(stabilised(poles, domain), domain)
         basis = basis_of(sections, len(start) - 1, domain)
-        states = state_responses(sections, variable, domain)
+        states = _state_responses(sections, variable, domain)
         blocks = [-states * output[:, np.newaxis]]
         for j, zeros in enumerate(n_zeros):
             blocks.append(responses(basis_of(sections, zeros, domain), variable) * inputs[:, j : j + 1])
@@ -72,18 +72,12 @@ def sk_poles(
     return stabilised(np.asarray(poles, dtype=np.complex128), domain)
 
 
-def state_responses(
+def _state_responses(
     sections: tuple[NDArray[np.float64], ...], variable: NDArray[np.complex128], domain: Domain
 ) -> NDArray[np.complex128]:
     """The state of a basis as functions of frequency: all strictly proper functions with its poles.
 
-    Args:
-        sections: Denominators.
-        variable: ``1/z`` or ``s``, shape ``(n_points,)``.
-        domain: Of the poles.
-
-    Returns:
-        Shape ``(n_points, n_poles)``.
+    The variable is ``1/z`` or ``s``; shape ``(n_points, n_poles)``.
     """
     system = realise(basis_of(sections, sum(len(d) - 1 for d in sections) - 1, domain), domain)
     n = len(system.A)

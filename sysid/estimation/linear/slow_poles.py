@@ -78,15 +78,8 @@ def stability(radius: float) -> str:
     return f"The free run is {verdict}: the largest pole has magnitude {radius:.{digits}f}."
 
 
-def autocorrelation(errors: Errors) -> float:
-    """From one sample to the next, the mean over outputs.
-
-    Args:
-        errors: Of each record, shape ``(n_samples, n_outputs)``; zero where they do not count.
-
-    Returns:
-        From -1 to 1; 0 where there are none.
-    """
+def _autocorrelation(errors: Errors) -> float:
+    """From one sample to the next, the mean over outputs, from -1 to 1; samples that are 0 do not count."""
     together = sum((np.sum(e[1:] * e[:-1], axis=0) for e in errors), np.zeros(errors[0].shape[1]))
     alone = sum((np.sum(e * e, axis=0) for e in errors), np.zeros(errors[0].shape[1]))
     known = alone > 0.0
@@ -106,7 +99,7 @@ def significantly_better(errors: Errors, than: Errors, *, parameters: int, scale
         Whether they are.
     """
     n = sum(len(e) for e in errors)
-    rho = max(abs(autocorrelation(errors)), abs(autocorrelation(than)))
+    rho = max(abs(_autocorrelation(errors)), abs(_autocorrelation(than)))
     independent = n * (1.0 - rho**2) / (1.0 + rho**2)
     floor = 1e-20 * max(scale, np.finfo(np.float64).tiny)
     less, more = (sum(float(np.sum(e**2)) for e in some) / n + floor for some in (errors, than))
@@ -137,7 +130,7 @@ def notes(radius: float, lengths: Sequence[int], errors: Errors | None) -> tuple
 
 def _together(errors: Errors) -> tuple[str, ...]:
     square = sum(float(np.sum(e**2)) for e in errors) / max(sum(map(len, errors)), 1)
-    rho = autocorrelation(errors) if square > ROUNDING**2 else 0.0
+    rho = _autocorrelation(errors) if square > ROUNDING**2 else 0.0
     if rho <= HANGS_TOGETHER:
         return ()
     return (

@@ -148,7 +148,7 @@ def short_run(
         return begun
     limits = Termination(max_iterations=iterations, tolerance=1e-6, patience=4)
     engine = LevenbergMarquardt(termination=limits, evidence_after=None)
-    solution = engine.minimise(provider, begun.theta, flat_prior(len(begun.theta)))
+    solution = engine.minimise(provider, begun.theta, _flat_prior(len(begun.theta)))
     return Candidate(start=start, delays=delays, provider=provider, theta=solution.theta, loss=solution.at.loss)
 
 
@@ -166,7 +166,7 @@ def long_run(candidate: Candidate, training: TransferFunctionTraining, watch: Wa
     left = training.max_time_s - (now() - watch.began)
     limits = Termination(max_iterations=training.max_iterations, max_time_s=left, tolerance=1e-7, patience=6)
     engine = LevenbergMarquardt(termination=limits, evidence_after=None, on_iteration=watch.on_iteration)
-    solution = engine.minimise(candidate.provider, candidate.theta, flat_prior(len(candidate.theta)))
+    solution = engine.minimise(candidate.provider, candidate.theta, _flat_prior(len(candidate.theta)))
     # A run that cannot improve on its start began at the minimum that the short run had reached already.
     ended = solution.status in {Status.NOT_IMPROVED, Status.STALLED}
     return End(
@@ -179,14 +179,7 @@ def long_run(candidate: Candidate, training: TransferFunctionTraining, watch: Wa
     )
 
 
-def flat_prior(n: int) -> Prior:
-    """No prior: the loss alone is minimised.
-
-    Args:
-        n: Number of parameters.
-
-    Returns:
-        A prior of precision 0.
-    """
+def _flat_prior(n: int) -> Prior:
+    """No prior: the loss alone is minimised."""
     group = Group(name="poles", members=np.arange(n))
     return Prior(centre=np.zeros(n), groups=(group,), alphas=np.zeros(1), beta=1.0)

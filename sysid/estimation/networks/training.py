@@ -237,16 +237,8 @@ LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_s
 """Options of a training that concern lagged regressors."""
 
 
-def check_shooting(name: str, training: Training) -> None:
-    """Refuse what is for grey boxes alone.
-
-    Args:
-        name: What is trained, with an article.
-        training: How to train.
-
-    Raises:
-        ConfigError: If it says how to shoot.
-    """
+def _check_shooting(name: str, training: Training) -> None:
+    """Refuse what is for grey boxes alone: how to shoot."""
     if training.shooting != Training().shooting:
         raise ConfigError(
             f"{name} has no equations to shoot with",
@@ -267,7 +259,7 @@ def check_lagged(name: str, training: Training) -> None:
     Raises:
         ConfigError: If it says how to shoot, or asks for an ensemble of a single start.
     """
-    check_shooting(name, training)
+    _check_shooting(name, training)
     if training.ensemble > 1 and training.n_starts < 2:
         raise ConfigError(
             "an ensemble of a single start is that start", where="ensemble", expected="starts of 2 or more beside it",
@@ -297,7 +289,7 @@ def check_hidden_states(name: str, training: Training, *, unites: bool = False, 
             remedy="leave loop out: its states are hidden, and only the free run can be compared with a measurement",
         )
     if not shoots:
-        check_shooting(name, training)
+        _check_shooting(name, training)
     strange = [option for option in LAGGED_ONLY if not (unites and option == "ensemble")]
     strangers = [option for option in strange if getattr(training, option) != getattr(Training(), option)]
     if strangers:

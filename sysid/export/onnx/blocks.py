@@ -60,7 +60,7 @@ def _sequence(nodes: Nodes, name: str, kind: int) -> str:
 
 def _body(surrogate: Surrogate, nodes: Nodes, size: str, kinds: dict[str, int]) -> Any:
     """One block: its samples in, its outputs at the end of what the blocks before it gave."""
-    inner = within_a_body(nodes, "block_")
+    inner = _within_a_body(nodes, "block_")
     first = inner.add("Mul", ["block", size], "first")
     span = [first, inner.add("Add", [first, size], "stop"), inner.integers([0])]
     inner.add("Slice", ["u", *span], "u")
@@ -85,16 +85,8 @@ def _body(surrogate: Surrogate, nodes: Nodes, size: str, kinds: dict[str, int]) 
     return inner.graph("block_of_samples", begin + sequences[0], end + sequences[1])
 
 
-def within_a_body(nodes: Nodes, prefix: str) -> Nodes:
-    """The same nodes as part of another graph's loop, with other names for what goes in and comes out.
-
-    Args:
-        nodes: From ``u`` and ``state`` to ``y``, ``state_out`` and ``flags``.
-        prefix: Put before these names.
-
-    Returns:
-        The nodes; new names get the prefix too.
-    """
+def _within_a_body(nodes: Nodes, prefix: str) -> Nodes:
+    """The same nodes as part of another graph's loop: what goes in and comes out, and is new, has a prefix."""
     own = {name: f"{prefix}{name}" for name in ("u", "state", "y", "state_out", "flags")}
     for node in nodes.nodes:
         for names in (node.input, node.output):

@@ -14,19 +14,8 @@ from sysid.ingest.tables.options import RepairOptions
 HOUR = 3600.0
 
 
-def empty_stamps(record: Record, repairs: RepairOptions) -> Record:
-    """Samples without a time stamp.
-
-    Args:
-        record: The samples.
-        repairs: ``stamps: drop`` drops them.
-
-    Returns:
-        The samples that have one.
-
-    Raises:
-        TraceError: If there are such samples and no repair was asked for, or nothing else is left.
-    """
+def _empty_stamps(record: Record, repairs: RepairOptions) -> Record:
+    """Samples without a time stamp, which ``stamps: drop`` drops; refused where no repair was asked for."""
     bad = ~np.isfinite(record.stamps)
     if not bad.any():
         return record
@@ -157,5 +146,5 @@ def _in_single(record: Record) -> str | None:
     )
 
 
-STEPS: tuple[Callable[[Record, RepairOptions], Record], ...] = (empty_stamps, backward, duplicates)
+STEPS: tuple[Callable[[Record, RepairOptions], Record], ...] = (_empty_stamps, backward, duplicates)
 """The repairs of time stamps, in the order in which they are made."""

@@ -88,15 +88,8 @@ def check_distinct(names: Sequence[str], *, where: str) -> None:
         )
 
 
-def is_labelled(part: object) -> bool:
-    """Whether an object has a label for each of its rows, as a series or a frame of pandas has.
-
-    Args:
-        part: Anything.
-
-    Returns:
-        Whether it has.
-    """
+def _is_labelled(part: object) -> bool:
+    """Whether an object has a label for each of its rows, as a series or a frame of pandas has."""
     return hasattr(getattr(part, "index", None), "equals")
 
 
@@ -109,7 +102,7 @@ def index_of(parts: Sequence[Any]) -> Columns:
     Returns:
         The column, or none.
     """
-    return next((_index(one.index) for one in parts if is_labelled(one)), {})
+    return next((_index(one.index) for one in parts if _is_labelled(one)), {})
 
 
 def check_labels(parts: Sequence[Any], names: Sequence[object], *, where: str) -> None:
@@ -123,7 +116,7 @@ def check_labels(parts: Sequence[Any], names: Sequence[object], *, where: str) -
     Raises:
         ConfigError: If two have different labels.
     """
-    labelled = [(str(name), part.index) for name, part in zip(names, parts, strict=True) if is_labelled(part)]
+    labelled = [(str(name), part.index) for name, part in zip(names, parts, strict=True) if _is_labelled(part)]
     for (first, one), (second, other) in pairwise(labelled):
         if not one.equals(other):
             raise ConfigError(
@@ -148,8 +141,8 @@ def check_rows(table: Any, *, where: str) -> None:
         ConfigError: If the labels are of several levels, or do not count evenly.
     """
     if isinstance(table, Mapping):
-        table = next(filter(is_labelled, table.values()), None)
-    if not is_labelled(table):
+        table = next(filter(_is_labelled, table.values()), None)
+    if not _is_labelled(table):
         return
     if getattr(table.index, "nlevels", 1) > 1:
         raise ConfigError(

@@ -14,19 +14,8 @@ LISTS = "a name that holds + or -> in quotes, or as lists: inputs: [...], output
 """What helps where a name is misread."""
 
 
-def listed(value: object, *, what: str) -> tuple[str, ...]:
-    """Names as they stand in the list form of a mapping.
-
-    Args:
-        value: A name, or a list of names.
-        what: Which they are, for errors.
-
-    Returns:
-        The names.
-
-    Raises:
-        ConfigError: If it is neither.
-    """
+def _listed(value: object, *, what: str) -> tuple[str, ...]:
+    """Names as they stand in the list form of a mapping: one, or a list of them."""
     names = [value] if isinstance(value, str) else value
     if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
         raise ConfigError(
@@ -38,17 +27,8 @@ def listed(value: object, *, what: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def check_fields(value: Dict[str, Any], known: tuple[str, ...], example: str) -> None:
-    """Refuse the list form of a mapping whose fields are others.
-
-    Args:
-        value: The fields.
-        known: Their names.
-        example: How it is written.
-
-    Raises:
-        ConfigError: If one is missing, or there is another.
-    """
+def _check_fields(value: Dict[str, Any], known: tuple[str, ...], example: str) -> None:
+    """Refuse the list form of a mapping whose fields are others."""
     if set(value) != set(known):
         raise ConfigError(
             "not a mapping",
@@ -159,8 +139,8 @@ class Mapping:
         if not isinstance(value, Dict):
             return cls.parse(str(value))
         word = "outputs" if "outputs" in value else "output"
-        check_fields(value, ("inputs", word), "{inputs: [BP, AR], output: BC}")
-        return cls(inputs=listed(value["inputs"], what="inputs"), outputs=listed(value[word], what="outputs"))
+        _check_fields(value, ("inputs", word), "{inputs: [BP, AR], output: BC}")
+        return cls(inputs=_listed(value["inputs"], what="inputs"), outputs=_listed(value[word], what="outputs"))
 
     @classmethod
     def parse(cls, text: str) -> Mapping:

@@ -82,17 +82,8 @@ def _plan(n_theta: int, n_inputs: int, limits: tuple[Between, ...], **structure:
     return Plan.of(side_by_side([columns], n_inputs, limits))
 
 
-def planned_alone(columns: ColumnRecursion, n_inputs: int, limits: tuple[Between, ...]) -> Planned:
-    """What the pass is given of one recursion without an equation; see :func:`side_by_side`.
-
-    Args:
-        columns: The recursion.
-        n_inputs: How many of its columns it does not write.
-        limits: Of each output, in its unit; empty for none.
-
-    Returns:
-        Its plan and its parameters.
-    """
+def _planned_alone(columns: ColumnRecursion, n_inputs: int, limits: tuple[Between, ...]) -> Planned:
+    """What the pass is given of one recursion without an equation: its plan and its parameters."""
     structure = {one.name: getattr(columns, one.name) for one in fields(columns) if one.name != "theta"}
     theta = np.ascontiguousarray(columns.theta, dtype=np.float64)
     return *_plan(len(theta), n_inputs, limits, **structure), read_only(theta)
@@ -121,7 +112,7 @@ class AbstractLaggedForm(AbstractForm):
 
     @cached_property
     def _planned(self) -> Planned:
-        return planned_alone(self.columns, self.n_inputs, self.output_limits)
+        return _planned_alone(self.columns, self.n_inputs, self.output_limits)
 
     @property
     def _own(self) -> int:
@@ -180,7 +171,7 @@ class AbstractLaggedForm(AbstractForm):
         y = room[:, m:].copy()
         y[depth:] = np.reshape(np.asarray(output, dtype=np.float64), (len(inputs), -1))
         room = np.concatenate([room[:, :m], np.empty((len(room), len(own))), y], axis=1)
-        plan = planned_alone(opened(columns, m), m + len(own), self.output_limits)
+        plan = _planned_alone(opened(columns, m), m + len(own), self.output_limits)
         # What was predicted of each sample one step less before it is the newest; none of it is newer than measured.
         newest = deque[Array](maxlen=max(1, self._own))
         for step in range(1, min(steps, len(inputs)) + 1):

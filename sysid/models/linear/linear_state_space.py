@@ -216,8 +216,15 @@ class _StateSpaceModel(InnovationModel):
         return self.system.radius
 
     def continuous(self) -> ContinuousStateSpace:
-        """The continuous system whose samples it is; see :func:`continuous_form`."""
-        return continuous_form(self)
+        """The continuous system whose samples it is, inputs held between them, as ``d2c`` by zoh.
+
+        Returns:
+            The system in the channels' units, its dead times beside it.
+
+        Raises:
+            ConfigError: If a pole is zero or lies on the negative real axis.
+        """
+        return _continuous_form(self)
 
     @property
     def matrices(self) -> Matrices:
@@ -338,18 +345,8 @@ class VectorStateSpaceModel(_StateSpaceModel, SeveralOutputs):
         return self.continuous().to_control(pade_order=pade_order) if continuous else state_space(self)
 
 
-def continuous_form(model: _StateSpaceModel) -> ContinuousStateSpace:
-    """The continuous system that gives a model's samples when its inputs are held between them, as ``d2c`` by zoh.
-
-    Args:
-        model: The model.
-
-    Returns:
-        The system in the channels' units, its dead times beside it; its output at the samples is the model's.
-
-    Raises:
-        ConfigError: If a pole is zero or lies on the negative real axis.
-    """
+def _continuous_form(model: _StateSpaceModel) -> ContinuousStateSpace:
+    """What :meth:`_StateSpaceModel.continuous` gives."""
     system, late = model._run_freely, model.orders.shifts(len(model.mapping.inputs))
     remedy = (
         "fit fewer states, or a continuous transfer function (domain: continuous): such a pole mostly describes noise"

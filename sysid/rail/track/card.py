@@ -111,23 +111,15 @@ class TrackCard:
 
     def profile(self, code: str) -> TrackProfile:
         """The section's track, positions in m from its first station."""
-        return profile_of(self.section(code), name=f"section {code}")
+        return _profile_of(self.section(code), name=f"section {code}")
 
 
 def _wrong(number: int, what: str, expected: str, got: object) -> ConfigError:
     return ConfigError(what, where=f"track card, row {number}", expected=expected, got=got, remedy="correct the row")
 
 
-def profile_of(rows: Sequence[CardRow], *, name: str) -> TrackProfile:
-    """The track that rows of one section describe.
-
-    Args:
-        rows: Of one section.
-        name: Of the track.
-
-    Returns:
-        The profile; what no row tells is level, straight and without limit.
-    """
+def _profile_of(rows: Sequence[CardRow], *, name: str) -> TrackProfile:
+    """The track that rows of one section describe; what no row tells is level, straight and without limit."""
     picked = {code: [(row.distance, row.value) for row in rows if row.code is code] for code in CardCode}
     return TrackProfile.from_steps(
         name,
@@ -200,7 +192,7 @@ class CardReader:
         self._known: list[CardRow] = []
         self._name = f"section {section}, as read"
         self.offset = offset
-        self.profile = profile_of((), name=self._name)
+        self.profile = _profile_of((), name=self._name)
 
     def read(self, travelled: float) -> tuple[CardRow, ...]:
         """Read on.
@@ -215,5 +207,5 @@ class CardReader:
         if fresh:
             self._left = self._left[len(fresh) :]
             self._known += fresh
-            self.profile = profile_of(self._known, name=self._name)
+            self.profile = _profile_of(self._known, name=self._name)
         return tuple(fresh)

@@ -51,20 +51,12 @@ def write_comparison(run: Path, against: Path) -> Path:
     with replacing(path.with_suffix(".json")) as draft:
         draft.write_text(json.dumps(found.to_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
     with replacing(path) as draft:
-        draft.write_text(render_comparison(found, f"{stem}.json"), encoding="utf-8")
+        draft.write_text(_render_comparison(found, f"{stem}.json"), encoding="utf-8")
     return path
 
 
-def render_comparison(found: Comparison, numbers: str) -> str:
-    """The page.
-
-    Args:
-        found: The comparison.
-        numbers: Name of the file with the same numbers.
-
-    Returns:
-        HTML 5 in one piece.
-    """
+def _render_comparison(found: Comparison, numbers: str) -> str:
+    """The page, HTML 5 in one piece; ``numbers`` is the name of the file with the same numbers."""
     sections = (*(_cases(found, output) for output in found.outputs), *_pictures(found), _what_differs(found))
     ours, theirs = found.ours, found.theirs
     told = [f"{_chosen(side, found)} of {readable(side.results.created)}" for side in (ours, theirs)]

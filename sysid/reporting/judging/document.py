@@ -31,21 +31,12 @@ def judgement_document(results: JudgementResults) -> Document:
     record = results.judgement
     judged = tuple((subject.name, "; ".join(subject.parts)) for subject in results.subjects)
     verdict = Verdict(headline=judgement_headline(record), tiles=(), points=judged, warnings=())
-    sections = [judgement_section(record, 0, headline=False), *data_set_section(results.data)]
+    sections = [_judgement_section(record, 0, headline=False), *data_set_section(results.data)]
     return Document(results=results, verdict=verdict, sections=tuple(sections))
 
 
-def judgement_section(record: JudgementRecord, index: int, *, headline: bool = True) -> Section:
-    """What was found as a section.
-
-    Args:
-        record: What was found.
-        index: Of the judgements in the page, from 0 on.
-        headline: Whether it begins with what stands in the verdict of its own page.
-
-    Returns:
-        The section.
-    """
+def _judgement_section(record: JudgementRecord, index: int, *, headline: bool = True) -> Section:
+    """What was found as a section; a headline repeats the verdict of its own page."""
     name = identifier(f"{record.title.lower()}-{index}" if index else record.title.lower())
     parts: list[Part] = [judgement_headline(record)] if headline else []
     parts += [text for text in (record.method, *tolerance_sentences(record)) if text]
@@ -86,4 +77,4 @@ def judgement_points(folder: Path) -> list[tuple[str, str]]:
 def _section_of(document: Dict[str, Any], where: Path, index: int) -> Section:
     if "tables" in document or "headline" in document:  # version 1, which carries no number
         return ready_section(parse_record(ReadyRecord, document, where=where), index)
-    return judgement_section(parse_judgement(document, where=where), index)
+    return _judgement_section(parse_judgement(document, where=where), index)

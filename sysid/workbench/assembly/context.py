@@ -114,7 +114,7 @@ class Context:
         Returns:
             Their records; what has been run is found.
         """
-        source, found_out = new_runs_of(asked, self.beside), new_runs_outlined(asked, number, self.beside)
+        source, found_out = _new_runs_of(asked, self.beside), new_runs_outlined(asked, number, self.beside)
         count = asked.candidates if number else asked.held_out
 
         def make(work: Work) -> list[Trace]:
@@ -284,19 +284,8 @@ class OfSeed:
         return title if self.seed is None or not title else f"{title}, seed {self.seed}"
 
 
-def new_runs_of(asked: ActiveLearningConfig, beside: Path) -> ExperimentData:
-    """The experiments whose reference active learning asks for new runs.
-
-    Args:
-        asked: The active learning.
-        beside: Folder of the pipeline.
-
-    Returns:
-        They.
-
-    Raises:
-        ConfigError: If its data are no pipeline of kind ``experiment``.
-    """
+def _new_runs_of(asked: ActiveLearningConfig, beside: Path) -> ExperimentData:
+    """The experiments whose reference active learning asks for new runs, seen from the folder of the pipeline."""
     source = data_of_pipeline(beside / asked.data)
     if not isinstance(source, ExperimentData):
         raise ConfigError(
@@ -321,7 +310,7 @@ def new_runs_outlined(asked: ActiveLearningConfig, number: int, beside: Path) ->
     count = (asked.candidates if number else asked.held_out) or 0
 
     def how_long() -> Estimate:
-        unmade = new_runs_of(asked, beside).unmade_new(number, count, duration=asked.duration)
+        unmade = _new_runs_of(asked, beside).unmade_new(number, count, duration=asked.duration)
         return estimate_of([] if unmade is None else [unmade]) or Estimate(seconds=1.0, basis="they have been run")
 
     title = f"Running {count} new experiments" + (f" for round {number}" if number else ", which train nothing")

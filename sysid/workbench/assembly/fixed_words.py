@@ -86,18 +86,11 @@ def _members(entry: Mapping[str, Any], loc: Loc, origins: Origins) -> list[dict[
             got=error.got,
             remedy=error.remedy,
         ) from None
-    return [plain_words(one) for one in members]
+    return [_plain_words(one) for one in members]
 
 
-def plain_words(fixed: FixedMember) -> dict[str, Any]:
-    """A fixed submodel in the words of one entry.
-
-    Args:
-        fixed: The submodel.
-
-    Returns:
-        What :class:`sysid.workbench.assembly.member_config.FixedConfig` reads; what is usual is left out.
-    """
+def _plain_words(fixed: FixedMember) -> dict[str, Any]:
+    """A fixed submodel in the words of one entry, as :class:`FixedConfig` reads it; what is usual is left out."""
     words = {
         "mapping": str(fixed.mapping),
         "gains": {name: dict(one) if isinstance(one, Mapping) else one for name, one in fixed.gains.items()},

@@ -74,7 +74,7 @@ class Ripening:
     def _seconds(self, trial: Trial) -> float:
         """Processor time until a network is ripe, with some for its beginning, as far as it may have it."""
         wall_s = self.budget.wall_s or math.inf
-        need = (RIPE + 1 - iterations_each(trial, self.n_outputs)) * trial.iteration_s
+        need = (RIPE + 1 - _iterations_each(trial, self.n_outputs)) * trial.iteration_s
         return round(min(need / (1.0 - BEGINNING), LONGEST * self.budget.trial * wall_s), 3)
 
 
@@ -113,16 +113,8 @@ def _options(seconds: Mapping[int, float], point: Point) -> dict[str, Any]:
     return {**FURTHER, "max_iterations": RIPE, "max_time_s": seconds[point.number]}
 
 
-def iterations_each(trial: Trial, n_outputs: int) -> float:
-    """Iterations of each model of a trial.
-
-    Args:
-        trial: The trial.
-        n_outputs: Of the mapping.
-
-    Returns:
-        Their number, the mean over a trial's models where it has one an output.
-    """
+def _iterations_each(trial: Trial, n_outputs: int) -> float:
+    """Iterations of each model of a trial, the mean where it has one an output."""
     whole = structure_from_dict(trial.structure).for_outputs(n_outputs).several_outputs
     return trial.iterations / (1 if whole else n_outputs)
 
@@ -138,7 +130,7 @@ def is_young(trial: Trial, n_outputs: int, folds: int = 1) -> bool:
     Returns:
         Whether it did.
     """
-    return trial.status == Status.TIME_LIMIT.name and iterations_each(trial, n_outputs) < RIPE * folds
+    return trial.status == Status.TIME_LIMIT.name and _iterations_each(trial, n_outputs) < RIPE * folds
 
 
 def young_told(trials: Sequence[Trial], rank: Rank, n_outputs: int, folds: int = 1) -> str:
@@ -156,7 +148,7 @@ def young_told(trials: Sequence[Trial], rank: Rank, n_outputs: int, folds: int =
     young = sorted((one for one in trials if is_young(one, n_outputs, folds)), key=rank)
     if not young:
         return ""
-    named = [f"{one.label} ({_count(iterations_each(one, n_outputs) / folds)})" for one in young[:NAMED]]
+    named = [f"{one.label} ({_count(_iterations_each(one, n_outputs) / folds)})" for one in young[:NAMED]]
     more = f" and {len(young) - NAMED} more" if len(young) > NAMED else ""
     return (
         f"In the time that there was, {', '.join(named)}{more} came to fewer than {RIPE} iterations, too few to tell "

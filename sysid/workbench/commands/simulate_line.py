@@ -57,7 +57,7 @@ def simulate_line_command(wish: Wish, asked: str) -> None:
     check_picture(wish.plot)
     out, stored, positions = wish.written, read_interpolation(meant(wish.bundle)), parse_positions(asked)
     table = read_command(wish.command, stored.inputs, time_unit=wish.time_unit, unit=wish.unit)
-    trace = simulate_line(stored, table.trace(stored.line.sample_time), positions)
+    trace = _simulate_line(stored, table.trace(stored.line.sample_time), positions)
     write_trace(replace(trace, name=out.stem), out)
     names = ", ".join(channel.name for channel in stored.outputs)
     units, values = {one.name: one.unit for one in stored.inputs}, trace.columns([one.name for one in stored.inputs])
@@ -68,20 +68,8 @@ def simulate_line_command(wish: Wish, asked: str) -> None:
     _draw(stored, trace, positions, wish.plot or out.with_suffix(".png"), title=wish.bundle.name)
 
 
-def simulate_line(stored: StoredInterpolation, given: Trace, positions: list[float]) -> Trace:
-    """Every position of a line as one trace.
-
-    Args:
-        stored: The line.
-        given: A trace with the inputs of the whole.
-        positions: Where along the line.
-
-    Returns:
-        The inputs, then each output at each position, as ``BC17`` for position 17.
-
-    Raises:
-        ConfigError: If a position is not on the line.
-    """
+def _simulate_line(stored: StoredInterpolation, given: Trace, positions: list[float]) -> Trace:
+    """The inputs, then each output at each position of a line, as ``BC17`` for position 17."""
     run = stored.line.simulate_trace(given, positions)
     inputs = [channel.name for channel in stored.inputs]
     channels, columns = list(stored.inputs), [given.columns(inputs)]

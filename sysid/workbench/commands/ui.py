@@ -40,7 +40,7 @@ def ui_command(port: int, *, browser: bool) -> int:
     # What the server says is for those who look for a fault; it is kept until then and no longer.
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(  # noqa: S603 - our own words
-            server_command(uri, address),
+            _server_command(uri, address),
             env=server_environment(page(experiment)),
             start_new_session=True,
             stdout=log,
@@ -75,16 +75,8 @@ def page(experiment: str | None) -> str:
     return f"#/experiments/{experiment}/runs?viewStateShareKey={VIEW}&workflowType=machine_learning"
 
 
-def server_command(uri: str, address: str) -> list[str]:
-    """The words that start the server.
-
-    Args:
-        uri: The tracking store.
-        address: Where it shall listen.
-
-    Returns:
-        Program and arguments.
-    """
+def _server_command(uri: str, address: str) -> list[str]:
+    """The words that start the server on an address."""
     host, port = address.removeprefix("http://").split(":")
     return [
         *(sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri),

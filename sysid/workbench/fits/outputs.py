@@ -60,24 +60,16 @@ def models_of(fit: FitConfig, config: PipelineConfig) -> tuple[FitModel, ...]:
     return tuple(FitModel(fit=one.fit, config=one.config, outputs=(one,)) for one in outputs)
 
 
-def output_name(name: str, output: str) -> str:
-    """What one output of a fit is called.
-
-    Args:
-        name: Of the fit.
-        output: The output.
-
-    Returns:
-        Both.
-    """
+def _output_name(name: str, output: str) -> str:
+    """What one output of a fit is called."""
     return f"{name}, {output}"
 
 
 def _named(fit: FitConfig, output: str, config: PipelineConfig) -> FitConfig:
     """A fit under the name of one of its outputs; it starts from what the initial fit has of the same output."""
     initial: Dict[str, FitConfig] = {one.name: one for one in config.fits}
-    begun = None if fit.initial is None else output_name(initial[fit.initial].name, output)
-    return fit.model_copy(update={"name": output_name(fit.name, output), "initial": begun})
+    begun = None if fit.initial is None else _output_name(initial[fit.initial].name, output)
+    return fit.model_copy(update={"name": _output_name(fit.name, output), "initial": begun})
 
 
 def _of(config: PipelineConfig, mapping: Mapping) -> PipelineConfig:

@@ -157,17 +157,8 @@ def _signals(arrays: Mapping[str, Any], name: str) -> dict[str, Any]:
     return {signal: np.asarray(arrays[f"{name}/{signal}"], dtype=np.float64) for signal in SIGNALS}
 
 
-def fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: TraceSet) -> dict[str, Any]:
-    """One fit as it stands in results.json.
-
-    Args:
-        ready: The fit and its figures.
-        exports: The exported files, with paths relative to the run folder.
-        traces: The cases, some of which may go where none was fitted.
-
-    Returns:
-        JSON values.
-    """
+def _fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: TraceSet) -> dict[str, Any]:
+    """One fit as it stands in results.json; it may go without some of the cases, where none was fitted."""
     fit, model = ready.fit, ready.fit.model
     stored, fitted = fit.to_dict(), traces.with_role(Role.ESTIMATION)
     scored = [trace for trace in traces if traces.roles[trace.name] is not Role.ESTIMATION]
@@ -251,8 +242,8 @@ def results_document(
         if data.selection
         else None,
         "start": {"kind": start.kind.value, "n_measured": start.n_measured},
-        "fits": [fit_record(ready, exports if ready.config.name == first else (), traces) for ready in fits],
-        "systems": system_records(fits),
+        "fits": [_fit_record(ready, exports if ready.config.name == first else (), traces) for ready in fits],
+        "systems": _system_records(fits),
         "orders": [dict(one) for one in orders],
         "best": asdict(choice) | {"name": first} if choice else None,
         "linearity": linearity(fits, choice.name if choice else None),
@@ -277,15 +268,8 @@ def _data(traces: TraceSet) -> dict[str, Any]:
     return {**about, "cases": cases}
 
 
-def system_records(fits: Sequence[FitReady]) -> list[dict[str, Any]]:
-    """The fits of several outputs as wholes, as they stand in results.json.
-
-    Args:
-        fits: The fits that are ready, output by output.
-
-    Returns:
-        JSON values, one for each; none of fits of one output.
-    """
+def _system_records(fits: Sequence[FitReady]) -> list[dict[str, Any]]:
+    """The fits of several outputs as wholes, as they stand in results.json; none of fits of one output."""
     groups: dict[str, list[FitReady]] = {}
     for ready in fits:
         if ready.system is not None:

@@ -36,29 +36,14 @@ GROWN = "grown"
 """Name of the fit, and of its folder."""
 
 
-def found_fits(searched: Searched, folder: Path) -> list[FitResult]:
-    """The fits of what a search has chosen.
-
-    Args:
-        searched: What came of it.
-        folder: Its run folder.
-
-    Returns:
-        One a model.
-    """
+def _found_fits(searched: Searched, folder: Path) -> list[FitResult]:
+    """The fits of what a search has chosen, one a model."""
     own = [one for one in searched.results.fits if one.name == FOUND or one.name.startswith(f"{FOUND}, ")]
     return [read_fit(folder / "fits" / slug) for slug in dict.fromkeys(one.model_slug or one.slug for one in own)]
 
 
-def training_of(searched: Searched) -> dict[str, Any]:
-    """The options of training that a search has chosen with the structure.
-
-    Args:
-        searched: What came of it.
-
-    Returns:
-        By name.
-    """
+def _training_of(searched: Searched) -> dict[str, Any]:
+    """The options of training that a search has chosen with the structure, by name."""
     (trial,) = [one for one in searched.record.trials if one.number == searched.record.winner]
     return {name: value for name, value in trial.values.items() if name not in {"structure", "seed"}}
 
@@ -97,10 +82,10 @@ def grow(
     """
     grower = Grower(
         reference=ground.reference, design=ground.config.experiment, config=how, taught=ground.found.traces,
-        rest=ground.found.before, folder=ground.folder / GROWN / "rounds", training=training_of(searched),
+        rest=ground.found.before, folder=ground.folder / GROWN / "rounds", training=_training_of(searched),
         workers=ground.config.workers, seconds=seconds, say=say,
     )  # fmt: skip
-    return grower, grower.grow(found_fits(searched, ground.folder / "model"))
+    return grower, grower.grow(_found_fits(searched, ground.folder / "model"))
 
 
 def program_of(ground: Ground, grower: Grower, grown: Grown, export: Dict[str, Any]) -> Program[Results]:

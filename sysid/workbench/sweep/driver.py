@@ -134,7 +134,7 @@ class Driver:
             trials = self._do([*shared, *jobs.values()])
             for point in alive:
                 trial = trials[jobs[point.number].key]
-                found[point.number] = as_trial_of(trial, point, before=found.get(point.number))
+                found[point.number] = _as_trial_of(trial, point, before=found.get(point.number))
             alive, dropped = self._split(alive, found, rung.keep)
             for point in dropped:
                 found[point.number] = found[point.number].model_copy(update={"dropped_at": number})
@@ -179,7 +179,7 @@ class Driver:
         jobs = {point.number: self._job_on(point, options(point)) for point in points}
         done = self._do(jobs.values())
         self.last.update(jobs)
-        trials = [as_trial_of(done[jobs[p.number].key], p, before=before[p.number]) for p in points]
+        trials = [_as_trial_of(done[jobs[p.number].key], p, before=before[p.number]) for p in points]
         return [one.model_copy(update={"iterations": one.iterations + before[one.number].iterations}) for one in trials]
 
     def is_stored_on(self, points: Sequence[Point], options: Callable[[Point], Mapping[str, Any]]) -> bool:
@@ -365,17 +365,8 @@ def as_trial(outcome: Mapping[str, Any]) -> Trial:
     return Trial.model_validate({**kept, "number": max(1, kept["number"]), "label": label})
 
 
-def as_trial_of(trial: Trial, point: Point, *, before: Trial | None) -> Trial:
-    """A job's result as that of its point, with the time of the jobs before it.
-
-    Args:
-        trial: The result.
-        point: The point.
-        before: The point's result at the rung before.
-
-    Returns:
-        The trial.
-    """
+def _as_trial_of(trial: Trial, point: Point, *, before: Trial | None) -> Trial:
+    """A job's result as that of its point, with the time of the jobs before it: of the rungs before."""
     added = {name: getattr(trial, name) + (getattr(before, name) if before else 0.0) for name in ("seconds", "cpu_s")}
     return trial.model_copy(update={"number": point.number, "values": dict(point.values), **added})
 

@@ -129,16 +129,10 @@ class LongARX:
         return np.asarray(e)
 
 
-def armax_start(pieces: Sequence[Segment], orders: AbstractPolynomial, long: LongARX) -> Array:
+def _armax_start(pieces: Sequence[Segment], orders: AbstractPolynomial, long: LongARX) -> Array:
     """Coefficients of an ARMAX model by one regression with the innovations of a long ARX model.
 
-    Args:
-        pieces: Unbroken records.
-        orders: The structure.
-        long: The long ARX model of the pieces, or of their differences where the noise is integrated.
-
-    Returns:
-        The flat vector.
+    That is of the pieces, or of their differences where the noise is integrated.
     """
     na, nc, m = orders.order("na"), orders.order("nc"), len(orders.nb)
     skipped = len(long.A) - 1 + nc
@@ -157,17 +151,12 @@ def armax_start(pieces: Sequence[Segment], orders: AbstractPolynomial, long: Lon
     return np.concatenate([theta[:n_b], A, inside(C), [level] * orders.level])
 
 
-def box_jenkins_start(pieces: Sequence[Segment], orders: AbstractPolynomial, long: LongARX, *, whitened: bool) -> Array:
+def _box_jenkins_start(
+    pieces: Sequence[Segment], orders: AbstractPolynomial, long: LongARX, *, whitened: bool
+) -> Array:
     """Coefficients of OE and Box-Jenkins models: each input's part first, then the noise that is left.
 
-    Args:
-        pieces: Unbroken records.
-        orders: The structure.
-        long: Their long ARX model.
-        whitened: Whether what an input does is fitted through the filter that whitens the noise.
-
-    Returns:
-        The flat vector.
+    Where it is whitened, what an input does is fitted through the filter that whitens the noise.
     """
     A = np.concatenate([[1.0], inside(long.A[1:])])
     B, F, left = [], [], [piece.outputs[:, 0].copy() for piece in pieces]
@@ -186,16 +175,10 @@ def box_jenkins_start(pieces: Sequence[Segment], orders: AbstractPolynomial, lon
     return np.concatenate([*B, *F, *noise, [level] * orders.level])
 
 
-def state_space_start(pieces: Sequence[Segment], orders: AbstractPolynomial, same: LongARX) -> Array | None:
-    """Coefficients of a model of one input that are a state space's own.
+def _state_space_start(pieces: Sequence[Segment], orders: AbstractPolynomial, same: LongARX) -> Array | None:
+    """Coefficients of a model of one input that are a state space's own; ``None`` where it has not just these.
 
-    Args:
-        pieces: Unbroken records.
-        orders: The structure.
-        same: The state space, of as many states as the model has poles.
-
-    Returns:
-        The flat vector; ``None`` where the structure has not just these coefficients.
+    The state space has as many states as the model has poles.
     """
     if len(orders.nb) != 1 or orders.denominators[0] != len(same.A) - 1:
         return None
@@ -326,9 +309,9 @@ def long_models(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[L
 def starts_of(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequence[LongARX]) -> list[Array]:
     """Coefficients from long ARX models."""
     if has_common(orders):
-        return [armax_start(looked, orders, long) for long in longs]
+        return [_armax_start(looked, orders, long) for long in longs]
     kinds = [(long, whitened) for long in longs for whitened in (False, True)]
-    return [box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
+    return [_box_jenkins_start(looked, orders, long, whitened=whitened) for long, whitened in kinds]
 
 
 def of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
@@ -336,9 +319,9 @@ def of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> lis
     same = None if has_common(orders) else LongARX.of_state_space(looked, orders)
     if same is None:
         return []
-    begun = [box_jenkins_start(looked, orders, same, whitened=False)]
+    begun = [_box_jenkins_start(looked, orders, same, whitened=False)]
     # What is fitted to the state space keeps its poles inside the unit circle: its own are an integrator's, too.
-    itself = state_space_start(looked, orders, same)
+    itself = _state_space_start(looked, orders, same)
     return begun if itself is None else [*begun, itself]
 
 

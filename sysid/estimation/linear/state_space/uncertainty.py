@@ -24,15 +24,8 @@ LEFT_OPEN = 1e-14
 """Curvature of a direction, relative to the largest, below which the data leave it open."""
 
 
-def coordinates_covariance(found: Found) -> Array:
-    """Covariance of the local coordinates at the least prediction error; NaN where the data leave one open.
-
-    Args:
-        found: The fit.
-
-    Returns:
-        Shape ``(n_parameters, n_parameters)``.
-    """
+def _coordinates_covariance(found: Found) -> Array:
+    """Covariance of the local coordinates at the least prediction error; NaN where the data leave one open."""
     half, P = coordinates_root(found), found.chart.n_parameters
     return np.asarray(half @ half.T) if half.shape[1] == P else np.full((P, P), np.nan)
 
@@ -103,7 +96,7 @@ def state_space_uncertainty(model: LinearStateSpaceModel | VectorStateSpaceModel
     return Uncertainty(
         names=state_space_names(orders, model.mapping),
         values=values,
-        covariance=J @ coordinates_covariance(found) @ J.T,
+        covariance=J @ _coordinates_covariance(found) @ J.T,
         noise_variance=float(np.exp(np.linalg.slogdet(covariance + _TINY * np.eye(p))[1] / p)),
     )
 

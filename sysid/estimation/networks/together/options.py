@@ -20,18 +20,8 @@ AUTO: Literal["auto"] = "auto"
 """In the place of windows: where the start is far off, of lengths by the records."""
 
 
-def check_windows(given: object) -> Literal["auto"] | tuple[int, ...]:
-    """What may be asked of windows.
-
-    Args:
-        given: Numbers of samples, or ``auto``.
-
-    Returns:
-        The same.
-
-    Raises:
-        ConfigError: If they are neither.
-    """
+def _check_windows(given: object) -> Literal["auto"] | tuple[int, ...]:
+    """What may be asked of windows: numbers of samples, or ``auto``."""
     if given == AUTO:
         return AUTO
     if isinstance(given, list | tuple):
@@ -94,7 +84,7 @@ class JointTraining(TypedFields):
         for name in ("max_iterations", "patience", "checkpoints", "starts", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
-        object.__setattr__(self, "windows", check_windows(self.windows))
+        object.__setattr__(self, "windows", _check_windows(self.windows))
         for name in ("moves", "leverage", "robust_scale"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name} is too small", where=name, expected="above 0", got=getattr(self, name))
