@@ -176,7 +176,7 @@ def grown(multistart: Multistart, number: int, theta: Array) -> Array:
     record at once the error has a minimum wherever another number of slips falls together with the record's.
 
     Args:
-        multistart: As for :func:`_shot`.
+        multistart: What the starts have in common, its residuals those of equations.
         number: Which start.
         theta: Where it begins.
 

@@ -224,7 +224,17 @@ class _StateSpaceModel(InnovationModel):
         Raises:
             ConfigError: If a pole is zero or lies on the negative real axis.
         """
-        return _continuous_form(self)
+        system, late = self._run_freely, self.orders.shifts(len(self.mapping.inputs))
+        remedy = (
+            "fit fewer states, or a continuous transfer function (domain: continuous): such a pole mostly describes "
+            "noise"
+        )
+        A, B = rates(system.A, system.B / np.array(self.scaling.input_scale), self.sample_time, remedy=remedy)
+        gain = np.atleast_1d(self.scaling.output_scale)[:, np.newaxis]
+        return ContinuousStateSpace(
+            A=A, B=B, C=gain * system.C, D=gain * system.D / np.array(self.scaling.input_scale),
+            delays=tuple(k * self.sample_time for k in late), mapping=self.mapping,
+        )  # fmt: skip
 
     @property
     def matrices(self) -> Matrices:
@@ -343,17 +353,3 @@ class VectorStateSpaceModel(_StateSpaceModel, SeveralOutputs):
             ConfigError: If there is no continuous form.
         """
         return self.continuous().to_control(pade_order=pade_order) if continuous else state_space(self)
-
-
-def _continuous_form(model: _StateSpaceModel) -> ContinuousStateSpace:
-    """What :meth:`_StateSpaceModel.continuous` gives."""
-    system, late = model._run_freely, model.orders.shifts(len(model.mapping.inputs))
-    remedy = (
-        "fit fewer states, or a continuous transfer function (domain: continuous): such a pole mostly describes noise"
-    )
-    A, B = rates(system.A, system.B / np.array(model.scaling.input_scale), model.sample_time, remedy=remedy)
-    gain = np.atleast_1d(model.scaling.output_scale)[:, np.newaxis]
-    return ContinuousStateSpace(
-        A=A, B=B, C=gain * system.C, D=gain * system.D / np.array(model.scaling.input_scale),
-        delays=tuple(k * model.sample_time for k in late), mapping=model.mapping,
-    )  # fmt: skip
