@@ -14,7 +14,7 @@ from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
-from sysid.estimation.linear_posteriors import LinearPosterior
+from sysid.estimation.linear_posteriors import LinearPosterior, linear_posterior
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.training import Training
@@ -286,7 +286,7 @@ class Estimator:
         Returns:
             The fit; as it is where its estimator gives a posterior itself, or there is none.
         """
-        found = None if self.posterior is None else self.posterior(fit, traces, start)
+        found = None if self.posterior is None else linear_posterior(self.posterior, fit, traces, start)
         if found is None:
             return fit
         others = [Experiment.for_model(trace, fit.model, start) for trace in selection]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from sysid.estimation.networks.posterior import Noise, Posterior, free_run_error
 from sysid.estimation.nonparametric.noise import persistence
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import FitResult
+from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import (
     AbstractModel,
     ARXModel,
@@ -28,23 +29,30 @@ from sysid.traces import Trace
 GROWTH = 1e-6
 """By how much a pole's magnitude may exceed 1 before a free run is known at no sample."""
 
-LinearPosterior = Callable[[FitResult, Sequence[Trace], Start], Posterior | None]
+LinearPosterior = Callable[[Any, Uncertainty, Sequence[Trace], Start], Posterior | None]
+"""From a model, what is known of its parameters, its estimation traces, and how a free run over them begins."""
 
 
-def arx_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
-    """Of an ARX model: least squares says it of the coefficients, under white residuals one step ahead.
+def linear_posterior(of: LinearPosterior, fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
+    """The posterior of a linear fit.
 
     Args:
+        of: That of its kind of structure.
         fit: The fit.
         traces: Estimation traces.
         start: How a free run over them begins.
 
     Returns:
-        The posterior; ``None`` where the free run grows without bound.
+        The posterior; ``None`` where the fit has no uncertainty, or its free run grows without bound.
     """
-    model, known = cast("ARXModel", fit.model), fit.uncertainty
-    if known is None or model.pole_radius > 1.0 + GROWTH:
+    radius = fit.model.pole_radius
+    if fit.uncertainty is None or (radius is not None and radius > 1.0 + GROWTH):
         return None
+    return of(fit.model, fit.uncertainty, traces, start)
+
+
+def arx_posterior(model: ARXModel, known: Uncertainty, traces: Sequence[Trace], start: Start) -> Posterior | None:
+    """Of an ARX model: least squares says it of the coefficients, under white residuals one step ahead."""
     n = len(model.coefficients)
     root = _root(known.covariance)
     factor = np.zeros((1 + n, root.shape[1]))  # the recursion has the constant first
@@ -55,38 +63,23 @@ def arx_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Post
     return Posterior(factor=factor, noise=replace(noise, one_step=known.noise_variance))
 
 
-def polynomial_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
-    """Of OE, Box-Jenkins and ARMAX: their coefficients, under white innovations.
-
-    Args:
-        fit: The fit.
-        traces: Estimation traces.
-        start: How a free run over them begins.
-
-    Returns:
-        The posterior; ``None`` where the free run grows without bound, or its noise drifts so.
-    """
-    model, known = cast("PolynomialModel", fit.model), fit.uncertainty
-    if known is None or model.orders.drifts or model.pole_radius > 1.0 + GROWTH:
+def polynomial_posterior(
+    model: PolynomialModel, known: Uncertainty, traces: Sequence[Trace], start: Start
+) -> Posterior | None:
+    """Of OE, Box-Jenkins and ARMAX: their coefficients, under white innovations; none where the noise drifts."""
+    if model.orders.drifts:
         return None
     root = _root(known.covariance) / model.gains[:, np.newaxis]
     return Posterior(factor=root, noise=_noise(model, traces, start, len(root)))
 
 
-def state_space_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
-    """Of a state space: the entries of its matrices, along the directions that change what it does.
-
-    Args:
-        fit: The fit.
-        traces: Estimation traces.
-        start: How a free run over them begins.
-
-    Returns:
-        The posterior; ``None`` where a subspace method alone was used, or the free run grows without bound.
-    """
-    model = cast("LinearStateSpaceModel | VectorStateSpaceModel", fit.model)
-    if fit.uncertainty is None or model.pole_radius > 1.0 + GROWTH:
-        return None
+def state_space_posterior(
+    model: LinearStateSpaceModel | VectorStateSpaceModel,
+    _: Uncertainty,
+    traces: Sequence[Trace],
+    start: Start,
+) -> Posterior | None:
+    """Of a state space: the entries of its matrices, along the directions that change what it does."""
     root = matrices_root(model, traces, start)
     return Posterior(factor=root, noise=_noise(model, traces, start, root.shape[1]))
 
@@ -102,21 +95,11 @@ def _noise(model: AbstractModel, traces: Sequence[Trace], start: Start, paramete
     return Noise(free_run=left.free_run * counted / (counted - paid), one_step=left.one_step * white)
 
 
-def transfer_function_posterior(fit: FitResult, traces: Sequence[Trace], start: Start) -> Posterior | None:
-    """Of a transfer function: its polynomials, under white errors of the free run.
-
-    Args:
-        fit: The fit.
-        traces: Estimation traces; the fit's own covariance is all that is needed.
-        start: Likewise.
-
-    Returns:
-        The posterior; ``None`` where the fit has no covariance, or the free run grows without bound.
-    """
+def transfer_function_posterior(
+    model: TransferFunctionModel, known: Uncertainty, traces: Sequence[Trace], start: Start
+) -> Posterior | None:
+    """Of a transfer function: its polynomials, under white errors of the free run, of which the fit knows all."""
     del traces, start
-    model, known = cast("TransferFunctionModel", fit.model), fit.uncertainty
-    if known is None or model.pole_radius > 1.0 + GROWTH:
-        return None
     root, names = _root(known.covariance), _polynomial_names(model)
     factor = np.zeros((len(names), root.shape[1]))
     for i, name in enumerate(known.names):  # an input that the records do not determine is not among them
