@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.models.channels.history import History
-from sysid.models.grey_box.state_search import LEAST_NOISE, StateSearch
+from sysid.models.contract.state_descent import LEAST_NOISE, StateSearch
 
 if TYPE_CHECKING:
     from sysid.models.grey_box.equation_form import EquationForm

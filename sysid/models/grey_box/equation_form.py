@@ -13,10 +13,10 @@ from sysid.models.channels.ends import read_now
 from sysid.models.channels.history import History
 from sysid.models.contract.column_recursion import ColumnEquation, ColumnRecursion
 from sysid.models.contract.form import no_prediction
+from sysid.models.contract.state_descent import StateSearch
 from sysid.models.grey_box.case_search import shown
 from sysid.models.grey_box.case_values import CaseValues
 from sysid.models.grey_box.equation_programs import EquationPrograms
-from sysid.models.grey_box.state_search import StateSearch
 from sysid.models.orders.activations import PLAIN
 from sysid.models.orders.lags import Lags
 

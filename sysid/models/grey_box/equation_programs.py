@@ -14,7 +14,8 @@ from sysid.kernels import equation_run
 from sysid.kernels import register_machine as machine
 from sysid.models.channels.scaling import Scaling, VectorScaling
 from sysid.models.contract.form import AbstractForm
-from sysid.models.grey_box.state_search import LARGEST, Derived, at_rest
+from sysid.models.contract.state_descent import LARGEST
+from sysid.models.grey_box.state_search import Derived, at_rest
 
 Array = NDArray[np.float64]
 

@@ -1,30 +1,17 @@
-"""The state of a nonlinear model that nobody measured: at rest, and before a record that shows it."""
+"""The state of a nonlinear model at rest, which nobody measured."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.models.contract.state_descent import STEPS, usable
+
 Array = NDArray[np.float64]
 Derived = tuple[Array, Array, Array]
 """Values, and their derivatives by state and by parameters."""
-
-NOISE = 1e-2
-"""Standard deviation of an output's history in scaled numbers, beside a state whose deviation from what is expected is
-of order 1: weak enough to matter only where the history does not show a state."""
-
-SHARPENED, LEAST_NOISE = 4, 1e-10
-"""Times that the noise is taken from what the state leaves of the history, where that is less; and its least."""
-
-STEPS = 50
-"""Steps of a search at most."""
-
-MANY = 6
-"""States up to which searches begin on both sides of each."""
 
 SLOWLY, SHORTER, PATIENCE = 1e-2, 0.5, 3
 """Part of what changes by which a step has to lessen it, or part of the step before that it has to be shorter than; and
@@ -32,9 +19,6 @@ steps in a row that may be neither before a search ends."""
 
 STOOD = 1e-10
 """What changes where nothing does, in shares of what would: searches from elsewhere are not needed then."""
-
-LARGEST = 1e100
-"""Numbers from here on are those of a run that explodes."""
 
 RANK = 1e-9
 """Share of the largest singular value below which an equilibrium leaves a direction open."""
@@ -140,7 +124,7 @@ def _stood(
     for _ in range(STEPS):
         (change, by_state, _), (y, out_state, _) = standing(x)
         J = by_state[:, places] * scale / rows[:, None]
-        if not _usable(J) or not _usable(change):
+        if not usable(J) or not usable(change):
             return np.inf, x
         J, open_ = _split(J, change)
         step = -np.linalg.pinv(J, rcond=RANK) @ (change / rows)
@@ -170,86 +154,10 @@ def _stood(
     return now, x
 
 
-def _usable(values: Array) -> bool:
-    """Whether numbers can be squared and summed up: of a run that explodes they cannot."""
-    return bool(np.all(np.abs(values) < LARGEST))
-
-
 def _split(J: Array, change: Array) -> tuple[Array, Array]:
     """A matrix that is safe to invert, and the directions that it leaves open."""
-    if not _usable(J) or not _usable(change):
+    if not usable(J) or not usable(change):
         return np.zeros_like(J), np.zeros((J.shape[1], 0))
     _, sizes, rows = np.linalg.svd(J)
     rank = int(np.count_nonzero(sizes > RANK * max(float(sizes.max(initial=0.0)), 1e-300)))
     return J, rows[rank:].T
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class StateSearch:
-    r"""The scaled state :math:`\xi` that minimises :math:`|e(\xi)|^2/\sigma^2 + |\xi - \xi_0|^2` over a history.
-
-    :math:`\sigma` is what is left of the output there: the less the state leaves of it, the less what was expected has
-    a say.
-
-    Args:
-        misfit: Errors at a state, and their derivatives where those are asked for.
-        low: Least state.
-        high: Greatest state.
-        expected: The state expected.
-    """
-
-    misfit: Callable[[Array, bool], tuple[Array, Array]]
-    low: Array
-    high: Array
-    expected: Array
-
-    def found(self) -> Array:
-        """The state, from the best of several beginnings."""
-        with np.errstate(over="ignore", invalid="ignore"):  # runs from some of them may explode
-            return self._found()
-
-    def _found(self) -> Array:
-        n = len(self.expected)
-        near = np.clip(self.expected, self.low, self.high)
-        begins = [near, np.clip(np.zeros(n), self.low, self.high)]
-        if n <= MANY:
-            begins += [np.clip(sign * row, self.low, self.high) for row in np.eye(n) for sign in (1.0, -1.0)]
-        ends = [self._descended(begin, NOISE) for begin in begins]
-        xi = min(ends, key=lambda end: self._total(end, NOISE))
-        away = self.misfit(xi, False)[0]
-        spare, noise = len(away) - n, NOISE
-        for _ in range(SHARPENED if spare > 0 else 0):
-            level = max(float(np.linalg.norm(self.misfit(xi, False)[0])) / spare**0.5, LEAST_NOISE)
-            if not level < noise / 2.0:
-                break
-            noise = level
-            xi = self._descended(xi, noise)
-        return xi
-
-    def _total(self, xi: Array, noise: float) -> float:
-        away = self.misfit(xi, False)[0]
-        total = float(away @ away) / noise**2 + float(np.sum((xi - self.expected) ** 2))
-        return total if np.isfinite(total) else np.inf
-
-    def _descended(self, xi: Array, noise: float) -> Array:
-        """Levenberg-Marquardt from one state, within the bounds."""
-        n, damping, best = len(xi), 1e-3, self._total(xi, noise)
-        for _ in range(STEPS):
-            away, J = self.misfit(xi, True)
-            if not _usable(J) or not _usable(away):
-                break
-            spread = np.sqrt(damping * ((J**2).sum(axis=0) / noise**2 + 1.0))
-            rows = np.concatenate([J / noise, np.eye(n), np.diag(spread)])
-            misses = np.concatenate([away / noise, xi - self.expected, np.zeros(n)])
-            trial = np.clip(xi - np.linalg.lstsq(rows, misses, rcond=None)[0], self.low, self.high)
-            total = self._total(trial, noise)
-            if total < best:
-                done = best - total < 1e-9 * best
-                xi, best, damping = trial, total, damping / 10.0
-                if done:
-                    break
-            else:
-                damping *= 10.0
-                if damping > 1e12:
-                    break
-        return xi

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from sysid.errors import ConfigError, shortened
-from sysid.models.networks.neural_form import HISTORY_NOISE, NeuralForm, Seen
+from sysid.models.networks.neural_form import NeuralForm, Seen
 from sysid.models.orders.lags import whole
 
 
@@ -138,9 +138,11 @@ class NeuralEnsemble(NeuralForm):
             return alone
         found = [alone]
         for signs in self.all_signs:
-            states = [member.sought(seen, part, [member.descended_with(signs, seen, part)]) for member, part in pairs]
+            states = [
+                member.search(seen, part).found([member.descended_with(signs, seen, part)]) for member, part in pairs
+            ]
             found.append(np.concatenate(states))
-        return min(found, key=lambda states: self._misfit(seen, states, x, HISTORY_NOISE))
+        return min(found, key=self.search(seen, x).total)
 
     def run(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled outputs over some scaled inputs; see the base class."""

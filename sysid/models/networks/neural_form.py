@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -16,6 +15,7 @@ from sysid.kernels.neurons import code_of
 from sysid.models.channels.history import History
 from sysid.models.channels.scaling import Scaling, VectorScaling
 from sysid.models.contract.form import AbstractForm, no_prediction
+from sysid.models.contract.state_descent import StateSearch
 from sysid.models.networks.neural_sizes import Sizes
 from sysid.models.orders.activations import PLAIN
 
@@ -23,18 +23,8 @@ STATE_BOUND = 10.0
 """Bound of each state. Fits scale the states to -1 to 1 over their records; ten times that is lost, and the bound
 keeps a free run finite."""
 
-HISTORY_NOISE = 1e-2
-"""Standard deviation of the output's history in scaled numbers, beside a state whose deviation from what the oldest
-sample says is of order 1: weak enough to matter only where the history does not show a state."""
-
-SHARPENED, LEAST_NOISE = 4, 1e-10
-"""Times that the history's noise is taken from what the state leaves of it, where that is less; and its least."""
-
 MOST_SIGNED = 4
 """Outputs whose signs are tried in all ways where a sensor cannot tell them; of more, all with the same sign."""
-
-CORRECTIONS = 50
-"""Levenberg-Marquardt steps at most to find the state that a history shows; mostly a handful suffice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +175,7 @@ class NeuralForm(AbstractForm):
         if self.rectified:
             # Across the kink of an absolute value no descent leads. With either sign given there is no kink.
             around += [self.descended_with(signs, seen, x) for signs in self.all_signs]
-        return self.sought(seen, x, around)
+        return self.search(seen, x).found(around)
 
     @property
     def all_signs(self) -> list[tuple[float, ...]]:
@@ -208,58 +198,26 @@ class NeuralForm(AbstractForm):
         """
         signed = replace(self, rectified=False, low=-np.inf, high=np.inf)
         wanted = replace(seen, output=np.array(signs) * seen.output)
-        return signed._descended(wanted, expected, expected, HISTORY_NOISE)
+        return signed.search(wanted, expected).descended(expected)
 
-    def sought(
-        self, seen: Seen, expected: NDArray[np.float64], around: Sequence[NDArray[np.float64]]
-    ) -> NDArray[np.float64]:
-        """The state before some samples, by descents from some.
+    def search(self, seen: Seen, expected: NDArray[np.float64]) -> StateSearch:
+        """The search for the state before some samples.
 
         Args:
             seen: The samples.
             expected: State expected, shape ``(n_states,)``.
-            around: Where descents begin, each of this shape.
 
         Returns:
-            Shape ``(n_states,)``.
+            The search, without bounds.
         """
-        descents = [self._descended(seen, begin, expected, HISTORY_NOISE) for begin in around]
-        found = min(descents, key=lambda x: self._misfit(seen, x, expected, HISTORY_NOISE))
-        # The less the state leaves of the output, the less what was expected has a say.
-        noise, spare = HISTORY_NOISE, int(np.count_nonzero(seen.known)) * self.sizes.outputs - len(expected)
-        for _ in range(SHARPENED if spare > 0 else 0):
-            level = max(float(np.linalg.norm(self.away(seen, found))) / spare**0.5, LEAST_NOISE)
-            if not level < noise / 2.0:
-                break
-            noise = level
-            found = self._descended(seen, found, expected, noise)
-        return found
+        n, far = len(expected), np.full(len(expected), np.inf)
+        known = slice(None) if seen.known.all() else seen.known
 
-    def _descended(
-        self, seen: Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float
-    ) -> NDArray[np.float64]:
-        """Levenberg-Marquardt from one state."""
-        n = len(x)
-        damping, best = 1e-3, self._misfit(seen, x, expected, noise)
-        for _ in range(CORRECTIONS):
-            J = self._linearised(seen.inputs, x)[seen.known].reshape(-1, n)
-            away = self.away(seen, x)[seen.known].ravel()
-            if not np.isfinite(J).all():
-                break
-            # By orthogonal factors: squared, the precision of a state that is seen well leaves no digit to the others.
-            spread = np.sqrt(damping * ((J**2).sum(axis=0) / noise**2 + 1.0))
-            rows = np.concatenate([J / noise, np.eye(n), np.diag(spread)])
-            misses = np.concatenate([away / noise, x - expected, np.zeros(n)])
-            trial = x - np.linalg.lstsq(rows, misses, rcond=None)[0]
-            misfit = self._misfit(seen, trial, expected, noise)
-            if misfit < best:
-                done = best - misfit < 1e-9 * best
-                x, best, damping = trial, misfit, damping / 10.0
-                if done:
-                    break
-            else:
-                damping *= 10.0
-        return x
+        def misfit(x: NDArray[np.float64], moving: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            away = (self.run(seen.inputs, x.copy()) - seen.output)[known].ravel()
+            return away, self._linearised(seen.inputs, x)[known].reshape(-1, n) if moving else away
+
+        return StateSearch(misfit=misfit, low=-far, high=far, expected=expected)
 
     def run(self, scaled: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Scaled outputs over some scaled inputs; ``x`` becomes the state after them.
@@ -348,19 +306,3 @@ class NeuralForm(AbstractForm):
         J = np.empty((*y.shape, dynamic + n + self.sizes.output.stop - self.sizes.output.start))
         kernel.sensitivities(scaled, x.copy(), S, *self.arguments(self.theta), y, J)
         return J[:, :, dynamic : dynamic + n]
-
-    def away(self, seen: Seen, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Outputs minus what was seen, zero where that is masked.
-
-        Args:
-            seen: The samples.
-            x: State before the first of them, shape ``(n_states,)``.
-
-        Returns:
-            Shape ``(n_samples, n_outputs)``, in scaled numbers.
-        """
-        return np.where(seen.known[:, None], self.run(seen.inputs, x.copy()) - seen.output, 0.0)
-
-    def _misfit(self, seen: Seen, x: NDArray[np.float64], expected: NDArray[np.float64], noise: float) -> float:
-        away = self.away(seen, x).ravel()
-        return float(away @ away / noise**2 + np.sum((x - expected) ** 2))

@@ -8,7 +8,6 @@ import pytest
 from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Scaling
 from sysid.models.grey_box import equation_programs
 from sysid.models.grey_box.grey_box import lowered
-from sysid.models.grey_box.state_search import StateSearch
 
 
 def a_model(equations: str, **initial: object) -> GreyBoxModel:
@@ -67,12 +66,3 @@ def test_a_history_shows_the_state_before_it(begin: list[float]) -> None:
     history = History(inputs=u[:15], output=y[:15])
     assert form.followed(history) == pytest.approx(y[:15], abs=1e-6)
     assert model.simulate(u[15:], history) == pytest.approx(y[15:], abs=1e-5)
-
-
-def test_a_run_that_explodes_ends_the_search_where_it_is() -> None:
-    def misfit(xi: np.ndarray, derived: bool) -> tuple[np.ndarray, np.ndarray]:
-        del derived
-        return np.full(9, 1e180), np.full((9, len(xi)), 1e250)
-
-    search = StateSearch(misfit=misfit, low=np.full(2, -np.inf), high=np.full(2, np.inf), expected=np.zeros(2))
-    assert search.found().tolist() == [0.0, 0.0]

@@ -225,9 +225,8 @@ class NeuralRecords:
     ) -> NDArray[np.float64]:
         """The state that the first samples of a record show, sought from a state near it."""
         form = self.at(theta)
-        return form.sought(
-            seen, form.resting(record.oldest[: form.sizes.inputs], record.oldest[form.sizes.inputs : -1]), [near]
-        )
+        inputs, output = record.oldest[: form.sizes.inputs], record.oldest[form.sizes.inputs : -1]
+        return form.search(seen, form.resting(inputs, output)).found([near])
 
     def as_scored(self, theta: NDArray[np.float64]) -> Self | None:
         """The same residuals, begun as where runs are scored, where these would be others.
