@@ -211,17 +211,9 @@ class EquationProvider(AbstractProvider):
                 total += 0.5 * float(np.vdot(error, error))
         return total if np.isfinite(total) else np.inf
 
-    def linearise(self, theta: Array) -> Linearisation:
+    @np.errstate(over="ignore", invalid="ignore")  # likewise
+    def linearise(self, theta: Array, *, correlation: bool = True) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
-        with np.errstate(over="ignore", invalid="ignore"):  # likewise
-            return self._linearised(theta, correlation=True)
-
-    def without_news(self, theta: Array) -> Linearisation:
-        """The same without the correlation time; see the base class."""
-        with np.errstate(over="ignore", invalid="ignore"):  # likewise
-            return self._linearised(theta, correlation=False)
-
-    def _linearised(self, theta: Array, *, correlation: bool) -> Linearisation:
         gradient, matrix, shared = np.zeros(len(theta)), np.zeros((len(theta), len(theta))), self.at(theta)
         loss = correlated = samples = 0.0
         for number in range(len(self.records)):

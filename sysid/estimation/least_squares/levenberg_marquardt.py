@@ -246,7 +246,9 @@ class LevenbergMarquardt:
         # BLAS threads that wake for matrices of this size cost more than they give (measured: 92 ms an epoch of
         # 20,000 x 281 with two threads, 45 ms with one); the second core is better spent on another start.
         with one_blas_thread():
-            state = State(theta=theta, at=provider.without_news(theta), damping=self.damping, prior=prior)
+            state = State(
+                theta=theta, at=provider.linearise(theta, correlation=False), damping=self.damping, prior=prior
+            )
         return self.resume(provider, self._record(state, provider, 0.0))
 
     def resume(
@@ -315,7 +317,7 @@ class LevenbergMarquardt:
                     continue
             gain = (now - loss - state.prior.penalty(trial)) / promised if promised > 0.0 else -1.0
             if gain > MIN_GAIN:
-                at = provider.linearise(trial) if self._asks(state.iteration + 1) else provider.without_news(trial)
+                at = provider.linearise(trial, correlation=self._asks(state.iteration + 1))
                 if at.finite:
                     damping, further = damping.accepted(gain), state.iteration + 1
                     state = replace(state, theta=trial, at=at, damping=damping, iteration=further)

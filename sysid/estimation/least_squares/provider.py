@@ -79,25 +79,14 @@ class AbstractProvider(ABC):
         """
 
     @abstractmethod
-    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+    def linearise(self, theta: NDArray[np.float64], *, correlation: bool = True) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix.
 
         Args:
             theta: Flat parameters.
+            correlation: Whether the correlation time is found as well, for the evidence. A step needs it not, and a
+                pass over a short record is so fast that a transform of its residuals is a tenth of it.
 
         Returns:
-            All three, and the correlation time that the evidence asks for.
+            All three, and that time where it was asked for.
         """
-
-    def without_news(self, theta: NDArray[np.float64]) -> Linearisation:
-        """The same without the correlation time: what a step needs before the evidence is asked.
-
-        A pass over a short record is so fast that a transform of its residuals is a tenth of it.
-
-        Args:
-            theta: Flat parameters.
-
-        Returns:
-            Loss, gradient and Gauss-Newton matrix; of a provider that has no such time to find, as :meth:`linearise`.
-        """
-        return self.linearise(theta)

@@ -193,7 +193,7 @@ class SeparableProvider(AbstractProvider):
         solution = self.separated(theta)
         return np.inf if solution is None else 0.5 * float(solution.residual @ solution.residual)
 
-    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+    def linearise(self, theta: NDArray[np.float64], *, correlation: bool = True) -> Linearisation:  # noqa: ARG002 - it is 1
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
         solution = self.separated(theta)
         n = len(theta)

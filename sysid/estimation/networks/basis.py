@@ -152,14 +152,8 @@ class RebasedProvider(AbstractProvider):
         """Half the weighted sum of squared residuals; see the base class."""
         return self.inner.loss(self.to_plain @ theta)
 
-    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+    def linearise(self, theta: NDArray[np.float64], *, correlation: bool = True) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix with respect to the parameters in the basis."""
-        return self._in_basis(self.inner.linearise(self.to_plain @ theta))
-
-    def without_news(self, theta: NDArray[np.float64]) -> Linearisation:
-        """The same without the correlation time; see the base class."""
-        return self._in_basis(self.inner.without_news(self.to_plain @ theta))
-
-    def _in_basis(self, at: Linearisation) -> Linearisation:
         P = self.to_plain
+        at = self.inner.linearise(P @ theta, correlation=correlation)
         return replace(at, gradient=P.T @ at.gradient, gauss_newton=P.T @ at.gauss_newton @ P)

@@ -143,7 +143,7 @@ class StepSamples(AbstractProvider):
             total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
 
-    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+    def linearise(self, theta: NDArray[np.float64], *, correlation: bool = True) -> Linearisation:  # noqa: ARG002 - it is 1
         """Loss, gradient and Gauss-Newton matrix; see the base class.
 
         Samples that were chosen for being different are independent, so that the correlation time is 1.

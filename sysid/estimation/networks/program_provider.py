@@ -104,15 +104,8 @@ class ProgramProvider(AbstractProvider):
         total = sum(self._each(one))
         return total if math.isfinite(total) else math.inf
 
-    def linearise(self, theta: Array) -> Linearisation:
+    def linearise(self, theta: Array, *, correlation: bool = True) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
-        return self._linearised(theta, correlation=True)
-
-    def without_news(self, theta: Array) -> Linearisation:
-        """The same without the correlation time; see the base class."""
-        return self._linearised(theta, correlation=False)
-
-    def _linearised(self, theta: Array, *, correlation: bool) -> Linearisation:
         program = self._trained.program_at(theta)
         found = self._each(lambda record: self._normal_equations(program, record, len(theta)))
         with np.errstate(over="ignore", invalid="ignore"):  # infinities of two records may cancel

@@ -26,7 +26,7 @@ class Residuals(AbstractProvider):
     def loss(self, theta):
         return 0.5 * float(np.sum(self.function(theta) ** 2))
 
-    def linearise(self, theta):
+    def linearise(self, theta, *, correlation=True):  # noqa: ARG002
         e, J = self.function(theta), self.jacobian(theta)
         return Linearisation(loss=0.5 * float(e @ e), gradient=J.T @ e, gauss_newton=J.T @ J)
 
@@ -186,7 +186,7 @@ class _Line(AbstractProvider):
     def loss(self, theta: np.ndarray) -> float:
         return 0.5 * float(np.sum((self.A @ theta - self.b) ** 2))
 
-    def linearise(self, theta: np.ndarray) -> Linearisation:
+    def linearise(self, theta: np.ndarray, *, correlation: bool = True) -> Linearisation:  # noqa: ARG002
         error = self.A @ theta - self.b
         return Linearisation(loss=self.loss(theta), gradient=self.A.T @ error, gauss_newton=self.A.T @ self.A)
 
@@ -217,7 +217,7 @@ class _Exchanger(AbstractProvider):
     def loss(self, theta: np.ndarray) -> float:
         return 0.5 * float(np.sum((self._run(theta) - self.measured) ** 2)) if theta[1:].min() > 0.0 else np.inf
 
-    def linearise(self, theta: np.ndarray) -> Linearisation:
+    def linearise(self, theta: np.ndarray, *, correlation: bool = True) -> Linearisation:  # noqa: ARG002
         moved = [1e-6 * theta[i] * np.eye(3)[i] for i in range(3)]
         J = np.column_stack([(self._run(theta + d) - self._run(theta - d)) / (2.0 * d.sum()) for d in moved])
         error = self._run(theta) - self.measured
@@ -267,7 +267,7 @@ class _Steep(AbstractProvider):
     def loss(self, theta):  # noqa: ARG002 - as every provider
         return 1.0
 
-    def linearise(self, theta):  # noqa: ARG002
+    def linearise(self, theta, *, correlation=True):  # noqa: ARG002
         return Linearisation(loss=1.0, gradient=np.array([1e308]), gauss_newton=np.array([[1e300]]))
 
 

@@ -43,12 +43,12 @@ def test_a_step_is_the_same_where_nobody_asks_for_news(structure, monkeypatch):
     sysid.fit(record(), "u -> y", structure, Training(starts=1, max_iterations=3), stability=None)
     assert found
     for provider, theta in found:
-        whole, bare = provider.linearise(theta), provider.without_news(theta)
+        whole, bare = provider.linearise(theta), provider.linearise(theta, correlation=False)
         assert whole.loss == bare.loss
         np.testing.assert_array_equal(whole.gradient, bare.gradient)
         np.testing.assert_array_equal(whole.gauss_newton, bare.gauss_newton)
         assert whole.correlation_time >= 1.0
-    assert any(np.isnan(provider.without_news(theta).correlation_time) for provider, theta in found)
+    assert any(np.isnan(provider.linearise(theta, correlation=False).correlation_time) for provider, theta in found)
 
 
 @dataclass(eq=False)
@@ -68,13 +68,10 @@ class Line(AbstractProvider):
     def loss(self, theta):
         return self._at(theta).loss
 
-    def linearise(self, theta):
-        self.asked += 1
-        return self._at(theta)
-
-    def without_news(self, theta):
-        self.bare += 1
-        return replace(self._at(theta), correlation_time=np.nan)
+    def linearise(self, theta, *, correlation=True):
+        self.asked += correlation
+        self.bare += not correlation
+        return self._at(theta) if correlation else replace(self._at(theta), correlation_time=np.nan)
 
 
 @pytest.mark.parametrize("after", [None, 3])

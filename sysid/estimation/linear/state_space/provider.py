@@ -101,7 +101,7 @@ class PredictionErrors(AbstractProvider):
             return False
         return system.radius < self.largest if self.stable else system.radius < _LOST
 
-    def linearise(self, theta: Array) -> Linearisation:
+    def linearise(self, theta: Array, *, correlation: bool = True) -> Linearisation:  # noqa: ARG002 - it is 1
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
         system, P = self.chart.system(theta), self.chart.n_parameters
         loss, g, H = 0.0, np.zeros(P), np.zeros((P, P))

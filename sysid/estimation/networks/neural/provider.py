@@ -48,18 +48,10 @@ class NeuralProvider(NeuralRecords, AbstractProvider):
         y -= record.target
         return y
 
-    def linearise(self, theta: NDArray[np.float64]) -> Linearisation:
+    # A random start whose free run explodes has none; it is not told as a warning, the engine sees it.
+    @np.errstate(over="ignore", invalid="ignore")
+    def linearise(self, theta: NDArray[np.float64], *, correlation: bool = True) -> Linearisation:
         """Loss, gradient and Gauss-Newton matrix; see the base class."""
-        # A random start whose free run explodes has none; it is not told as a warning, the engine sees it.
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self._linearised(theta, correlation=True)
-
-    def without_news(self, theta: NDArray[np.float64]) -> Linearisation:
-        """The same without the correlation time; see the base class."""
-        with np.errstate(over="ignore", invalid="ignore"):  # likewise
-            return self._linearised(theta, correlation=False)
-
-    def _linearised(self, theta: NDArray[np.float64], *, correlation: bool) -> Linearisation:
         gradient, matrix = np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
         loss, correlated = 0.0, 0.0
         for record in self._records:
