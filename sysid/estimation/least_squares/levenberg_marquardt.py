@@ -246,9 +246,8 @@ class LevenbergMarquardt:
         # BLAS threads that wake for matrices of this size cost more than they give (measured: 92 ms an epoch of
         # 20,000 x 281 with two threads, 45 ms with one); the second core is better spent on another start.
         with one_blas_thread():
-            state = State(
-                theta=theta, at=provider.linearise(theta, correlation=False), damping=self.damping, prior=prior
-            )
+            at = provider.linearise(theta, correlation=False)
+        state = State(theta=theta, at=at, damping=self.damping, prior=prior)
         return self.resume(provider, self._record(state, provider, 0.0))
 
     def resume(

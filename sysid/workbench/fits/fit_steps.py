@@ -100,14 +100,7 @@ class FitSteps:
         return (self.config.data, self.config.selection, self.config.stability.sequences)
 
     def outline_around(self, trials: Outlined) -> list[Outlined]:
-        """All steps of a search, as far as they are known before it: of which structure a fit is, nobody knows.
-
-        Args:
-            trials: The search, between the loading and the fits.
-
-        Returns:
-            The steps in order.
-        """
+        """All steps of a search, which stands behind the loading: of which structure a fit is, nobody knows."""
         data, *rest = self.outline()
         named = [
             replace(one, title=one.title.partition(",")[0]) if one.name.startswith("fit-") else one for one in rest
