@@ -65,7 +65,7 @@ def tell_of_compiling(tell: Callable[[], None]) -> None:
 def _listen() -> None:
     from numba.core import event
 
-    class FirstCompilation(event.Listener):
+    class FirstCompilation(event.Listener):  # type: ignore[misc]  # Numba has no types
         """Tells once."""
 
         def on_start(self, _: Any) -> None:

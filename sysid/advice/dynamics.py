@@ -28,6 +28,8 @@ CURVED, MOST_EXPLAINED = "past outputs act along a curve, and a linear response 
 AWAY = "the plant runs away by itself, and what is seen is the loop"
 QUIET, LOUD = 20.0, 5.0
 """Signal-to-noise ratios in decibel from which a record is quiet, and below which it is loud."""
+LITTLE = 1.0 / (1.0 + 10.0 ** (-LOUD / 10.0))
+"""Share of the output that a response explains, below which what is read off it rests on little: it is as loud."""
 
 
 def check_dynamics(record: Record) -> Iterator[Finding]:
@@ -120,6 +122,7 @@ def _settling(record: Record, whole: ImpulseResponse, j: int, name: str) -> Find
         "gain_deviation": float(deviation[j, -1]),
         "length": total / seconds if seconds > 0.0 else np.inf,
         "lags_seconds": float(whole.time[-1]),
+        "explained": whole.explained,
     }
     if record.integrates:
         code, verdict = INTEGRATES, Verdict.NOTE
@@ -129,6 +132,8 @@ def _settling(record: Record, whole: ImpulseResponse, j: int, name: str) -> Find
         code, verdict = "settling.never", Verdict.LOOK
     elif figures["length"] < 10.0:
         code, verdict = "settling.short_record", Verdict.LOOK
+    elif whole.explained < LITTLE:
+        code, verdict = "settling.little", Verdict.NOTE
     else:
         code, verdict = "settling", Verdict.FINE
     return Finding(topic=Topic.DYNAMICS, code=code, verdict=verdict, subject=(name,), figures=figures)
@@ -198,7 +203,7 @@ def check_sampling(record: Record) -> Iterator[Finding]:
     j = int(np.argmax(acting))
     samples = rise(found.step()[0][j]) * factor
     subject = (found.mapping.inputs[j],)
-    figures = {"rise": samples, "sample_time": record.sample_time, "factor": factor}
+    figures = {"rise": samples, "sample_time": record.sample_time, "factor": factor, "explained": found.explained}
     every, response = max(int(samples / GOOD), 2), np.abs(found.values[j])
     # Beside a curve in the state, a linear response that explains little is no measure of how fast the plant is.
     curved = record.state_curve is not None and found.explained < MOST_EXPLAINED
@@ -215,6 +220,8 @@ def check_sampling(record: Record) -> Iterator[Finding]:
     elif samples < TOO_SLOW and found.settling()[j] - found.dead_times[j].best <= 3:
         code, verdict = "sampling.slow", Verdict.LOOK
         figures["proposed"] = record.sample_time / 5.0
+    elif found.explained < LITTLE:
+        code, verdict = "sampling.little", Verdict.NOTE
     else:
         code, verdict = "sampling.good", Verdict.FINE
     yield Finding(topic=Topic.SAMPLING, code=code, verdict=verdict, subject=subject, figures=figures)

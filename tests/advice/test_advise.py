@@ -131,6 +131,21 @@ def test_a_long_record_says_how_much_of_it_was_looked_at(monkeypatch: pytest.Mon
     assert finding(found, "dead_time").figures["best"] == 2
 
 
+@pytest.mark.parametrize("other", ["noise", "an input that is missing"])
+def test_a_gain_of_a_response_that_explains_little_is_told_to_be_one(other: str) -> None:
+    """It had been called fine where the response explained 41 % of the output."""
+    u = steps(2000, 3)
+    y = plant(u)
+    beside = noise(2000, 3, 1.0) if other == "noise" else plant(steps(2000, 4, hold=9))
+    found = look(trace(u, y + 1.2 * y.std() * beside / beside.std()))
+    told = finding(found, "settling.little", "u1")
+    assert told.verdict is Verdict.NOTE
+    assert told.figures["explained"] == pytest.approx(0.41, abs=0.1)
+    assert told.figures["gain"] == pytest.approx(1.5, abs=3.0 * told.figures["gain_deviation"])
+    assert "sampling.good" not in codes(found)
+    assert "explains only" in said(told, {"u1": "V", "y": "m"})[0]
+
+
 def test_noise_is_measured() -> None:
     u = steps(3000, 9)
     y = plant(u)

@@ -196,6 +196,12 @@ SAID: Final[dict[str, Words]] = {
         "A step of {who} settles within {seconds:.3g} s ({samples:.0f} samples); its gain is {gain:.4g} ±"
         " {gain_deviation:.2g}."
     ),
+    "settling.little": Words(
+        "A step of {who} settles within {seconds:.3g} s ({samples:.0f} samples) at a gain of {gain:.4g} ±"
+        " {gain_deviation:.2g}, by a response that explains only {explained:.0%} of the output.",
+        "Beside noise alone the gain is as sure as it says. Beside inputs that are missing, or a plant that integrates"
+        " or is not linear, it is none: see below.",
+    ),
     "settling.short_record": Words(
         "A step of {who} takes {seconds:.3g} s to settle; the record is only {length:.1f} times that.",
         "Record ten times the settling time at least.",
@@ -210,6 +216,9 @@ SAID: Final[dict[str, Words]] = {
     ),
     "settling.unknown": Words("How long a step of {who} takes: a linear response explains too little to say."),
     "sampling.good": Words("A step response of {who} rises over {rise:.1f} samples."),
+    "sampling.little": Words(
+        "A step response of {who} rises over {rise:.1f} samples; it explains only {explained:.0%} of the output."
+    ),
     "sampling.fast": Words(
         "A step response of {who} rises over {rise:.0f} samples: sampled faster than a model wants.",
         "Resample to some {proposed:.3g} s, filtered before: poles near one are hard to fit, and lags reach too short.",
