@@ -42,6 +42,7 @@ from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 from tests.benchmarks._linear_octave import octave_fits
 from tests.benchmarks._linear_systems import NAMES, SAMPLES, fit_percent, systems
+from tests.benchmarks._peers_environment import python_with
 
 PINNED = ("sippy_unipi==1.0.1", "nfoursid", "slycot")
 WORKER = Path(__file__).with_name("_linear_peers_worker.py")
@@ -75,20 +76,16 @@ def trace_of(u: np.ndarray, y: np.ndarray) -> tuple[Trace, Mapping]:
 
 def python_of_peers() -> Path:
     """The interpreter of the peers' environment, made if it is not there."""
-    folder = Path.home() / ".cache" / "sysid" / ("linear-peers-" + "-".join(p.replace("==", "-") for p in PINNED))
-    python = folder / "bin" / "python"
-    if not (folder / "complete").exists():
-        print(f"making {folder} with {', '.join(PINNED)}", flush=True)
-        subprocess.run([sys.executable, "-m", "venv", "--clear", str(folder)], check=True)
-        subprocess.run([str(python), "-m", "pip", "install", "-q", *PINNED], check=True)
-        (folder / "complete").touch()
-    return python
+    return python_with("linear-peers", PINNED)
 
 
 def peers(seeds: range) -> dict[str, tuple[str, float, float]]:
     """For each system the peer with the best median fit, that fit and its median seconds."""
     done = subprocess.run(
-        [str(python_of_peers()), str(WORKER), *map(str, seeds)], capture_output=True, text=True, check=True
+        [str(python_of_peers()), str(WORKER), *map(str, seeds)],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     lines: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
     for line in done.stdout.splitlines():

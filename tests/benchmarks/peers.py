@@ -45,6 +45,7 @@ from sysid.models import NARX, Mapping
 from sysid.reporting.scores import Score
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found, read, scored
+from tests.benchmarks._peers_environment import python_with
 
 PINNED = ("jax-sysid==1.1.0", "fastcan==0.6.0", "pyrenn==0.1")
 WORKER = Path(__file__).with_name("_peers_worker.py")
@@ -105,18 +106,6 @@ class Learned:
     seconds: np.ndarray
     errors: np.ndarray
     unseen: dict[str, float]
-
-
-def environment() -> Path:
-    """The peers' Python, made if it is not there."""
-    folder = Path.home() / ".cache" / "sysid" / ("peers-" + "-".join(p.replace("==", "-") for p in PINNED))
-    python = folder / "bin" / "python"
-    if not (folder / "complete").exists():
-        print(f"making {folder} with {', '.join(PINNED)}", flush=True)
-        subprocess.run([sys.executable, "-m", "venv", "--clear", str(folder)], check=True)
-        subprocess.run([str(python), "-m", "pip", "install", "-q", *PINNED], check=True)
-        (folder / "complete").touch()
-    return python
 
 
 def tank() -> Problem:
@@ -270,6 +259,11 @@ def judge(problem: Problem, runs: list[Learned], curves: list[tuple[np.ndarray, 
             peer=f"{best:.3g} {problem.unit} in {at_best:.1f} s, the median of its seeds' best",
             note="; ".join(filter(None, ("" if np.isfinite(undercut) else "ours does not get there", note))),
         )
+
+
+def environment() -> Path:
+    """The peers' Python, made if it is not there."""
+    return python_with("peers", PINNED)
 
 
 def elsewhere(problem: Problem, learned: Learned, best: float, cap: float) -> str:

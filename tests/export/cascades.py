@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,7 +13,6 @@ from sysid.models import (
     NARX,
     Cascade,
     Domain,
-    GreyBox,
     GreyBoxModel,
     Limit,
     Mapping,
@@ -25,6 +25,7 @@ from sysid.models import (
     parameter_count,
 )
 from sysid.models.linear.transfer_function import TransferFunctionModel
+from tests.models.cascades.cascades import equation
 
 
 def wired_narx(mapping: str, structure: NARX, seed: int, *, clamp: float = 3.0) -> NARXModel:
@@ -86,21 +87,7 @@ def wired_transfer_function(mapping: str) -> TransferFunctionModel:
 
 def wired_equation(text: str, *inputs: str, free: dict[str, float] | None = None, **tables) -> GreyBoxModel:
     """A member that is an equation; its parameters stand where they start."""
-    free = free or {}
-    return GreyBoxModel(
-        grey=GreyBox(equations=text, tables=tables, parameters=free),
-        theta=np.array(list(free.values())),
-        norms=(),
-        levels=(),
-        spans=(),
-        substeps=1,
-        scaling=Scaling.identity(len(inputs)),
-        mapping=Mapping(inputs=inputs, output=text.split(" = ", maxsplit=1)[0]),
-        sample_time=0.1,
-        input_units=("psi",) * len(inputs),
-        output_unit="psi",
-        rest_output=2.0,
-    )
+    return replace(equation(text, *inputs, free=free, **tables), rest_output=2.0)
 
 
 def build_cascade() -> Cascade:

@@ -112,7 +112,7 @@ def equation(text: str, *inputs: str, free: dict[str, float] | None = None, **ta
         sample_time=0.1,
         input_units=("psi",) * len(inputs),
         output_unit="psi",
-        rest_output=RESTS[output],
+        rest_output=RESTS.get(output, 0.0),
     )
 
 
