@@ -10,8 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from sysid.estimation import FitResult
 from sysid.models.store import structure_from_dict
 from sysid.reporting.results import Results
@@ -40,6 +38,7 @@ from sysid.workbench.sweep.store import TRIALS, TrialStore
 from sysid.workbench.sweep.trial import Bench
 from sysid.workbench.sweep.workers import AbstractWorkers, InThisProcess, LocalWorkers, NoWorkers
 from sysid.workbench.written import Written
+from sysid.yaml_files import yaml_text
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
@@ -108,8 +107,7 @@ def auto_of(config: AutoConfig, *, load: Callable[[], Data] | None = None, page:
         The search, with the YAML that makes it again.
     """
     fields = {"kind": config.kind, **config.model_dump(mode="json", exclude_defaults=True)}
-    text = yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=116)
-    return Auto(config=config, text=text, path=Path.cwd() / f"{config.name}.yaml", load=load, page=page)
+    return Auto(config=config, text=yaml_text(fields), path=Path.cwd() / f"{config.name}.yaml", load=load, page=page)
 
 
 def program(request: RunRequest) -> Program[Searched]:

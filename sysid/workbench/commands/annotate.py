@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import yaml
 from rich.table import Table
 
 from sysid.errors import ConfigError
@@ -17,6 +16,7 @@ from sysid.validation.annotator import Annotator
 from sysid.workbench.annotation import annotated_set, find_annotator
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.store import write_bytes
+from sysid.yaml_files import yaml_text
 
 
 def annotate_command(source: str, *, annotator: str, out: Path | None) -> None:
@@ -84,6 +84,5 @@ def _write(traces: TraceSet, annotator: Annotator, name: str, out: Path) -> Path
         "cases": cases,
         "provenance": traces.source or f"The data set {traces.name}.",
     }
-    text = yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=116, default_flow_style=None)
-    write_bytes(description, text.encode())
+    write_bytes(description, yaml_text(fields).encode())
     return description

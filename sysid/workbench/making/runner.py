@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from sysid.field_checks import check
 from sysid.ingest import load_dataset
 from sysid.plugins import find_plugin
@@ -22,6 +20,7 @@ from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Outlined, Step, Work
 from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.written import Written
+from sysid.yaml_files import yaml_text
 
 if TYPE_CHECKING:
     from sysid.workbench.kinds import RunRequest
@@ -94,9 +93,8 @@ class _Making:
             "description": self.config.description,
             **self.maker.dataset(self.options, results),
         }
-        text = yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=116, default_flow_style=None)
         file = run.store.path / FILE
-        write_bytes(file, f"# Made by: {run.command}\n\n{text}".encode())
+        write_bytes(file, f"# Made by: {run.command}\n\n{yaml_text(fields)}".encode())
         return file
 
 

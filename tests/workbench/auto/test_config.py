@@ -6,6 +6,8 @@ from sysid.errors import ConfigError
 from sysid.field_checks import check
 from sysid.models import ARX
 from sysid.workbench.auto.config import AutoConfig
+from sysid.workbench.auto.run import auto_of
+from sysid.yaml_files import parse_yaml
 
 SEARCH = {"kind": "auto", "name": "a", "data": "d", "mapping": "u -> y"}
 
@@ -27,3 +29,9 @@ def test_what_it_shares_with_a_sweep_comes_to_the_sweep():
     config = check(AutoConfig, SEARCH | {"rest": {"y": 2.0}, "seed": 7, "export": None}, where="search.yaml")
     swept = config.sweep(ARX(na=1, nb=[1], nk=[1]))
     assert (swept.rest, swept.seed, swept.export, swept.start) == ({"y": 2.0}, 7, None, config.start)
+
+
+@pytest.mark.parametrize("said", ["1e-3", "no", "a\u2028b"])
+def test_a_search_that_is_in_no_file_is_written_as_it_is_read(said):
+    config = check(AutoConfig, SEARCH | {"description": said, "rest": {"y": 2.0}}, where="search.yaml")
+    assert check(AutoConfig, parse_yaml(auto_of(config).text, where="again"), where="again") == config
