@@ -135,6 +135,31 @@ def input_columns(values: object, names: Sequence[str]) -> NDArray[np.float64]:
     return known_inputs(inputs[:, np.newaxis] if inputs.ndim == 1 and len(names) == 1 else inputs)
 
 
+def fitting_columns(inputs: NDArray[np.float64], n: int, *, more: bool = False) -> NDArray[np.float64]:
+    """Inputs as float64, a column for each that a form reads.
+
+    Args:
+        inputs: What is given.
+        n: How many columns there have to be.
+        more: Whether there may be more, which are not read.
+
+    Returns:
+        The inputs.
+
+    Raises:
+        TraceError: If they have another shape.
+    """
+    found = np.asarray(inputs, dtype=np.float64)
+    if found.ndim != 2 or found.shape[1] < n or (found.shape[1] > n and not more):
+        raise TraceError(
+            "the inputs do not fit the model",
+            expected=f"inputs and history of shape (n, {n})",
+            got=f"shape {found.shape}",
+            remedy="give one column per input of the mapping, in its order",
+        )
+    return found
+
+
 def _no_numbers(found: NDArray[Any]) -> TraceError:
     return TraceError(
         "the inputs are no numbers",

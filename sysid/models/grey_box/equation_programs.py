@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.equations import Lowered
-from sysid.errors import TraceError
 from sysid.kernels import equation_run
 from sysid.kernels import register_machine as machine
+from sysid.models.channels.history import fitting_columns
 from sysid.models.channels.scaling import Scaling, VectorScaling
 from sysid.models.contract.form import AbstractForm
 from sysid.models.contract.state_descent import LARGEST
@@ -130,15 +130,8 @@ class EquationPrograms(AbstractForm):
         Raises:
             TraceError: If there are fewer inputs than the equations read.
         """
-        inputs = np.asarray(inputs, dtype=np.float64)
         needed = max((channel + 1 for channel, _ in self.lowered.lagged), default=0)
-        if inputs.ndim != 2 or inputs.shape[1] < needed:
-            raise TraceError(
-                "the inputs do not fit the model",
-                expected=f"inputs and history of shape (n, {needed})",
-                got=f"shape {inputs.shape}",
-                remedy="give one column per input of the mapping, in its order",
-            )
+        inputs = fitting_columns(inputs, needed, more=True)
         depth = self.lowered.depth
         missing = max(0, depth - len(before))
         past = np.concatenate([np.repeat(before[:1], missing, axis=0), before])[len(before) + missing - depth :]

@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import TraceError
 from sysid.kernels import cascade as kernel
 from sysid.kernels.arrays import read_only
 from sysid.kernels.cascade_layout import Program
 from sysid.kernels.cascade_plan import Plan
 from sysid.models.channels.ends import Ends
-from sysid.models.channels.history import History
+from sysid.models.channels.history import History, fitting_columns
 from sysid.models.contract.column_recursion import ColumnRecursion
 from sysid.models.contract.form import AbstractForm
 from sysid.models.lagged.cascade_program import Limit, program_of
@@ -194,15 +193,8 @@ class AbstractLaggedForm(AbstractForm):
 
     def _checked(self, inputs: Array, history: History) -> Array:
         """Inputs of the right shape, or an error."""
-        inputs, n = np.asarray(inputs, dtype=np.float64), self.n_inputs
-        if inputs.ndim != 2 or inputs.shape[1] != n or history.inputs.shape[1] != n:
-            raise TraceError(
-                "the inputs do not fit the model",
-                expected=f"inputs and history of shape (n, {n})",
-                got=f"shapes {inputs.shape} and {history.inputs.shape}",
-                remedy="give one column per input of the mapping, in its order",
-            )
-        return inputs
+        fitting_columns(history.inputs, self.n_inputs)
+        return fitting_columns(inputs, self.n_inputs)
 
 
 def walk(plan: Planned, room: Array, past: int) -> None:

@@ -9,10 +9,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.errors import TraceError
 from sysid.kernels import innovations
 from sysid.kernels import linear as kernel
-from sysid.models.channels.history import History
+from sysid.models.channels.history import History, fitting_columns
 from sysid.models.channels.scaling import Scaling, VectorScaling
 from sysid.models.contract.form import AbstractForm, no_prediction
 from sysid.models.linear.innovations import Innovations
@@ -324,12 +323,4 @@ class StateSpace(AbstractForm):
         return np.asarray(scipy.linalg.solve_discrete_lyapunov(self.A, drive))
 
     def _checked(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
-        inputs = np.asarray(inputs, dtype=np.float64)
-        if inputs.ndim != 2 or inputs.shape[1] != self.n_inputs:
-            raise TraceError(
-                "the inputs do not fit the model",
-                expected=f"inputs and history of shape (n, {self.n_inputs})",
-                got=f"shape {inputs.shape}",
-                remedy="give one column per input of the mapping, in its order",
-            )
-        return self.scaling.scale_inputs(inputs)
+        return self.scaling.scale_inputs(fitting_columns(inputs, self.n_inputs))

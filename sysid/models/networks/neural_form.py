@@ -12,7 +12,7 @@ from sysid.errors import TraceError
 from sysid.kernels import neural_state_space as kernel
 from sysid.kernels.arrays import read_only
 from sysid.kernels.neurons import code_of
-from sysid.models.channels.history import History
+from sysid.models.channels.history import History, fitting_columns
 from sysid.models.channels.scaling import Scaling, VectorScaling
 from sysid.models.contract.form import AbstractForm, no_prediction
 from sysid.models.contract.state_descent import StateSearch
@@ -276,15 +276,7 @@ class NeuralForm(AbstractForm):
         Raises:
             TraceError: If the number of inputs is not the model's.
         """
-        inputs = np.asarray(inputs, dtype=np.float64)
-        if inputs.ndim != 2 or inputs.shape[1] != self.sizes.inputs:
-            raise TraceError(
-                "the inputs do not fit the model",
-                expected=f"inputs and history of shape (n, {self.sizes.inputs})",
-                got=f"shape {inputs.shape}",
-                remedy="give one column per input of the mapping, in its order",
-            )
-        return self.scaling.scale_inputs(inputs)
+        return self.scaling.scale_inputs(fitting_columns(inputs, self.sizes.inputs))
 
     def scaled_outputs(self, output: NDArray[np.float64]) -> NDArray[np.float64]:
         """Outputs in the model's numbers.
