@@ -54,6 +54,17 @@ def replacing(path: Path) -> Iterator[Path]:
         draft.unlink(missing_ok=True)
 
 
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file so that readers see the old one or the new one, never a part.
+
+    Args:
+        path: The file; its folder is made if it is not there.
+        data: Its contents.
+    """
+    with replacing(path) as draft:
+        draft.write_bytes(data)
+
+
 @contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
     """A new folder that takes the place of ``path``, with all that is in it, when the block ends without an error.

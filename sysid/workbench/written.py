@@ -8,8 +8,8 @@ from typing import Generic, Self, TypeVar
 
 from pydantic import BaseModel
 
+from sysid.atomic import write_bytes
 from sysid.field_checks import check
-from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import read_yaml
 
 Config = TypeVar("Config", bound=BaseModel)

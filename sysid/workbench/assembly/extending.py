@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from sysid.atomic import write_bytes
 from sysid.errors import ConfigError, did_you_mean
 from sysid.field_checks import Loc, Origins
 from sysid.models import Mapping
 from sysid.workbench.assembly.fixed_words import fixed_schema, one_by_one
 from sysid.workbench.kinds import DEFAULT
 from sysid.workbench.old_words import ASSEMBLY, with_new_words
-from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import read_yaml, yaml_text
 
 JOINED_FILE = "pipeline-joined.yaml"

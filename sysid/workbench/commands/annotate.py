@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
+from sysid.atomic import write_bytes
 from sysid.errors import ConfigError
 from sysid.ingest import load_dataset, write_trace
 from sysid.names import slug
@@ -15,7 +16,6 @@ from sysid.units import Reference
 from sysid.validation.annotator import Annotator
 from sysid.workbench.annotation import annotated_set, find_annotator
 from sysid.workbench.runner.console import console
-from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import yaml_text
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
+from sysid.atomic import write_bytes
 from sysid.content import nearest_file
 from sysid.errors import ConfigError
 from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
@@ -22,7 +23,6 @@ from sysid.workbench.commands.pictures import kept_picture
 from sysid.workbench.commands.reader_options import as_typed, files_from
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import nearby
-from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.schemas import schema_line
 
 _PATHS = {".yaml", ".yml", *(suffix for reader in READERS for suffix in reader.suffixes)}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sysid.atomic import write_bytes
 from sysid.reporting.figures.svg import as_file
 from sysid.workbench.runner.naming import nearby
-from sysid.workbench.runner.store import write_bytes
 
 
 def kept_picture(target: Path, drawing: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid.api.responses import bode, poles, step
+from sysid.atomic import write_bytes
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.export.bundle import Bundle
@@ -17,7 +18,7 @@ from sysid.reporting.results import read_results
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import meant, nearby
-from sysid.workbench.runner.store import RunFolder, write_bytes
+from sysid.workbench.runner.store import RunFolder
 
 RESULTS = "results.json"
 

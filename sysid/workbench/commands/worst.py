@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.atomic import write_bytes
 from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
 from sysid.export.reading import read_bundle
@@ -18,7 +19,6 @@ from sysid.workbench.runner import events
 from sysid.workbench.runner.console import console
 from sysid.workbench.runner.naming import meant
 from sysid.workbench.runner.screen import Screen
-from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.worst import Kept, drawn, errors_of, kept_text
 
 QUANTILES = (0.5, 0.9, 0.99)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sysid.atomic import write_bytes
 from sysid.errors import ConfigError
 from sysid.ingest import load_dataset, write_csv
 from sysid.references.config import ReferenceConfig
@@ -23,7 +24,7 @@ from sysid.workbench.runner.naming import cases_of
 from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Estimate, NotKnownError, Outlined, Step, Work
-from sysid.workbench.runner.store import write_bytes, write_json
+from sysid.workbench.runner.store import write_json
 from sysid.workbench.written import Written
 from sysid.yaml_files import yaml_text
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sysid.atomic import write_bytes
 from sysid.field_checks import check
 from sysid.ingest import load_dataset
 from sysid.plugins import find_plugin
@@ -18,7 +19,6 @@ from sysid.workbench.runner.naming import cases_of
 from sysid.workbench.runner.program import Closing, Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Outlined, Step, Work
-from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.written import Written
 from sysid.yaml_files import yaml_text
 

@@ -27,7 +27,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from sysid import bounded_text
-from sysid.atomic import clear_drafts, replacing
+from sysid.atomic import clear_drafts, write_bytes
 from sysid.errors import ConfigError, UserError
 
 LINE = "line.json"
@@ -36,17 +36,6 @@ LINE = "line.json"
 
 class BusyError(UserError):
     """Another process is working in the same folder."""
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file so that readers see the old one or the new one, never a part.
-
-    Args:
-        path: The file; its folder is made if it is not there.
-        data: Its contents.
-    """
-    with replacing(path) as draft:
-        draft.write_bytes(data)
 
 
 def write_json(path: Path, value: object) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from sysid.atomic import write_bytes
 from sysid.errors import ConfigError
 from sysid.names import slug
 from sysid.references.described import Wish
 from sysid.references.sources import Source
-from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.schemas import write_schemas
 from sysid.workbench.surrogates.plan import text_of
 from sysid.workbench.workspace import refuse_taken

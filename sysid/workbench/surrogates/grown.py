@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from sysid.atomic import write_bytes
 from sysid.estimation import FitResult
 from sysid.models import Mapping, Start
 from sysid.references.config import ReferenceConfig
@@ -28,7 +29,7 @@ from sysid.workbench.fits.record import read_fit
 from sysid.workbench.runner.program import Program
 from sysid.workbench.runner.run import Run
 from sysid.workbench.runner.steps import Step
-from sysid.workbench.runner.store import digest, strict, write_bytes
+from sysid.workbench.runner.store import digest, strict
 from sysid.workbench.surrogates.grow import Grower, Grown
 from sysid.yaml_files import yaml_text
 

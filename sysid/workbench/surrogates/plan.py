@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sysid.atomic import write_bytes
 from sysid.errors import ConfigError
 from sysid.field_checks import check
 from sysid.names import slug
@@ -23,7 +24,6 @@ from sysid.references.told import reasons_of
 from sysid.workbench.auto.finish import span
 from sysid.workbench.auto.parts import searched_in
 from sysid.workbench.experiments.config import ExperimentConfig
-from sysid.workbench.runner.store import write_bytes
 from sysid.yaml_files import read_yaml, yaml_text
 
 RUNNING = 0.2

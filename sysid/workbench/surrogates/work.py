@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sysid.atomic import replacing
+from sysid.atomic import replacing, write_bytes
 from sysid.bounded_text import read_bounded
 from sysid.errors import ConfigError
 from sysid.export.bundle import Bundle
@@ -42,7 +42,6 @@ from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.runner.events import StepDone, StepProgress, StepStarted, Watcher
 from sysid.workbench.runner.program import Program
-from sysid.workbench.runner.store import write_bytes
 from sysid.workbench.surrogates.grown import GROWN, Ground, grow
 from sysid.workbench.surrogates.grown import program_of as grown_program
 from sysid.workbench.surrogates.known import pipeline_of

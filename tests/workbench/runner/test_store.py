@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sysid.atomic import write_bytes
 from sysid.workbench.runner.store import (
     BusyError,
     RunFolder,
@@ -21,7 +22,6 @@ from sysid.workbench.runner.store import (
     read_json,
     strict,
     write_arrays,
-    write_bytes,
     write_json,
 )
 
