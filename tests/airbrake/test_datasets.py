@@ -1,5 +1,6 @@
 """The shipped air-brake data sets: what is in them, and that they are made again bit for bit."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -57,9 +58,15 @@ def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
+@cache
+def made(name: str) -> TraceSet:
+    """The cases of a data set that are simulated here, once for all tests."""
+    return load_dataset(FOLDER / name, cases=SHORT[name], cache=False)
+
+
 @pytest.fixture(scope="module")
 def traces(name: str) -> TraceSet:
-    return load_dataset(FOLDER / name, cases=SHORT[name], cache=False)
+    return made(name)
 
 
 def command_of(recipe: dict[str, Any]) -> Command:
@@ -105,14 +112,14 @@ def test_brakes_apply_and_reservoirs_stay_between_atmosphere_and_supply(traces: 
     ("name", "case"), [("abdx-service", "VAL04"), ("abdx-combined", "VAL05"), ("ab-linear", "VAL02")]
 )
 def test_a_case_is_made_again_bit_for_bit(name: str, case: str) -> None:
-    one, again = (load_dataset(FOLDER / name, cases=[case], cache=False)[case] for _ in range(2))
+    one, again = made(name)[case], load_dataset(FOLDER / name, cases=[case], cache=False)[case]
     np.testing.assert_array_equal(again.values, one.values)
     assert again.digest == one.digest
 
 
 @pytest.mark.parametrize(("name", "case"), [("abdx-service", "VAL04"), ("abdx-selection", "SEL02")])
 def test_two_valves_are_those_of_the_same_run(name: str, case: str) -> None:
-    one = load_dataset(FOLDER / name, cases=[case], cache=False)[case]
+    one = made(name)[case]
     two = load_dataset(FOLDER / f"{name}-two-valves", cases=[case], cache=False)[case]
     for channel in ("STP", "BP", "AR"):
         np.testing.assert_array_equal(two[channel], one[channel])

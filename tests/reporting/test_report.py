@@ -239,10 +239,12 @@ def test_what_the_run_says_in_words_is_on_the_page_and_escaped(page: Page, path:
     assert "<stable>" not in path.read_text(encoding="utf-8")
 
 
-def test_a_report_made_twice_is_the_same_to_the_byte(path: Path, run_folder: Path) -> None:
-    before = path.read_bytes()
-    write_report(run_folder)
-    assert path.read_bytes() == before
+def test_a_report_made_twice_is_the_same_to_the_byte(make_run: Callable[..., Path], tmp_path: Path) -> None:
+    """With every kind of picture, each of one case."""
+    folder = make_run(tmp_path / "run", edit=lambda document: document.update(drawn=1))
+    before = write_report(folder).read_bytes()
+    write_report(folder)
+    assert (folder / "report" / "index.html").read_bytes() == before
 
 
 @pytest.mark.slow
