@@ -268,7 +268,7 @@ class Excursions(AbstractSequences):
 
     def _sequence(self, rng: np.random.Generator) -> tuple[NDArray[np.float64], int]:
         """Rows of inputs and outputs, and how many of them at the end are held."""
-        at = int(rng.choice(self._firsts))
+        at = int(self._firsts[rng.integers(0, len(self._firsts))])
         # Of each passage the row, how many rows it goes over and at which steps, its samples, and whether it is led.
         parts: list[tuple[int, float, float, int, bool]] = []
         total = 0

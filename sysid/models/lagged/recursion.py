@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +145,7 @@ class Recursion(AbstractLaggedForm):
         flat = self.theta[self.neurons * (r + 2) + 1 + r :]
         return flat.reshape(self.neurons, r) if len(flat) else None
 
-    @property
+    @cached_property
     def columns(self) -> ColumnRecursion:
         """Its output is one more column of lagged regressors."""
         return ColumnRecursion(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -68,7 +69,7 @@ class Innovations:
     def at(self, entries: Array) -> Innovations:
         """The system of this size with other entries, in the order of :attr:`entries`."""
         shapes = [getattr(self, name).shape for name in _NAMES]
-        parts = np.split(entries, np.cumsum([int(np.prod(shape)) for shape in shapes])[:-1])
+        parts = np.split(entries, np.cumsum([math.prod(shape) for shape in shapes])[:-1])
         return Innovations(**{name: part.reshape(s) for name, part, s in zip(_NAMES, parts, shapes, strict=True)})
 
     @property

@@ -9,6 +9,7 @@ of its ill conditioning; after some steps the chart is laid anew, in balanced co
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -99,7 +100,7 @@ class Chart:
         del theta
         n, m, p, P = self.base.n_state, self.base.n_inputs, self.base.n_outputs, self.n_parameters
         shapes = ((n, n), (n, m), (p, n), (p, m), (n, p), (p,))
-        ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
+        ends = np.cumsum([math.prod(shape) for shape in shapes])
         parts = np.split(self.basis, ends[:-1])
         A, B, C, D, K, c = (part.reshape(*shape, P) for part, shape in zip(parts, shapes, strict=True))
         return Directions(A=A, B=B, C=C, D=D, K=K, constant=c)
