@@ -180,7 +180,14 @@ def quantity(row: Array, outputs: Array, inputs: Array) -> Array:
         Shape ``(...)``.
     """
     p = len(outputs)
-    return np.asarray(np.tensordot(row[:p], outputs, axes=1) + np.tensordot(row[p:], inputs, axes=1))
+    return np.asarray(_summed(row[:p], outputs) + _summed(row[p:], inputs))
+
+
+def _summed(row: Array, columns: Array) -> Array:
+    """What ``np.tensordot`` gives, which takes ten times as long for a single sample, of which runs ask for each."""
+    if columns.ndim == 1:
+        return np.asarray(np.dot(row[np.newaxis], columns[:, np.newaxis])[0, 0])
+    return np.asarray(np.tensordot(row, columns, axes=1))
 
 
 def features(outputs: Array, inputs: Array) -> Array:
