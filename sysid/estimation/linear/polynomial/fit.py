@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.contained import has_common, next_smaller, parts_of, with_root
+from sysid.estimation.linear.polynomial.slow import of_transfer_function
 from sysid.estimation.linear.polynomial.starts import LongARX, long_models, looked_at, of_state_space, starts_of
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
@@ -30,7 +32,7 @@ from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.estimation.results.uncertainty import Uncertainty
-from sysid.models import Mapping, Start
+from sysid.models import Mapping, Scaling, Start
 from sysid.models.linear.polynomial import PolynomialModel
 from sysid.models.linear.polynomial_orders import AbstractPolynomial
 from sysid.models.orders.typed_fields import TypedFields
@@ -117,6 +119,9 @@ def fit_polynomial(
     with one_blas_thread():  # threads that wake for such small matrices cost more than they give
         from_part = part and _from_part(segments_of(part, scaling), segments, orders, training, until)
         errors, solution = from_part or _search(segments, orders, training, until)
+        if not orders.noise and training.stable is None:
+            data = traces, mapping, start or Start(), rest, experiments
+            errors, solution, scaling = _slow(errors, solution, orders, training, (data, scaling, until))
         at = errors.linearise(solution.theta)
         system = errors.chart.system(solution.theta)
         variance = float(errors.covariance(system)[0, 0])
@@ -194,6 +199,29 @@ def _search(
         scale=float(np.mean([np.mean(segment.outputs**2) for segment in segments])),
     )
     return (errors, beyond) if better else (bounded, inside)
+
+
+def _slow(
+    errors: PredictionErrors,
+    solution: Solution,
+    orders: AbstractPolynomial,
+    training: PolynomialTraining,
+    given: tuple[Any, Scaling, float],
+) -> tuple[PredictionErrors, Solution, Scaling]:
+    """What was found, or where a pole is as slow as the records, what the transfer function of these orders is."""
+    (data, scaling, until), lengths = given, [len(segment) for segment in errors.segments]
+    radius = errors.chart.system(solution.theta).radius
+    if not slow_poles.unseen(radius, lengths):
+        return errors, solution, scaling
+    found = of_transfer_function(data, orders, errors, scaling, seconds=until - now())
+    if found is None:
+        return errors, solution, scaling
+    problem, theta, own = found
+    at_one = abs(problem.chart.system(theta).radius - 1.0) <= slow_poles.FAR  # from where steps would lead away
+    other = _run(problem, theta, replace(training, max_iterations=0) if at_one else _within(training, until))
+    other = replace(other, status=Status.CONVERGED) if at_one else other  # the transfer function has
+    beyond = at_one or radius > problem.largest
+    return (problem, other, own) if beyond or other.at.loss < solution.at.loss else (errors, solution, scaling)
 
 
 def _errors(segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining) -> PredictionErrors:

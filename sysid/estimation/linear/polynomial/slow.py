@@ -1,0 +1,96 @@
+"""Output errors with a pole as slow as the records: where the transfer function of the same orders has its poles.
+
+Both are one structure. A transfer function is searched with its numerator eliminated, so that it runs along a bound of
+the poles, where a search over all coefficients stops; it decides whether a pole may lie beyond.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import FitDivergedError, TraceError
+from sysid.estimation.linear.segments import segments_of
+from sysid.estimation.linear.state_space.provider import PredictionErrors
+from sysid.estimation.linear.transfer_function import fit_transfer_function
+from sysid.estimation.linear.transfer_function_problem import SLOWEST
+from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.records.experiment import Experiment
+from sysid.models import Mapping, Scaling, Start, TransferFunction, TransferFunctionModel
+from sysid.models.linear.polynomial_orders import AbstractPolynomial
+from sysid.traces import Trace
+
+Array = NDArray[np.float64]
+
+
+ROUNDED = 1e-9
+"""How far a pole is brought within the bound that it is at: its polynomial is rounded."""
+
+
+def of_transfer_function(
+    data: tuple[Sequence[Trace], Mapping, Start, float, Sequence[Experiment]],
+    orders: AbstractPolynomial,
+    errors: PredictionErrors,
+    scaling: Scaling,
+    *,
+    seconds: float,
+) -> tuple[PredictionErrors, Array, Scaling] | None:
+    """The coefficients of the transfer function of the same orders.
+
+    Args:
+        data: Traces, mapping, start, output at rest, and the records as they are fitted.
+        orders: Of a model without noise.
+        errors: The least-squares problem.
+        scaling: Of the coefficients.
+        seconds: Time for it.
+
+    Returns:
+        The problem with the bound that its poles keep, the coefficients, and their scaling: beyond the bound inputs
+        are as they are, as the offset of one adds up in an integrator, and no constant undoes it. ``None`` where there
+        is no such transfer function.
+    """
+    zeros = tuple(nb - 1 for nb in orders.nb)
+    if any(z > n or not n for z, n in zip(zeros, orders.denominators, strict=True)) or seconds <= 0.0:
+        return None
+    traces, mapping, start, rest, experiments = data
+    structure = TransferFunction(poles=orders.denominators, zeros=zeros, delays=orders.nk, intercept=orders.intercept)
+    try:
+        fit = fit_transfer_function(
+            traces, mapping, structure, TransferFunctionTraining(max_time_s=seconds), start=start, rest_output=rest
+        )
+    except (FitDivergedError, TraceError):
+        return None
+    largest = 1.0 - 1.0 / (SLOWEST * max(len(segment) for segment in errors.segments))
+    model = cast("TransferFunctionModel", fit.model)
+    problem = replace(errors, stable=model.pole_radius <= largest + ROUNDED, largest=largest)
+    if not problem.stable:
+        scaling = replace(scaling, input_offset=(0.0,) * len(zeros))
+        problem = replace(problem, segments=tuple(segments_of(experiments, scaling)))
+    theta = _coefficients(model, orders, scaling, problem)
+    linear = [*range(sum(orders.nb)), *range(len(theta) - orders.level, len(theta))]
+    here = problem.linearise(theta)
+    if not np.isfinite(here.loss):
+        return None
+    theta[linear] -= np.linalg.lstsq(here.gauss_newton[np.ix_(linear, linear)], here.gradient[linear], rcond=None)[0]
+    return problem, theta, scaling
+
+
+def _coefficients(
+    model: TransferFunctionModel, orders: AbstractPolynomial, scaling: Scaling, problem: PredictionErrors
+) -> Array:
+    """Those of a transfer function in scaled numbers; the constant is left to who refines them."""
+    inputs = range(len(orders.nb))
+    B = [model.numerator(j) * scaling.input_scale[j] / scaling.output_scale for j in inputs]
+    F = [model.denominator(j) for j in inputs]
+    F = [_within(one, problem.largest) for one in F] if problem.stable else F
+    return np.concatenate([*B, *(one[1:] for one in F), np.zeros(int(orders.level))])
+
+
+def _within(denominator: Array, largest: float) -> Array:
+    """The polynomial with poles at the bound just within it."""
+    poles, edge = np.roots(denominator), largest - ROUNDED
+    return np.asarray(np.poly(poles * np.minimum(1.0, edge / np.maximum(np.abs(poles), edge))).real, dtype=np.float64)
