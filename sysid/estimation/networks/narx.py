@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -22,6 +23,7 @@ from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_
 from sysid.estimation.networks.posterior import calibrate, laplace
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.networks.regressed import regressed
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.choosing import Choice, choose
 from sysid.estimation.networks.starts.race import run_race
@@ -103,6 +105,7 @@ def fit_narx(
         checkpoints=checkpoints_of(on_progress),
         resume=resume,
         pretraining=_pretraining(training, task, seen),
+        prepared=_prepared(training, task, seen),
         until=starts.deadline(began, training, on_progress),
     )
     tasks = _started(multistart, task, seen)
@@ -203,6 +206,7 @@ def _started(
                 initial=None,
                 resume=None,
                 pretraining=_pretraining(view.training, part, experiments),
+                prepared=_prepared(view.training, part, experiments),
             )
         found = run_race(own)
         named = [replace(one, number=one.number + view.first, without=view.without) for one in found]
@@ -235,9 +239,24 @@ def _with_ensemble(
 def _pretraining(training: Training, task: _Task, experiments: Sequence[Experiment]) -> StepSamples | None:
     if not training.pretraining or not task.layout.linear or not task.layout.neurons:
         return None
-    found = StepSamples.of(
-        task.template, experiments, task.layout, task.basis, samples=training.pretraining, seed=training.seed
-    )
+    return _step_samples(training, task, experiments, training.pretraining)
+
+
+def _prepared(training: Training, task: _Task, experiments: Sequence[Experiment]) -> starts.Prepared:
+    """What is linear in a random start by least squares; a start that was given or pretrained stays as it is."""
+    samples = None if training.pretraining else _step_samples(training, task, experiments, sys.maxsize)
+
+    def prepared(multistart: starts.Multistart, number: int, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        given = number == 0 and multistart.initial is not None
+        return theta if samples is None or given else regressed(theta, samples, multistart.provider)
+
+    return prepared
+
+
+def _step_samples(
+    training: Training, task: _Task, experiments: Sequence[Experiment], samples: int
+) -> StepSamples | None:
+    found = StepSamples.of(task.template, experiments, task.layout, task.basis, samples=samples, seed=training.seed)
     # A record that stands at its limits throughout, as a truth value does, has no sample that says what a step does.
     return found if found.n_samples else None
 

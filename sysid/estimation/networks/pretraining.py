@@ -53,7 +53,7 @@ class StepSamples(AbstractProvider):
     """One-step residuals at chosen samples, as a function of parameters in the basis of training.
 
     Args:
-        layout: Where the parameters stand; with a linear part.
+        layout: Where the parameters stand.
         regressors: In the basis, shape ``(n_samples, n_regressors)``.
         target: Scaled output, shape ``(n_samples,)``.
         neuron: The kind of the neurons.
@@ -164,12 +164,13 @@ class StepSamples(AbstractProvider):
         layout, x = self.layout, self.regressors[rows]
         k, r = layout.neurons, x.shape[1]
         affine = theta[layout.affine]
+        straight = affine[0] + (x @ affine[1:] if layout.linear else 0.0)
         sums = x @ theta[: k * r].reshape(k, r).T + theta[k * r : k * (r + 1)]
         h = self.neuron.value(sums)
         g = np.broadcast_to(theta[layout.readout], h.shape)
         if layout.gated:
             g = g + x @ theta[layout.gates].reshape(k, r).T
-        return _Pass(x, sums, h, g, np.sum(g * h, axis=1) + affine[0] + x @ affine[1:] - self.target[rows])
+        return _Pass(x, sums, h, g, np.sum(g * h, axis=1) + straight - self.target[rows])
 
     def _jacobian(self, passed: _Pass, n_parameters: int) -> NDArray[np.float64]:
         layout, x, h = self.layout, passed.x, passed.h
@@ -180,7 +181,8 @@ class StepSamples(AbstractProvider):
         J[:, k * r : k * (r + 1)] = slopes
         J[:, layout.readout] = h
         J[:, layout.affine.start] = 1.0
-        J[:, layout.affine.start + 1 : layout.affine.stop] = x
+        if layout.linear:
+            J[:, layout.affine.start + 1 : layout.affine.stop] = x
         if layout.gated:
             J[:, layout.gates] = (h[:, :, None] * x[:, None, :]).reshape(len(x), -1)
         return J

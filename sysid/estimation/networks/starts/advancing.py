@@ -57,8 +57,11 @@ def advance(multistart: Multistart, number: int, before: Candidate | None, share
         seed, theta, centre = _begin(multistart, number)
         if multistart.pretraining is not None and seed is not None:
             theta = _pretraining(multistart, multistart.pretraining, number, seed, centre)
-        theta = multistart.prepared(multistart, number, theta)
+        # Of the start as it was drawn: the weights are held back as long as the evidence has not spoken, however close
+        # least squares have brought a start. Weighed against the little that they leave, fits of play, stops and
+        # overflows stall, and models go elsewhere on commands of another kind.
         prior = first_prior(training, multistart.layout, multistart.provider, theta, centre)
+        theta = multistart.prepared(multistart, number, theta)
         solution = keep.minimise(run, in_time(), multistart.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
         seed, solution = before.seed, keep.resume(run, in_time(), multistart.provider, before.solution.state)

@@ -54,6 +54,10 @@ Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceM
 """What is trained here."""
 
 
+Prepared = Callable[["Multistart", int, NDArray[np.float64]], NDArray[np.float64]]
+"""From where a start is drawn to where its training begins, by its number."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Multistart:
     """Everything that the starts of one fit have in common.
@@ -92,8 +96,7 @@ class Multistart:
     """First starts that are looked at one after another before the others begin."""
     enough: Callable[[Candidate], bool] = lambda _: False
     """Whether one of them is so good that the others need not begin."""
-    prepared: Callable[[Multistart, int, NDArray[np.float64]], NDArray[np.float64]] = lambda _, __, theta: theta
-    """From where a start is drawn to where its training begins, by its number."""
+    prepared: Prepared = lambda _, __, theta: theta
     least: int = 1
     """Starts that are trained to their end, whoever is ahead: those that an ensemble unites."""
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
