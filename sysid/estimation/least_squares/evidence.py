@@ -52,13 +52,8 @@ free, or switched off, for every practical purpose."""
 
 
 SAMPLES_PER_PARAMETER = 4.0
-"""Independent samples that each parameter is granted while a fit is far from its minimum: what a rough model leaves
-persists, and would hold it where it is if it counted for as little as it says."""
-
-LATE = 100
-"""Iterations from which on one has to do: what a good model leaves is noise, however it is correlated. With four for
-ever, what 100 parameters left of 500 samples counted as news, and networks of a hair dryer fitted their record to 95 %
-and the next one to anything between -250 and 80 %."""
+"""Independent samples that each parameter is granted at least: a record so short, or residuals so persistent, that
+fewer remain would leave the precision of the residuals undetermined."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,9 +108,7 @@ class Prior:
         return 0.5 * float(away @ (self.precision * away)) / self.beta
 
 
-def update(
-    prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_samples: int, iteration: int = 0
-) -> tuple[Prior, Evidence]:
+def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_samples: int) -> tuple[Prior, Evidence]:
     """One step of the evidence's fixed-point iteration, and the evidence with the precisions before it.
 
     Args:
@@ -123,13 +116,11 @@ def update(
         theta: Flat parameters, near a minimum of the penalised loss.
         at: Loss, Gauss-Newton matrix and correlation time there.
         n_samples: Samples that count.
-        iteration: Of the fit.
 
     Returns:
         The prior with new precisions, and the evidence found.
     """
-    granted = SAMPLES_PER_PARAMETER if iteration < LATE else 1.0
-    tau = min(at.correlation_time, max(1.0, n_samples / (granted * max(len(theta), 1))))
+    tau = min(at.correlation_time, max(1.0, n_samples / (SAMPLES_PER_PARAMETER * max(len(theta), 1))))
     independent = n_samples / tau
     root = np.sqrt(prior.beta / prior.precision)
     M = at.gauss_newton * root[:, None] * root[None, :]

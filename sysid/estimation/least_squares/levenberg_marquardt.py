@@ -331,7 +331,7 @@ class LevenbergMarquardt:
     def _with_evidence(self, state: State, provider: AbstractProvider) -> State:
         if not self._asks(state.iteration):
             return state
-        prior, evidence = update(state.prior, state.theta, state.at, provider.n_samples, state.iteration)
+        prior, evidence = update(state.prior, state.theta, state.at, provider.n_samples)
         return replace(state, prior=prior, evidence=evidence)
 
     def _record(self, state: State, provider: AbstractProvider, elapsed: float) -> State:

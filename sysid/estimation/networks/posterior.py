@@ -51,6 +51,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.least_squares.evidence import SAMPLES_PER_PARAMETER
 from sysid.estimation.least_squares.levenberg_marquardt import State
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.nonparametric.noise import persistence
@@ -62,10 +63,6 @@ from sysid.models.linear.innovation_moves import prediction_moves
 
 CALIBRATED_AT = 0.95
 """The level at which the spread is found."""
-
-SAMPLES_PER_PARAMETER = 4.0
-"""Independent samples that each determined parameter is granted at least: with fewer nothing is left to say how well
-the parameters are known."""
 
 LEAST_NOISE_SHARE = 0.05
 """Least share of the samples that is taken to be left for the residuals' variance once the parameters are paid for."""

@@ -93,7 +93,7 @@ def test_starts_are_shared_out_and_keep_numbers_and_seeds_of_their_own():
 
 
 def test_a_ensemble_unites_those_that_see_an_input_and_those_that_do_not():
-    training = replace(SHARED, ensemble=5, starts=12, max_iterations=25)
+    training = replace(SHARED, ensemble=5, starts=12, max_iterations=60)
     fit = fit_narx([told(1)], BOTH, SMALL, training, selection=[told(2), told(4)])
     without = {attempt.start for attempt in fit.attempts if attempt.without}
     (chosen,) = (attempt for attempt in fit.attempts if attempt.chosen)

@@ -119,20 +119,3 @@ def test_a_fit_is_close_within_few_iterations():
     errors = curve(trace_of({"u": u, "y": y}), replace(NETWORK, neurons=8), 10)
     assert errors[0] < 0.02 * np.var(y)
     assert errors[-1] < 2e-3 * np.var(y)
-
-
-def test_a_short_noisy_record_is_not_learnt_by_heart():
-    """A linear plant and a network of more than a hundred parameters on 500 samples: what is left is noise."""
-    rng = np.random.default_rng(3)
-    u = np.where(rng.random(1000) < 0.5, -1.0, 1.0)
-    y = np.zeros(1000)
-    for k in range(2, 1000):
-        y[k] = 1.4 * y[k - 1] - 0.5 * y[k - 2] + 0.1 * u[k - 1]
-    coloured = np.convolve(rng.standard_normal(1000), 0.8 ** np.arange(20.0))[:1000]
-    measured = y + 0.1 * np.std(y) * coloured / np.std(coloured)
-    network = NARX(input_delays=4, output_delays=4, neurons=10)
-    training = Training(max_iterations=200, workers=1)
-    fit = fit_narx([trace_of({"u": u[:500], "y": measured[:500]})], Mapping.parse("u -> y"), network, training)
-    history = History(inputs=u[492:500, None], output=y[492:500])
-    error = fit.model.simulate(u[500:, None], history) - y[500:]
-    assert np.sqrt(np.mean(error**2)) < 0.06 * np.std(y)

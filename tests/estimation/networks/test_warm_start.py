@@ -123,10 +123,10 @@ def test_a_fit_that_was_put_aside_ends_where_it_would_have_ended(loop: str, regu
         assert len(fit.history["mse"]) == iterations + 1
         return np.asarray(fit.model.recursion.numbers)
 
-    whole = trained(30)
+    whole = trained(24)
     trained(22)
     stored = Checkpoint(fields=json.loads(json.dumps(kept[-1].fields)))
-    np.testing.assert_array_equal(trained(30, resume=stored), whole)
+    np.testing.assert_array_equal(trained(24, resume=stored), whole)
 
 
 def test_a_checkpoint_of_another_structure_is_refused() -> None:

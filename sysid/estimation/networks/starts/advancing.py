@@ -26,6 +26,10 @@ from sysid.models.contract import gaps
 PRETRAINED = 0.4
 """Share of a fit's time that its starts may take one step ahead."""
 
+FAR = 100.0
+"""How many times as large as the loss of a prepared start that of the noise is taken to be at first: ten times the
+error, with which the weights are held back until the evidence speaks."""
+
 
 def advance(multistart: Multistart, number: int, before: Candidate | None, share: float, seconds: float) -> Candidate:
     """Train one start on, to a share of its iterations.
@@ -57,11 +61,8 @@ def advance(multistart: Multistart, number: int, before: Candidate | None, share
         seed, theta, centre = _begin(multistart, number)
         if multistart.pretraining is not None and seed is not None:
             theta = _pretraining(multistart, multistart.pretraining, number, seed, centre)
-        # Of the start as it was drawn: the weights are held back as long as the evidence has not spoken, however close
-        # least squares have brought a start. Weighed against the little that they leave, fits of play, stops and
-        # overflows stall, and models go elsewhere on commands of another kind.
-        prior = first_prior(training, multistart.layout, multistart.provider, theta, centre)
-        theta = multistart.prepared(multistart, number, theta)
+        drawn, theta = theta, multistart.prepared(multistart, number, theta)
+        prior = first_prior(training, multistart.layout, multistart.provider, theta, centre, drawn=drawn)
         solution = keep.minimise(run, in_time(), multistart.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
         seed, solution = before.seed, keep.resume(run, in_time(), multistart.provider, before.solution.state)
@@ -139,6 +140,7 @@ def first_prior(
     provider: AbstractProvider,
     theta: NDArray[np.float64],
     centre: NDArray[np.float64],
+    drawn: NDArray[np.float64] | None = None,
 ) -> Prior:
     """The prior that a fit begins with.
 
@@ -148,6 +150,7 @@ def first_prior(
         provider: Residuals.
         theta: Where the fit begins, in the provider's parameters.
         centre: What they are drawn to.
+        drawn: The start before it was prepared, whose error is not all noise.
 
     Returns:
         The prior.
@@ -156,7 +159,11 @@ def first_prior(
     # an open-loop fit, whose residuals are a thousand times smaller, at its start.
     # None is known better than the rounding of scaled numbers, also where a start leaves no error at all.
     rounding = 0.5 * provider.n_samples * np.finfo(np.float64).eps ** 2
-    beta = 0.5 * provider.n_samples / max(provider.loss(theta), rounding)
+    loss = provider.loss(theta)
+    if drawn is not None:
+        # Weighed against the little that least squares leave, fits of play, stops and overflows stall.
+        loss = min(FAR * loss, provider.loss(drawn))
+    beta = 0.5 * provider.n_samples / max(loss, rounding)
     # A precision given from outside is relative to that of the residuals, and stays.
     given = training.regularisation
     return layout.prior(centre, alpha=INITIAL_ALPHA if given is None else given * beta, beta=beta)
