@@ -140,6 +140,7 @@ def first_prior(
     provider: AbstractProvider,
     theta: NDArray[np.float64],
     centre: NDArray[np.float64],
+    *,
     drawn: NDArray[np.float64] | None = None,
 ) -> Prior:
     """The prior that a fit begins with.
