@@ -201,8 +201,7 @@ def at_minimum(state: State, provider: AbstractProvider, share: float = FLAT) ->
     g = at.gradient + ridge * (state.theta - prior.centre)
     free = np.ones(len(g), dtype=np.bool_)
     if provider.bounds is not None:
-        low, high = provider.bounds
-        free = ~(((state.theta <= low) & (g > 0.0)) | ((state.theta >= high) & (g < 0.0)))
+        free = ~(((state.theta <= provider.bounds[0]) & (g > 0.0)) | ((state.theta >= provider.bounds[1]) & (g < 0.0)))
     H = at.gauss_newton + np.diag(ridge)
     root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
     scaled = g[free] / root
@@ -247,8 +246,8 @@ class LevenbergMarquardt:
         # 20,000 x 281 with two threads, 45 ms with one); the second core is better spent on another start.
         with one_blas_thread():
             at = provider.linearise(theta, correlation=False)
-        state = State(theta=theta, at=at, damping=self.damping, prior=prior)
-        return self.resume(provider, self._record(state, provider, 0.0))
+        first = State(theta=theta, at=at, damping=self.damping, prior=prior)
+        return self.resume(provider, self._record(first, provider, 0.0))
 
     def resume(
         self, provider: AbstractProvider, state: State, *, first_loss: float | None = None, spent_s: float = 0.0

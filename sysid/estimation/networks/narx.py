@@ -25,6 +25,7 @@ from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.regressed import regressed
 from sysid.estimation.networks.starts import multistart as starts
+from sysid.estimation.networks.starts.advancing import with_evidence
 from sysid.estimation.networks.starts.choosing import Choice, choose
 from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
@@ -117,6 +118,10 @@ def fit_narx(
         choice = _over_all(multistart, windows, choice, tasks[race])
         tasks = dict(zip(in_place(list(tasks), race, choice.chosen), tasks.values(), strict=True))
     chosen = choice.chosen
+    if chosen.solution.evidence is None and training.regularisation is None:
+        chosen = with_evidence(chosen, tasks[chosen].provider)
+        tasks = dict(zip(in_place(list(tasks), choice.chosen, chosen), tasks.values(), strict=True))
+        choice = replace(choice, chosen=chosen)
     runs: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     runs += [(t.columns(mapping.inputs), None) for t in selection]
     # Copies with other offsets stand behind the records that they are of.

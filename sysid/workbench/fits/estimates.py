@@ -25,6 +25,11 @@ from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.screen import duration
 from sysid.workbench.runner.steps import Estimate
 
+EXPORT_TIME = Estimate(seconds=10.0, basis="typical")
+"""Of two formats, as measured on two cores."""
+
+SCORING_TIME = Estimate(seconds=1.0, basis="typical")
+
 CALIBRATION_ITERATIONS = 6
 """Iterations that are timed: their median leaves out what only the first one does."""
 

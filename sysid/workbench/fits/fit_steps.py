@@ -19,7 +19,7 @@ from sysid.workbench.fits import steps
 from sysid.workbench.fits.choice import Choice, choose
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data, load_data, unmade_data
-from sysid.workbench.fits.estimates import how_long
+from sysid.workbench.fits.estimates import EXPORT_TIME, SCORING_TIME, how_long
 from sysid.workbench.fits.evidence import curves, residuals
 from sysid.workbench.fits.orders import orders_key, said, search
 from sysid.workbench.fits.outputs import FitModel, FitOutput, models_of
@@ -49,9 +49,6 @@ from sysid.workbench.fits.fitted import Fitted, Scored
 LOOKING = Outlined(name="advice", title="Looking at the traces", estimate=Estimate(seconds=2.0, basis="typical"))
 LOADING = Outlined(name="data", title="Loading the traces")
 ORDERS = Outlined(name="orders", title="Searching the orders", estimate=Estimate(seconds=10.0, basis="typical"))
-EXPORT_TIME = Estimate(seconds=10.0, basis="typical")
-"""Of two formats, as measured on two cores."""
-SCORING_TIME = Estimate(seconds=1.0, basis="typical")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -102,10 +99,8 @@ class FitSteps:
     def outline_around(self, trials: Outlined) -> list[Outlined]:
         """All steps of a search, which stands behind the loading: of which structure a fit is, nobody knows."""
         data, *rest = self.outline()
-        named = [
-            replace(one, title=one.title.partition(",")[0]) if one.name.startswith("fit-") else one for one in rest
-        ]
-        return [data, trials, *named]
+        fits = {one.name: replace(one, title=one.title.partition(",")[0]) for one in rest if one.name[:4] == "fit-"}
+        return [data, trials, *(fits.get(one.name, one) for one in rest)]
 
     def outline(self) -> list[Outlined]:
         """All steps, as far as they are known before the traces are."""

@@ -273,22 +273,6 @@ def polynomial(u: np.ndarray) -> np.ndarray:
     return y
 
 
-def test_a_polynomial_begins_at_the_output_that_is_declared(tmp_path: Path) -> None:
-    """It had begun where its inputs hold it, whatever was declared."""
-    u = steps(1)
-    y, before = np.zeros(len(u)), 0.4
-    for k in range(len(u)):
-        before = y[k] = 0.5 * before + 0.8 * u[k - 1] ** 2 * (k > 0)
-    traces, structure = sysid.data((u, y), sample_time=0.5), PolynomialNARX(degree=2, terms=2, output_delays=1)
-    declared, held = (sysid.fit(traces, "u -> y", structure, ONE, rest_output=rest) for rest in (0.4, None))
-    still = np.zeros(4)
-    at_rest = History.at_rest(inputs=np.zeros(1), output=0.4)
-    np.testing.assert_allclose(declared.model.simulate(still, at_rest), [0.2, 0.1, 0.05, 0.025], atol=1e-6)
-    np.testing.assert_allclose(held.model.simulate(still, at_rest), 0.0, atol=1e-6)
-    about = declared.save(tmp_path / "b", formats=("c",)).metadata["initialisation"]
-    assert (about["values"]["y"], about["state"][0]) == (0.4, 0.4)
-
-
 def test_the_terms_of_a_polynomial_are_found_and_told() -> None:
     u = steps(1)
     y = polynomial(u) + 0.01 * np.random.default_rng(0).standard_normal(len(u))

@@ -27,7 +27,7 @@ NETWORKS = {
 tank = partial(record, n=400)
 SMALL = NARX(input_delays=1, output_delays=1, neurons=3, gated=True)
 PLAIN = NARX(input_delays=1, output_delays=1, neurons=4)
-ELECTION = Training(max_iterations=60, starts=6, ensemble=4)
+ELECTION = Training(max_iterations=120, starts=6, ensemble=4)
 
 
 def member(network: NARX, seed: int, size: float = 0.2) -> NARXModel:

@@ -136,7 +136,7 @@ def test_a_valve_that_switches_is_learnt_with_it_in_iterations_in_which_it_is_no
         fit = fit_narx([trace], Mapping.parse("u -> y"), network, Training(**common, **options), rest_output=0.0)
         mse[name] = np.mean((fit.model.simulate(u[:, None]) - y) ** 2)
     assert mse["with"] < 3e-5
-    assert mse["with"] < 0.2 * mse["without"]
+    assert mse["with"] < 0.3 * mse["without"]
 
 
 @pytest.mark.parametrize("stride", [2, 7])

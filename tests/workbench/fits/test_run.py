@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid import code_digest
+from sysid import atomic, code_digest
 from sysid.code_digest import look_again
 from sysid.errors import ParityError
 from sysid.estimation import FitResult, Status
@@ -27,7 +27,7 @@ from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.data import load_data
 from sysid.workbench.fits.record import read_fit, read_scores
 from sysid.workbench.fits.run import program_of
-from sysid.workbench.runner import events, store
+from sysid.workbench.runner import events
 from sysid.workbench.runner.program import carry_out
 from sysid.workbench.runner.store import RunFolder
 
@@ -247,17 +247,17 @@ KILLER = """
 import os, signal, sys
 from pathlib import Path
 import sysid.reporting.report
-from sysid.workbench.runner import store
+from sysid import atomic
 from sysid.workbench.fits.config import Pipeline, PipelineConfig
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.runner.program import carry_out
 
-replacing = store.replacing
+replacing = atomic.replacing
 def dying(path):
     if path.as_posix().endswith(sys.argv[1]):
         os.kill(os.getpid(), signal.SIGKILL)
     return replacing(path)
-store.replacing = dying
+atomic.replacing = dying
 pipeline = Pipeline.read(PipelineConfig, Path("pipelines/first.yaml"))
 carry_out(program_of(pipeline), Path("run"), command="sysid run first")
 """
@@ -269,7 +269,7 @@ class KilledError(BaseException):
 
 def killed(workspace: Path, about_to_write: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that ended when it was about to write a file."""
-    replacing = store.replacing
+    replacing = atomic.replacing
 
     def dying(path: Path) -> AbstractContextManager[Path]:
         if path.as_posix().endswith(about_to_write):
@@ -277,7 +277,7 @@ def killed(workspace: Path, about_to_write: str, monkeypatch: pytest.MonkeyPatch
         return replacing(path)
 
     with monkeypatch.context() as patch, pytest.raises(KilledError):
-        patch.setattr(store, "replacing", dying)
+        patch.setattr(atomic, "replacing", dying)
         run(workspace)
 
 

@@ -51,7 +51,7 @@ def of_transfer_function(
     Returns:
         The problem with the bound that its poles keep, the coefficients, and their scaling: beyond the bound inputs
         are as they are, as the offset of one adds up in an integrator, and no constant undoes it. ``None`` where there
-        is no such transfer function.
+        is no such transfer function, or it runs away.
     """
     zeros = tuple(nb - 1 for nb in orders.nb)
     if any(z > n or not n for z, n in zip(zeros, orders.denominators, strict=True)) or seconds <= 0.0:
@@ -64,7 +64,10 @@ def of_transfer_function(
         )
     except (FitDivergedError, TraceError):
         return None
-    largest = 1.0 - 1.0 / (SLOWEST * max(len(segment) for segment in errors.segments))
+    longest = max(len(segment) for segment in errors.segments)
+    if fit.model.pole_radius > 1.0 + 1.0 / longest:  # it runs away within a record, where the bounded one does not
+        return None
+    largest = 1.0 - 1.0 / (SLOWEST * longest)
     model = cast("TransferFunctionModel", fit.model)
     problem = replace(errors, stable=model.pole_radius <= largest + ROUNDED, largest=largest)
     if not problem.stable:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.damping import DAMPINGS
-from sysid.estimation.least_squares.evidence import Prior
+from sysid.estimation.least_squares.evidence import Prior, update
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
@@ -112,6 +112,22 @@ def advanced(
     model = multistart.model(solution.theta)
     mean, outside = judged(multistart, model)
     return replace(before, solution=solution, model=model, score=mean, outside=outside)
+
+
+def with_evidence(before: Candidate, provider: AbstractProvider) -> Candidate:
+    """A candidate that was looked at before the evidence spoke, with what it says of it.
+
+    Args:
+        before: The candidate.
+        provider: Its residuals.
+
+    Returns:
+        The same, with the evidence of the precisions that it has.
+    """
+    state = before.solution.state
+    at = provider.linearise(state.theta)
+    _, evidence = update(state.prior, state.theta, at, provider.n_samples)
+    return replace(before, solution=replace(before.solution, state=replace(state, at=at, evidence=evidence)))
 
 
 def _pretraining(
