@@ -64,11 +64,11 @@ def of_transfer_function(
         )
     except (FitDivergedError, TraceError):
         return None
+    model = cast("TransferFunctionModel", fit.model)
     longest = max(len(segment) for segment in errors.segments)
-    if fit.model.pole_radius > 1.0 + 1.0 / longest:  # it runs away within a record, where the bounded one does not
+    if model.pole_radius > 1.0 + 1.0 / longest:  # it runs away within a record, where the bounded one does not
         return None
     largest = 1.0 - 1.0 / (SLOWEST * longest)
-    model = cast("TransferFunctionModel", fit.model)
     problem = replace(errors, stable=model.pole_radius <= largest + ROUNDED, largest=largest)
     if not problem.stable:
         scaling = replace(scaling, input_offset=(0.0,) * len(zeros))
