@@ -143,7 +143,9 @@ class Shooting(EquationProvider):
     def _apart(self, end: Array, begun: Array) -> Array:
         return self.weight * (end - begun) / self.form.terms.scale
 
-    def _linearised(self, theta: Array, *, correlation: bool) -> Linearisation:  # noqa: ARG002 - pieces have none
+    @np.errstate(over="ignore", invalid="ignore")  # likewise
+    def linearise(self, theta: Array, *, correlation: bool = True) -> Linearisation:  # noqa: ARG002 - pieces have none
+        """Loss, gradient and Gauss-Newton matrix of the windows and of their joints; see the base class."""
         theta = self.plain(theta)
         shared, every = self.at(theta), np.arange(len(theta))
         gradient, matrix, loss = np.zeros(len(theta)), np.zeros((len(theta), len(theta))), 0.0

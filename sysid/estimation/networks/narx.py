@@ -118,7 +118,7 @@ def fit_narx(
         choice = _over_all(multistart, windows, choice, tasks[race])
         tasks = dict(zip(in_place(list(tasks), race, choice.chosen), tasks.values(), strict=True))
     chosen = choice.chosen
-    if chosen.solution.evidence is None and training.regularisation is None:
+    if chosen.solution.evidence is None and any(one.solution.evidence is not None for one in tasks):
         chosen = with_evidence(chosen, tasks[chosen].provider)
         tasks = dict(zip(in_place(list(tasks), choice.chosen, chosen), tasks.values(), strict=True))
         choice = replace(choice, chosen=chosen)
