@@ -12,7 +12,17 @@ from pathlib import Path
 from sysid.code_text import StatementReader, Target, bound, decorator_name, imported, is_for_types, is_said, is_script
 
 CALLED_BY_NAME = frozenset(
-    {"property", "cached_property", "setter", "staticmethod", "classmethod", "abstractmethod", "override", "cache"}
+    {
+        "property",
+        "cached_property",
+        "setter",
+        "staticmethod",
+        "classmethod",
+        "abstractmethod",
+        "override",
+        "cache",
+        "errstate",
+    }
 )
 """Decorators of methods that run only where somebody asks for them."""
 

@@ -40,6 +40,7 @@ from sysid.workbench.surrogates.asked import surrogate_of
 from sysid.workbench.surrogates.plan import times
 from sysid.workbench.surrogates.proof import Proof, _begun_until, fmu_of, prove
 from sysid.workbench.surrogates.told import beginning_of, poor, restless, short_of_time, unlike, without_effect
+from sysid.workbench.written import Written
 from sysid.yaml_files import read_yaml
 
 pytest.importorskip("fmpy")
@@ -237,8 +238,9 @@ def test_a_reference_that_is_random_is_told_to_who_goes_on_too(monkeypatch: pyte
         ExperimentConfig, {"kind": "experiment", "name": "noise", "workers": 1, "reference": reference,
         "experiment": DESIGN}, where="",
     )  # fmt: skip
+    written = Written(config=config, text="", path=tmp_path / "noise.yaml")
     for _ in range(2):
-        carry_out(experiment_program(config, text="", folder=tmp_path), tmp_path / "out", command="test")
+        carry_out(experiment_program(written), tmp_path / "out", command="test")
         (said,) = unlike(tmp_path / "out")
         assert "The reference is random (give it a seed)" in said
     assert unlike(tmp_path) == []

@@ -19,6 +19,7 @@ import pytest
 from sysid.export import read_bundle
 from sysid.models import History
 from sysid.names import tracking_key
+from sysid.reporting import read_signals
 from sysid.reporting.results import Results
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits.config import Pipeline, PipelineConfig
@@ -117,7 +118,7 @@ def test_the_learning_curve_is_a_stepped_metric(tracked_once) -> None:
 
 
 def test_free_runs_are_lines_over_the_samples_of_a_case_beside_their_target(tracked_once) -> None:
-    _, client, results = tracked_once
+    workspace, client, _ = tracked_once
     run = runs_of(client)["closed loop"].info.run_id
     output, target = (
         {entry.step: entry.value for entry in client.get_metric_history(run, f"{line}/run-3")}
@@ -125,8 +126,10 @@ def test_free_runs_are_lines_over_the_samples_of_a_case_beside_their_target(trac
     )
     assert output.keys() == target.keys()
     assert np.ptp(list(target.values())) > 0.0
-    errors = [output[step] - target[step] for step in output]
-    assert np.mean(np.square(errors)) == pytest.approx(results.fits[2].cases["run-3"].free_run.mse, rel=0.01)
+    whole = read_signals(workspace / "run" / "fits" / "closed-loop", ["run-3"])["run-3"]
+    steps = list(output)
+    np.testing.assert_allclose([output[step] for step in steps], whole.simulated[steps], rtol=1e-5)
+    np.testing.assert_allclose([target[step] for step in steps], whole.target[steps], rtol=1e-5)
 
 
 def test_the_data_set_is_an_input_with_its_digest(tracked_once) -> None:
