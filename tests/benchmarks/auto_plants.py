@@ -59,17 +59,17 @@ def ramps(plant: Plant, rng: np.random.Generator, n: int) -> Array:
     return np.array(columns).T
 
 
-def records(name: str) -> tuple[Trace, Trace, Trace, Mapping]:
+def records(name: str, samples: int = FITTED, spread: float = NOISE) -> tuple[Trace, Trace, Trace, Mapping]:
     """What is fitted, both tests, and the mapping."""
     plant, seed = PLANTS[name], sum(map(ord, name))
     inputs = [f"u{place + 1}" for place in range(len(plant.ranges))]
     channels = tuple(Channel(name=channel, unit="1") for channel in (*inputs, "y"))
     made, noise = list[Trace](), 0.0
-    for role, of, n in (("fitted", levels, FITTED), ("levels", levels, TESTED), ("ramps", ramps, TESTED)):
+    for role, of, n in (("fitted", levels, samples), ("levels", levels, TESTED), ("ramps", ramps, TESTED)):
         rng = np.random.default_rng([seed, len(made)])
         u = of(plant, rng, n)
         y = plant.run(u)
-        noise = NOISE * float(y.std()) if role == "fitted" else 0.0
+        noise = spread * float(y.std()) if role == "fitted" else 0.0
         values = np.column_stack([u, y + noise * rng.standard_normal(n)])
         made.append(Trace(name=role, sample_time=plant.sample_time, channels=channels, values=values))
     return made[0], made[1], made[2], Mapping.parse(f"{'+'.join(inputs)} -> y")

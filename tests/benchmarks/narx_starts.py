@@ -21,7 +21,6 @@ import numpy as np
 
 from sysid.estimation import FitProgress, Training, fit_narx
 from sysid.models import NARX
-from tests.benchmarks import auto_plants
 from tests.benchmarks._findings import found
 from tests.benchmarks.auto_plants import followed, records
 from tests.references.strange_plants import PLANTS
@@ -30,9 +29,9 @@ NETWORK = NARX(input_delays=4, output_delays=4, neurons=10)
 LOOKS = (0, 5, 20)
 
 
-def fitted(name: str, seed: int, iterations: int) -> tuple[float, ...]:
+def fitted(name: str, seed: int, iterations: int, samples: int, noise: float) -> tuple[float, ...]:
     """Fits at the looks, at the end and over two unseen records, in percent; and processor seconds."""
-    record, levels, ramps, mapping = records(name)
+    record, levels, ramps, mapping = records(name, samples, noise)
     errors: list[float] = []
 
     def watch(progress: FitProgress) -> None:
@@ -50,11 +49,10 @@ def fitted(name: str, seed: int, iterations: int) -> tuple[float, ...]:
 
 def main(samples: int, noise: float, seeds: list[int], iterations: int) -> None:
     """All plants, then medians and quartiles."""
-    auto_plants.FITTED, auto_plants.NOISE = samples, noise
     rows = []
     for name in PLANTS:
         for seed in seeds:
-            rows.append(fitted(name, seed, iterations))
+            rows.append(fitted(name, seed, iterations, samples, noise))
             print(f"{name:32} {seed}  " + " ".join(f"{one:7.1f}" for one in rows[-1]), flush=True)
     titles = [*(f"after {look} iterations" for look in LOOKS), "at the end", "unseen levels", "unseen ramps"]
     for title, column in zip(titles, zip(*rows, strict=True), strict=False):

@@ -143,7 +143,7 @@ class Shooting(EquationProvider):
     def _apart(self, end: Array, begun: Array) -> Array:
         return self.weight * (end - begun) / self.form.terms.scale
 
-    @np.errstate(over="ignore", invalid="ignore")  # likewise
+    @np.errstate(over="ignore", invalid="ignore")  # of a window that explodes, too
     def linearise(self, theta: Array, *, correlation: bool = True) -> Linearisation:  # noqa: ARG002 - pieces have none
         """Loss, gradient and Gauss-Newton matrix of the windows and of their joints; see the base class."""
         theta = self.plain(theta)

@@ -201,7 +201,8 @@ def at_minimum(state: State, provider: AbstractProvider, share: float = FLAT) ->
     g = at.gradient + ridge * (state.theta - prior.centre)
     free = np.ones(len(g), dtype=np.bool_)
     if provider.bounds is not None:
-        free = ~(((state.theta <= provider.bounds[0]) & (g > 0.0)) | ((state.theta >= provider.bounds[1]) & (g < 0.0)))
+        low, high = provider.bounds
+        free = ~(((state.theta <= low) & (g > 0.0)) | ((state.theta >= high) & (g < 0.0)))
     H = at.gauss_newton + np.diag(ridge)
     root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
     scaled = g[free] / root

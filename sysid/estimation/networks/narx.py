@@ -20,7 +20,7 @@ from sysid.estimation.networks import ensemble
 from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
-from sysid.estimation.networks.posterior import calibrate, laplace
+from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.pretraining import StepSamples
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.regressed import regressed
@@ -112,34 +112,15 @@ def fit_narx(
     tasks = _started(multistart, task, seen)
     on_checkpoint(Checkpoint.of(choose(list(tasks), training.choose_by).chosen.solution.state))
     tasks |= _with_ensemble(multistart, list(tasks), experiments, vet)
-    choice = choose(list(tasks), training.choose_by, vet)
-    if windows.samples:
-        race = choice.chosen
-        choice = _over_all(multistart, windows, choice, tasks[race])
-        tasks = dict(zip(in_place(list(tasks), race, choice.chosen), tasks.values(), strict=True))
+    choice, tasks = _chosen(multistart, windows, tasks, vet)
     chosen = choice.chosen
-    if chosen.solution.evidence is None and any(one.solution.evidence is not None for one in tasks):
-        chosen = with_evidence(chosen, tasks[chosen].provider)
-        tasks = dict(zip(in_place(list(tasks), choice.chosen, chosen), tasks.values(), strict=True))
-        choice = replace(choice, chosen=chosen)
     runs: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     runs += [(t.columns(mapping.inputs), None) for t in selection]
     # Copies with other offsets stand behind the records that they are of.
     names = [t.name for t in traces] * (len(experiments) // len(traces)) + [t.name for t in selection]
     left = left_on(chosen.model, names, runs)
     status = multistart_status(chosen, list(tasks), left, interrupted=multistart.stop.is_set())
-    posterior = laplace(
-        chosen.solution.state,
-        chosen.model,
-        tasks[chosen].to_plain,
-        experiments,
-        copies=1 + len(training.offsets),
-        stride=training.stride,
-    )
-    if posterior is not None:
-        posterior = calibrate(
-            posterior, chosen.model, [Experiment.for_model(t, chosen.model, start) for t in selection]
-        )
+    posterior = _posterior(multistart, chosen, tasks[chosen], experiments)
     seconds = multistart.checkpoints.earlier_s + now() - began
     fit = with_note(multistart_result(choice, list(tasks), training, status, seconds, left=left), windows)
     # All of them have the template's limits.
@@ -177,6 +158,37 @@ class _Task(ensemble.Task):
         to_plain = embedding(layout, whole) @ basis.to_plain(layout)
         provider = RebasedProvider(inner=inner, to_plain=to_plain)
         return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider, inner=inner)
+
+
+def _chosen(
+    multistart: starts.Multistart,
+    windows: Windows,
+    tasks: dict[starts.Candidate, _Task],
+    vet: Callable[[starts.Network], bool] | None,
+) -> tuple[Choice, dict[starts.Candidate, _Task]]:
+    """The choice, trained on over whole records, and with the evidence where it was looked at before that spoke."""
+    choice = choose(list(tasks), multistart.training.choose_by, vet)
+    before = after = choice.chosen
+    if windows.samples:
+        choice = _over_all(multistart, windows, choice, tasks[before])
+        after = choice.chosen
+    if after.solution.evidence is None and any(one.solution.evidence is not None for one in tasks):
+        after = with_evidence(after, tasks[before].provider)
+    tasks = dict(zip(in_place(list(tasks), before, after), tasks.values(), strict=True))
+    return replace(choice, chosen=after), tasks
+
+
+def _posterior(
+    multistart: starts.Multistart, chosen: starts.Candidate, task: _Task, experiments: Sequence[Experiment]
+) -> Posterior | None:
+    """Of the weights, calibrated on the selection traces."""
+    training, model = multistart.training, chosen.model
+    copies, stride = 1 + len(training.offsets), training.stride
+    found = laplace(chosen.solution.state, model, task.to_plain, experiments, copies=copies, stride=stride)
+    if found is None:
+        return None
+    selection = [Experiment.for_model(trace, model, multistart.start) for trace in multistart.selection]
+    return calibrate(found, model, selection)
 
 
 def _over_all(multistart: starts.Multistart, windows: Windows, choice: Choice, task: _Task) -> Choice:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.least_squares.small_matrices import cholesky, solved
 from sysid.estimation.networks.pretraining import StepSamples
 
 RIDGES = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
@@ -52,14 +53,17 @@ def regressed(theta: NDArray[np.float64], samples: StepSamples, provider: Abstra
     places = np.r_[neurons, layout.affine]
     matrix, gradient = at.gauss_newton[np.ix_(places, places)], at.gradient[places]
     weighed, affine = np.split(np.diag(matrix), [len(neurons)])
-    found = [(provider.loss(theta), theta)]
+    closer: list[tuple[float, NDArray[np.float64]]] = []
+    drawn = provider.loss(theta)
     for ridge in RIDGES:
         held = np.concatenate([np.full(len(neurons), ridge * weighed.sum() / max(1, len(neurons))), AFFINE * affine])
-        step = np.linalg.lstsq(matrix + np.diag(held), gradient, rcond=None)[0]
+        factor = cholesky(matrix + np.diag(held))
+        if factor is None:
+            continue
         moved = theta.copy()
-        moved[places] -= step
-        found.append((provider.loss(moved), moved))
-    least = min(loss for loss, _ in found)
-    if not np.isfinite(least):
-        return theta
-    return next(moved for loss, moved in reversed(found) if loss <= ALIKE * least)
+        moved[places] -= solved(factor, gradient)
+        loss = provider.loss(moved)
+        if loss < drawn:
+            closer.append((loss, moved))
+    least = min((loss for loss, _ in closer), default=drawn)
+    return next((moved for loss, moved in reversed(closer) if loss <= ALIKE * least), theta)

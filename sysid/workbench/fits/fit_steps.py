@@ -99,8 +99,10 @@ class FitSteps:
     def outline_around(self, trials: Outlined) -> list[Outlined]:
         """All steps of a search, which stands behind the loading: of which structure a fit is, nobody knows."""
         data, *rest = self.outline()
-        fits = {one.name: replace(one, title=one.title.partition(",")[0]) for one in rest if one.name[:4] == "fit-"}
-        return [data, trials, *(fits.get(one.name, one) for one in rest)]
+        named = [
+            replace(one, title=one.title.partition(",")[0]) if one.name.startswith("fit-") else one for one in rest
+        ]
+        return [data, trials, *named]
 
     def outline(self) -> list[Outlined]:
         """All steps, as far as they are known before the traces are."""

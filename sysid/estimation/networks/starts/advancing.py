@@ -177,7 +177,7 @@ def first_prior(
     # None is known better than the rounding of scaled numbers, also where a start leaves no error at all.
     rounding = 0.5 * provider.n_samples * np.finfo(np.float64).eps ** 2
     loss = provider.loss(theta)
-    if drawn is not None:
+    if drawn is not None and drawn is not theta:
         # Weighed against the little that least squares leave, fits of play, stops and overflows stall.
         loss = min(FAR * loss, provider.loss(drawn))
     beta = 0.5 * provider.n_samples / max(loss, rounding)
