@@ -217,8 +217,8 @@ class LevenbergMarquardt:
     Args:
         termination: When to stop.
         damping: Damping to begin with.
-        evidence_after: Iterations before the precisions are first updated: while the fit is far from a
-            minimum, its residuals say nothing about noise. ``None`` keeps the prior as it is.
+        evidence_after: Iterations before the precisions are first updated, if it does not come to a minimum sooner:
+            while the fit is far from one, its residuals say nothing about noise. ``None`` keeps the prior as it is.
         on_iteration: Called after every iteration.
         on_state: Given where the fit stands after every iteration, before ``on_iteration``: who keeps it has kept what
             is announced.
@@ -280,6 +280,8 @@ class LevenbergMarquardt:
                     )
                     if status is None and stands(state, provider):
                         status = Status.CONVERGED
+                    if self._is_to_be_heard(status, state, provider):
+                        state, status = self._heard(state, provider), None
                     if status is None:
                         state = self._step(state, provider)
                         state = self._record(state, provider, before + now() - started)
@@ -316,7 +318,7 @@ class LevenbergMarquardt:
                     continue
             gain = (now - loss - state.prior.penalty(trial)) / promised if promised > 0.0 else -1.0
             if gain > MIN_GAIN:
-                at = provider.linearise(trial, correlation=self._asks(state.iteration + 1))
+                at = provider.linearise(trial, correlation=self._asks(state, state.iteration + 1))
                 if at.finite:
                     damping, further = damping.accepted(gain), state.iteration + 1
                     state = replace(state, theta=trial, at=at, damping=damping, iteration=further)
@@ -324,12 +326,24 @@ class LevenbergMarquardt:
             damping = damping.rejected()
         return replace(state, damping=damping, iteration=state.iteration + 1)
 
-    def _asks(self, iteration: int) -> bool:
-        """Whether the evidence is asked after an iteration."""
-        return self.evidence_after is not None and iteration >= self.evidence_after
+    def _asks(self, state: State, iteration: int) -> bool:
+        """Whether the evidence is asked after an iteration: from the first time on always."""
+        return self.evidence_after is not None and (iteration >= self.evidence_after or state.evidence is not None)
+
+    def _is_to_be_heard(self, status: Status | None, state: State, provider: AbstractProvider) -> bool:
+        """Whether a fit would end at a minimum of precisions that nobody has asked the evidence about."""
+        if self.evidence_after is None or state.evidence is not None or not state.at.finite:
+            return False
+        return status is Status.CONVERGED or (status is Status.STALLED and at_minimum(state, provider))
+
+    def _heard(self, state: State, provider: AbstractProvider) -> State:
+        """The precisions by the evidence at a minimum, from which the fit goes on as if it began there."""
+        at = provider.linearise(state.theta)
+        prior, evidence = update(state.prior, state.theta, at, provider.n_samples)
+        return replace(state, at=at, prior=prior, evidence=evidence, losses=(at.loss,), damping=self.damping)
 
     def _with_evidence(self, state: State, provider: AbstractProvider) -> State:
-        if not self._asks(state.iteration):
+        if not self._asks(state, state.iteration):
             return state
         prior, evidence = update(state.prior, state.theta, state.at, provider.n_samples)
         return replace(state, prior=prior, evidence=evidence)

@@ -115,6 +115,15 @@ def test_the_evidence_finds_the_noise():
     assert solution.evidence.total_effective_parameters == pytest.approx(5.0, abs=0.1)
 
 
+def test_the_evidence_is_asked_at_a_minimum_however_soon_that_is_reached():
+    problem, _ = linear_problem(400, noise=0.1, seed=1)
+    solution = LevenbergMarquardt(evidence_after=30).minimise(problem, np.zeros(5), flat_prior(5, alpha=1e-2))
+    assert solution.status is Status.CONVERGED
+    assert solution.state.iteration < 30
+    assert solution.evidence.beta == pytest.approx(1.0 / 0.1**2, rel=0.2)
+    assert LevenbergMarquardt(evidence_after=None).minimise(problem, np.zeros(5), flat_prior(5)).evidence is None
+
+
 def test_the_evidence_of_a_linear_model_is_the_marginal_likelihood():
     rng = np.random.default_rng(3)
     X, y = rng.standard_normal((30, 4)), rng.standard_normal(30)
