@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from sysid.models import Start
 from sysid.reporting.results import Results, read_results
 from sysid.validation import evaluate
 from sysid.workbench.fits import steps
-from sysid.workbench.fits.config import Pipeline, PipelineConfig
+from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import load_data
 from sysid.workbench.fits.record import read_fit, read_scores
 from sysid.workbench.fits.run import program_of
@@ -315,7 +316,7 @@ def test_an_interrupted_fit_is_used_now_and_done_again_next_time(
 ) -> None:
     whole = steps.fit_traces
 
-    def interrupted(fit, *arguments) -> FitResult:
+    def interrupted(fit: FitConfig, *arguments: Any) -> FitResult:
         result = whole(fit, *arguments)
         if fit.name != "open loop":
             return result
