@@ -10,13 +10,17 @@ position is a row of fixed weights. A front that takes some samples from one kno
 unless it is said how fast it runs (``delay``): each knot is then heard at a position as much later or earlier as the
 front passes it, and what is interpolated is what the knots have at the same time of their own. Limits: no faster change
 along the line than the knots resolve, and no position beyond the outer knots.
+
+Of several lines the mean may answer (``beside``). At each position each stands behind its own field, and what they come
+to is averaged there: at a knot that is the mean of the wholes that they are made of. What would stand behind the mean
+of their fields is none of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -31,6 +35,9 @@ from sysid.models.channels.ends import check_record
 from sysid.models.store import cascade_from_dict
 from sysid.traces import Trace
 
+SPREAD = "_spread"
+"""Behind the name of an averaged output: how far the answers are apart."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Interpolation:
@@ -42,9 +49,13 @@ class Interpolation:
         at_place: The cascade that stands at every position. It reads :attr:`channel`, and may read inputs of ``along``.
         channel: Name under which it reads the field.
         delay: Seconds that a front takes from one position to the next.
+        beside: Other lines with the same inputs, channel and knots: the mean of all of them answers.
+        spread: Outputs of such a mean of which the largest answer less the smallest is an output too, ``BC_spread`` of
+            ``BC``.
 
     Raises:
-        ConfigError: If the knots are fewer than two or do not increase, or the cascades do not fit each other.
+        ConfigError: If the knots are fewer than two or do not increase, the cascades do not fit each other, or a line
+            beside it answers another question.
         ChannelError: If a channel is written by none of them.
 
     Example:
@@ -65,6 +76,8 @@ class Interpolation:
     at_place: Cascade
     channel: str
     delay: float = 0.0
+    beside: tuple[Interpolation, ...] = ()
+    spread: tuple[str, ...] = ()
 
     kind = "Interpolation"
     OLD_KIND = "Line"
@@ -100,6 +113,34 @@ class Interpolation:
                 expected=f"{self.along.sample_time:g} s",
                 got=f"{self.at_place.sample_time:g} s",
             )
+        self._check_beside()
+
+    def _check_beside(self) -> None:
+        expected, *got = [one._question for one in (self, *self.beside)]
+        if unlike := [one for one in got if one != expected]:
+            raise ConfigError(
+                "the lines do not answer the same question", where="beside", expected=expected, got=unlike[0],
+                remedy="average lines of the same inputs, channel, knots and sample time",
+            )  # fmt: skip
+        averaged = self._shared if self.beside else ()
+        if strangers := [name for name in self.spread if name not in averaged]:
+            raise ChannelError(strangers, averaged, where="spread of the line")
+
+    @property
+    def _question(self) -> str:
+        knots = ", ".join(f"{name}: {position:g}" for name, position in self.knots.items())
+        unit = self.along.units[next(iter(self.knots))]
+        return f"{', '.join(sorted(self.inputs))} in, {self.channel} in {unit} at {knots}, each {self.sample_time:g} s"
+
+    @property
+    def _shared(self) -> tuple[str, ...]:
+        """What every line has at a position, in one unit: only that can be averaged."""
+        return tuple(n for n, unit in self._units.items() if all(one._units.get(n) == unit for one in self.beside))
+
+    @property
+    def _units(self) -> dict[str, str]:
+        units = {self.channel: self.along.units[next(iter(self.knots))]}
+        return units | {name: self.at_place.units[name] for name in self.at_place.outputs}
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -108,8 +149,14 @@ class Interpolation:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """What is had at every position: the field, and what the cascade there writes."""
-        return (self.channel, *self.at_place.outputs)
+        """What is had at every position: the field, and what the cascade there writes; of a mean what all have."""
+        return tuple(self.units)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each of these."""
+        units = {name: self._units[name] for name in self._shared}
+        return units | {f"{name}{SPREAD}": units[name] for name in self.spread}
 
     @property
     def sample_time(self) -> float:
@@ -118,8 +165,9 @@ class Interpolation:
 
     @property
     def n_parameters(self) -> int:
-        """Parameters of both cascades; the same for any number of positions."""
-        return self.along.n_parameters + self.at_place.n_parameters
+        """Parameters of both cascades, and of those beside; the same for any number of positions."""
+        own = self.along.n_parameters + self.at_place.n_parameters
+        return own + sum(one.n_parameters for one in self.beside)
 
     @cached_property
     def _spline(self) -> Any:
@@ -163,18 +211,44 @@ class Interpolation:
 
         Returns:
             One run whose arrays have a first axis of positions; its channels are the inputs of the cascade that
-            stands there (the field among them) and its outputs.
+            stands there (the field among them) and its outputs; of a mean, :attr:`outputs`.
 
         Raises:
             TraceError: If the number of inputs is not that of the line.
             ConfigError: If a position is not on the line.
         """
+        if self.beside:
+            return self._mean(inputs, positions, workers)
         weights, along = self.weights(positions), self.along.simulate(inputs)
         fields = self._fields(np.stack([along[name] for name in self.knots]), weights, np.atleast_1d(positions))
         records = np.empty((*fields.shape, len(self.at_place.inputs)))
         for column, name in enumerate(self.at_place.inputs):
             records[..., column] = fields if name == self.channel else along[name]
         return self.at_place.simulate_batch(records, workers=workers)
+
+    def _mean(
+        self, inputs: NDArray[np.float64], positions: Sequence[float] | NDArray[np.float64], workers: int
+    ) -> CascadeRun:
+        """The mean of all lines, and how far they are apart; held is what holds any of them."""
+        inputs = self.along.checked(inputs, 2)
+        columns = [[self.inputs.index(name) for name in one.inputs] for one in self.beside]
+        runs = [replace(self, beside=(), spread=()).simulate(inputs, positions, workers=workers)]
+        runs += [
+            one.simulate(inputs[:, own], positions, workers=workers)
+            for one, own in zip(self.beside, columns, strict=True)
+        ]
+        answers = {name: np.stack([run[name] for run in runs]) for name in self._shared}
+        found = {name: np.mean(answer, axis=0) for name, answer in answers.items()}
+        found |= {f"{name}{SPREAD}": np.ptp(answers[name], axis=0) for name in self.spread}
+        field, *outputs = self.outputs
+        held = np.zeros((*found[field].shape, len(outputs)), dtype=np.int8)
+        for column, name in enumerate(outputs):
+            codes = [run.held[..., run.outputs.index(name)] for run in runs if name in run.outputs]
+            held[..., column] = np.max(codes, axis=0, initial=0)
+        return CascadeRun(
+            inputs=(field,), outputs=tuple(outputs), values=np.stack(list(found.values()), axis=-1), held=held,
+            units=self.units, sample_time=self.sample_time,
+        )  # fmt: skip
 
     def _fields(
         self, knots: NDArray[np.float64], weights: NDArray[np.float64], positions: NDArray[np.float64]
@@ -218,6 +292,8 @@ class Interpolation:
             "at_place": self.at_place.to_dict(),
             "channel": self.channel,
             **({"delay": self.delay} if self.delay else {}),
+            **({"beside": [one.to_dict() for one in self.beside]} if self.beside else {}),
+            **({"spread": list(self.spread)} if self.spread else {}),
         }
 
     @classmethod
@@ -248,4 +324,6 @@ class Interpolation:
             at_place=cascade_from_dict(fields["at_place"]),
             channel=fields["channel"],
             delay=float(fields.get("delay", 0.0)),
+            beside=tuple(cls.from_dict(one) for one in fields.get("beside", ())),
+            spread=tuple(fields.get("spread", ())),
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
+from sysid.composite import committee
 from sysid.errors import ChannelError, ConfigError
 from sysid.models import Cascade, Interpolation, Limit, Mapping
 from sysid.traces import Channel, Trace
@@ -129,6 +131,65 @@ def test_it_is_stored_and_read_again():
     assert Interpolation.from_dict(earlier).knots == line().knots
     with pytest.raises(ConfigError, match="not a stored line"):
         Interpolation.from_dict(along().to_dict())
+
+
+def mean_of_two() -> Interpolation:
+    """Two lines whose pipes and cylinders differ; the second names its inner channel otherwise."""
+    models = [
+        replace(network("STP -> BP", seed=20 + i), mapping=Mapping(inputs=("STP",), output=name))
+        for i, name in enumerate(KNOTS)
+    ]
+    there = Cascade(models=(network("BP -> ER", seed=9), network("BP+ER -> BC", seed=10)))
+    second = Interpolation(along=Cascade(models=tuple(models)), knots=KNOTS, at_place=there, channel="BP")
+    return replace(line(), beside=(second,), spread=("BC",))
+
+
+def test_the_mean_of_lines_is_that_of_what_each_has_behind_its_own_field():
+    mean, positions = mean_of_two(), [1.0, 17.5, 50.0]
+    run = mean.simulate(handle(), positions)
+    parts = [one.simulate(handle(), positions) for one in (line(), *mean.beside)]
+    assert mean.outputs == ("BP", "BC", "BC_spread")
+    assert mean.n_parameters == line().n_parameters + mean.beside[0].n_parameters
+    for name in ("BP", "BC"):
+        assert_allclose(run[name], (parts[0][name] + parts[1][name]) / 2.0, atol=1e-12)
+    assert_allclose(run["BC_spread"], np.abs(parts[0]["BC"] - parts[1]["BC"]), atol=1e-12)
+    behind_the_mean_field = [one.at_place.simulate(run["BP"][1][:, None])["BC"] for one in (line(), *mean.beside)]
+    assert np.abs(run["BC"][1] - np.mean(behind_the_mean_field, axis=0)).max() > 1e-3
+
+
+def test_at_a_knot_the_mean_of_lines_is_the_mean_of_the_wholes_as_a_committee_has_it():
+    lines = [
+        replace(one, at_place=replace(one.at_place, rest={"BP": 90.0}), beside=(), spread=())
+        for one in (line(), *mean_of_two().beside)
+    ]
+    mean = replace(lines[0], beside=(lines[1],), spread=("BC",))
+    wholes = [Cascade(models=(*one.along.models, *one.at_place.models), limits=one.at_place.limits) for one in lines]
+    answer = committee(wholes, mean=["BC", *KNOTS]).simulate(handle())
+    run = mean.simulate(handle(), list(KNOTS.values()))
+    assert_allclose(run["BC"][0], answer["BC"], atol=1e-9)
+    assert_allclose(run["BC_spread"][0], answer["BC_spread"], atol=1e-9)
+    for k, knot in enumerate(KNOTS):
+        assert_allclose(run["BP"][k], answer[knot], atol=1e-9)
+
+
+def test_the_mean_of_lines_is_stored_and_tells_what_held_any_of_them():
+    mean = mean_of_two()
+    again = Interpolation.from_dict(json.loads(json.dumps(mean.to_dict())))
+    run, other = mean.simulate(handle(), [7.0]), again.simulate(handle(), [7.0])
+    assert again.outputs == mean.outputs
+    assert_allclose(other.values, run.values, rtol=0, atol=0)
+    assert run.activity["BC"].low == line().simulate(handle(), [7.0]).activity["BC"].low > 0
+    assert run.units["BC_spread"] == "psi"
+
+
+def test_lines_of_other_questions_are_not_averaged():
+    other = replace(line(), knots={"BP": 1.0, "BP10": 11.0, "BP25": 25.0, "BP50": 50.0})
+    with pytest.raises(ConfigError, match="do not answer the same question"):
+        replace(line(), beside=(other,))
+    with pytest.raises(ChannelError, match="spread of the line"):
+        replace(line(), beside=(line(),), spread=("ER",))
+    with pytest.raises(ChannelError, match="spread of the line"):
+        replace(line(), spread=("BC",))
 
 
 @pytest.mark.parametrize("positions", [[0.0], [51.0], [np.nan], [], [5.0, 60.0]], ids=str)

@@ -31,12 +31,11 @@ from sysid.errors import ChannelError, ConfigError
 from sysid.models import NARX, AbstractModel, Cascade, Limit, Mapping, NARXModel, Scaling
 from sysid.models.cascades.cascade_run import Level
 from sysid.models.cascades.wiring import Member
+from sysid.models.interpolation import SPREAD
 from sysid.models.lagged.cascade_program import NOBODY
 
 APART = "_apart"
 """Behind the name of an output: the channel of its difference."""
-SPREAD = "_spread"
-"""Behind the name of an averaged output: how far the answers are apart."""
 
 
 def committee(

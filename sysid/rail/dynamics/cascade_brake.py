@@ -128,7 +128,7 @@ class LineBrake(_FreeRunBrake):
 
     def __init__(self, *, line: Interpolation, consist: Consist) -> None:
         first, *_, last = line.knots.values()
-        fits = set(line.inputs) == {COMMAND} and CYLINDER in line.at_place.outputs
+        fits = set(line.inputs) == {COMMAND} and CYLINDER in line.outputs
         if not fits or (first, last) != (1.0, float(consist.pairs)):
             raise ConfigError(
                 "the line is not one of this train's brakes",

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 from sysid.composite import Doubting, TrainedComposite, TrainingData, committee, doubting, whole_score
 from sysid.composite.doubt.committee import check_alike
-from sysid.models import Cascade
+from sysid.models import Cascade, Interpolation
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
-from sysid.workbench.assembly.proof_config import DoubtConfig, MeanConfig
+from sysid.workbench.assembly.interpolation import interpolation_of
+from sysid.workbench.assembly.proof_config import DoubtConfig, InterpolationConfig, MeanConfig
 from sysid.workbench.assembly.written import written
 from sysid.workbench.runner.store import digest, strict
 
@@ -89,6 +90,7 @@ class Beside:
         mean: What is to be averaged.
         averaged: Over whom, beside the whole itself.
         outputs: Outputs that are asked of the whole, which are averaged.
+        interpolation: What is asked between the positions that are modelled.
     """
 
     doubt: DoubtConfig | None = None
@@ -96,9 +98,13 @@ class Beside:
     mean: MeanConfig | None = None
     averaged: tuple[Other, ...] = ()
     outputs: tuple[str, ...]
+    interpolation: InterpolationConfig | None = None
 
     @classmethod
-    def read(cls, doubt: DoubtConfig | None, mean: MeanConfig | None, outputs: Collection[str], folder: Path) -> Beside:
+    def read(
+        cls, doubt: DoubtConfig | None, mean: MeanConfig | None, outputs: Collection[str], folder: Path,
+        interpolation: InterpolationConfig | None = None,
+    ) -> Beside:  # fmt: skip
         """Read the bundles that sections of a YAML name.
 
         Args:
@@ -106,6 +112,7 @@ class Beside:
             mean: The other.
             outputs: Outputs that are asked of the whole.
             folder: Folder of the YAML.
+            interpolation: What is asked between the positions that are modelled.
 
         Returns:
             All of them.
@@ -122,7 +129,10 @@ class Beside:
             tuple(Other.of_bundle(read_bundle(folder / place), place) for place in (section.beside if section else ()))
             for section in (doubt, mean)
         )
-        return cls(doubt=doubt, doubting=doubting, mean=mean, averaged=averaged, outputs=tuple(outputs))
+        return cls(
+            doubt=doubt, doubting=doubting, mean=mean, averaged=averaged, outputs=tuple(outputs),
+            interpolation=interpolation,
+        )  # fmt: skip
 
     def and_trained(self, name: str, whole: Cascade) -> Beside:
         """The same, with a whole more that is averaged: one that was trained in the same run.
@@ -144,8 +154,8 @@ class Beside:
             whole: The whole, or one with the same channels that is not trained yet.
 
         Raises:
-            ConfigError: If one of them has other inputs, units or another sample time, lacks an output, or has it at
-                another level at rest.
+            ConfigError: If one of them has other inputs, units or another sample time, lacks an output, has it at
+                another level at rest, or has no output at other positions that is asked there.
         """
         doubted = () if self.doubt is None else (self.doubt.output,)
         for section, asked, others in (("doubt", doubted, self.doubting), ("mean", self.outputs, self.averaged)):
@@ -155,6 +165,9 @@ class Beside:
         if self.doubting:
             committee([whole, *(one.whole for one in self.doubting)], dict.fromkeys(doubted, 1.0))
         self.answering(whole)
+        if self.interpolation is not None:
+            for one in self.averaged:
+                interpolation_of(self.interpolation, one.of(self.outputs), where=f"mean, beside: {one.place}")
 
     def answering(self, whole: Cascade) -> Cascade:
         """What answers: the mean of all, or the whole as it is where none is asked for.
@@ -168,6 +181,24 @@ class Beside:
         if self.mean is None or not self.averaged:
             return whole
         return committee(self._members(whole), mean=self.outputs).upstream_of([*self.outputs, *self.mean.spreads])
+
+    def line(self, asked: InterpolationConfig, whole: Cascade) -> Interpolation:
+        """The line of what answers: where that is a mean, each whole stands at a position behind its own channel.
+
+        Args:
+            asked: What stands where.
+            whole: The whole, not the mean.
+
+        Returns:
+            The line.
+
+        Raises:
+            ConfigError: If the outputs cannot be had from the channel at a position.
+        """
+        if self.mean is None or not self.averaged:
+            return interpolation_of(asked, whole)
+        first, *others = (interpolation_of(asked, one) for one in self._members(whole))
+        return replace(first, beside=tuple(others), spread=tuple(n for n in self.mean.spread if n in asked.outputs))
 
     def _members(self, whole: Cascade) -> list[Cascade]:
         return [whole.upstream_of(self.outputs), *(one.of(self.outputs) for one in self.averaged)]

@@ -281,13 +281,6 @@ class AssemblyConfig(Words):
     def _check_doubt(self) -> AssemblyConfig:
         if self.doubt is not None:
             self.doubt.check_judges(averaged=self.mean is not None)
-        if self.mean is not None and self.interpolation is not None:
-            raise FieldError(
-                "there is no mean of positions between those that are modelled",
-                expected="mean, or interpolation",
-                got="both",
-                remedy="leave interpolation out; each of the wholes can have it in a pipeline of its own",
-            )
         training = (self.training,) if isinstance(self.training, str) else self.training
         fitted = (*training, *(self.together.data if self.together else ()))
         if self.doubt is not None and self.doubt.data in fitted:

@@ -27,7 +27,6 @@ from sysid.workbench.assembly.data import AssemblyData
 from sysid.workbench.assembly.interpolation import (
     InterpolationScores,
     StoredInterpolation,
-    interpolation_of,
     score_interpolation,
 )
 from sysid.workbench.assembly.member_scores import score_candidates
@@ -106,7 +105,7 @@ class Evaluating:
         scores = scored["scores"]
         whole = self._chosen(judged)
         stressed, worst, sequences = self._stressed(whole)
-        line = self._line(whole, data)
+        line = self._line(data)
         doubt = self._doubting()
         exported = self._export(whole, cases, evaluate_cascade(whole, cases), data, doubt)
         candidates = self.trained.candidates
@@ -207,11 +206,11 @@ class Evaluating:
             for stage, whole in wholes.items()
         }
 
-    def _line(self, whole: Cascade, data: AssemblyData) -> InterpolationScores | None:
+    def _line(self, data: AssemblyData) -> InterpolationScores | None:
         asked = self.context.config.interpolation
         if asked is None:
             return None
-        line, cases = interpolation_of(asked, whole), self.context.load(asked.data)
+        line, cases = self.beside.line(asked, self.trained.model), self.context.load(asked.data)
         stored = StoredInterpolation.of(asked, line, next(iter(cases)), data.data.estimation)
         write_json(self.context.store.path / LINE, stored.to_dict())
         return self.context.compute(

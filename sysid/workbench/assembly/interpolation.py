@@ -15,6 +15,7 @@ from sysid.errors import ConfigError
 from sysid.export.bundle import ranges_of
 from sysid.export.ranges import ranges_in
 from sysid.models import Cascade, Interpolation
+from sysid.models.interpolation import SPREAD
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference
 from sysid.workbench.assembly.proof_config import InterpolationConfig
@@ -73,9 +74,9 @@ class StoredInterpolation:
             The line with its channels.
         """
         outputs = []
-        for name in asked.outputs:
+        for name in (*asked.outputs, *(f"{one}{SPREAD}" for one in line.spread)):
             there = name if name in case.channel_names else next(iter(positions_of(case, name).values()), None)
-            unit = Channel(name=name, unit=line.at_place.units[name])
+            unit = Channel(name=name, unit=line.units[name])
             outputs.append(replace(case.channel(there), name=name, description="") if there else unit)
         inputs = tuple(case.channel(name) for name in line.inputs)
         return cls(line=line, inputs=inputs, outputs=tuple(outputs), ranges=ranges_in(line.inputs, fitted))
@@ -127,12 +128,15 @@ def _said(channel: Channel) -> dict[str, Any]:
     return {"name": channel.name, "unit": channel.unit, "reference": channel.reference.value}
 
 
-def interpolation_of(asked: InterpolationConfig, whole: Cascade) -> Interpolation:
+def interpolation_of(
+    asked: InterpolationConfig, whole: Cascade, *, where: str = "interpolation, outputs"
+) -> Interpolation:
     """The line of an assembly: what the knots need runs along it, what the outputs need stands at every position.
 
     Args:
         asked: What stands where.
         whole: The assembly.
+        where: Of whom an error speaks.
 
     Returns:
         The line.
@@ -145,11 +149,14 @@ def interpolation_of(asked: InterpolationConfig, whole: Cascade) -> Interpolatio
     if unread or asked.channel not in there.inputs:
         raise ConfigError(
             "the outputs cannot be had at a position of the line",
-            where="interpolation, outputs",
+            where=where,
             expected=f"outputs that follow from {asked.channel} and the inputs of the whole",
             got=f"{', '.join(asked.outputs)} from {', '.join(there.inputs)}",
             remedy="name the channel that the positions read, and outputs of members that stand there",
         )
+    levels = {whole.level(knot) for knot in asked.knots}
+    if len(levels) == 1 and not isinstance(level := next(iter(levels)), str):
+        there = replace(there, rest={**there.rest, asked.channel: level})  # before its first sample, as in the whole
     return Interpolation(
         along=whole.upstream_of(asked.knots),
         knots=asked.knots,

@@ -8,8 +8,8 @@ from typing import Annotated
 from pydantic import BaseModel, Field, model_validator
 
 from sysid.composite import Doubt, Perturbation
-from sysid.composite.doubt.committee import SPREAD
 from sysid.field_checks import FieldError
+from sysid.models.interpolation import SPREAD
 from sysid.workbench.old_words import STRICT
 
 

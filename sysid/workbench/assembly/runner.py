@@ -69,7 +69,7 @@ def _run(context: Context, estimates: RoundEstimates) -> AssemblyResults:
         read_published(config.published_models)  # a wrong name is said now, not when all is trained
     if config.export is not None:
         wanted_formats(config.export.formats)  # nor a format that cannot be written here
-    beside = Beside.read(config.doubt, config.mean, config.wanted, context.beside)
+    beside = Beside.read(config.doubt, config.mean, config.wanted, context.beside, config.interpolation)
     cases = context.load(config.data)
     context.cases.append(cases)
     data, begin = AssemblyData.of(context), None

@@ -46,6 +46,13 @@ def read_whole(bundle: Path) -> tuple[Cascade, str]:
 
 def _whole_of(line: Interpolation) -> Cascade:
     """What runs along a line, and what else stands at a position; rest and limits are declared anew."""
+    if line.beside:
+        raise ConfigError(
+            "the mean of several wholes is none to begin from",
+            expected="the line or the bundle of one whole",
+            got=f"a line that is the mean of {1 + len(line.beside)}",
+            remedy="name the run that left one of them",
+        )
     known = set(line.along.outputs)
     return Cascade(
         models=(*line.along.models, *(m for m in line.at_place.models if not set(Ends.of(m).outputs) & known))

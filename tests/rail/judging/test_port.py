@@ -235,6 +235,19 @@ def test_a_line_gives_every_car_its_own_pressure(pieces: int) -> None:
     np.testing.assert_allclose(tail, run["BP"][3], rtol=0.0, atol=1e-9)
 
 
+def test_the_mean_of_lines_gives_every_car_the_mean_of_its_pressures() -> None:
+    other = replace(line(), at_place=Cascade(models=(model("BP -> BC", gain=-1.0),)))
+    handle = np.repeat([90.0, 80.0, 64.0, 90.0], [20, 150, 30, 100])
+    runs = [
+        brake_of([Part(model=one)], TRAIN)().advance(handle)
+        for one in (line(), other, replace(line(), beside=(other,)))
+    ]
+    cylinders = [one.cylinders for one in runs]
+    assert np.abs(cylinders[0] - cylinders[1]).max() > 1.0
+    np.testing.assert_allclose(cylinders[2], (cylinders[0] + cylinders[1]) / 2.0, rtol=0.0, atol=1e-6)
+    assert runs[2].tail_pipe is not None
+
+
 def test_a_line_of_another_train_or_beside_other_models_is_refused() -> None:
     with pytest.raises(ConfigError, match="not one of this train's brakes"):
         brake_of([Part(model=line(9.0))], TRAIN)

@@ -51,6 +51,15 @@ def test_what_the_knots_need_runs_along_and_what_the_outputs_need_stands_at_a_pl
     assert dict(line.knots) == {"BP": 1.0, "BP9": 9.0}
 
 
+@pytest.mark.parametrize("rest", [{}, {"BP": "STP", "BP9": "STP", "AR": "STP"}], ids=["at 90", "at the handle"])
+def test_at_a_knot_it_begins_as_the_whole_does(rest):
+    """What reads earlier samples of the channel finds its level there, not its first sample."""
+    composite = pipe(rest=rest)
+    one, command = assembled(composite, models()), trace()["STP"][:, None]
+    run, there = interpolation_of(ASKED, one).simulate(command, [1.0]), one.simulate(command)
+    assert_allclose(run["AR"][0], there["AR"], atol=1e-9)
+
+
 def test_it_knows_what_it_was_trained_on():
     line, fitted = interpolation_of(ASKED, whole()), [trace(seed=5), trace(seed=6)]
     stored = StoredInterpolation.of(ASKED, line, next(iter(positions())), fitted)

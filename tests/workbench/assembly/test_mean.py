@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from sysid.composite import Doubt, committee, doubt_figures, doubting
@@ -16,7 +17,7 @@ from sysid.export import read_bundle
 from sysid.ingest import load_dataset
 from sysid.models import Cascade
 from sysid.validation import evaluate_cascade
-from sysid.workbench.assembly.runner import read_assembly
+from sysid.workbench.assembly.runner import read_assembly, read_interpolation
 from sysid.workbench.cli import app
 from sysid.yaml_files import parse_yaml, yaml_text
 from tests.workbench.assembly.conftest import assembly_results, write_tanks
@@ -171,6 +172,67 @@ def test_the_mean_of_seeds_is_that_of_runs_with_these_seeds(workspace: Path, bot
     told = CliRunner().invoke(app, named)
     assert told.exit_code == 0, told.output
     assert read_bundle(workspace / "member").model.mapping.output == "lower"
+
+
+LINE = """\
+fixed: [{mapping: upper -> LH, gains: {upper: 0.9}, low: 0, high: 1, rest: 0}]
+interpolation: {channel: upper, knots: {upper: 1, lower: 9}, outputs: [upper, LH], data: places}
+mean: {seeds: [4], spread: [LH]}
+"""
+
+
+def write_places(folder: Path) -> None:
+    """The tanks as a line: what stands at three positions."""
+    write_tanks(folder)
+    file, columns = folder / "dataset.yaml", {"upper1": 2, "upper9": 3, "LH1": 2, "LH4": 2, "LH9": 3}
+    for case in folder.glob("*.csv"):
+        values = np.loadtxt(case, delimiter=",", skiprows=1)
+        header = ",".join(["time [s]", "pump [cm]", *(f"{name} [cm]" for name in columns)])
+        rows = np.column_stack([values[:, :2], values[:, list(columns.values())]])
+        np.savetxt(case, rows, delimiter=",", header=header, comments="")
+    head, rest = file.read_text(encoding="utf-8").split("channels:\n")
+    channels = "\n".join(f"  - {{name: {name}, unit: cm}}" for name in ("pump", *columns))
+    file.write_text(f"{head}channels:\n{channels}\nsource:{rest.split('source:')[1]}", encoding="utf-8")
+
+
+def test_positions_between_have_the_mean_too_each_whole_behind_its_own_channel(workspace: Path) -> None:
+    write_places(workspace / "datasets" / "places")
+    folder = run(workspace, "tanks", FIRST + LINE)
+    stored, bundle = read_interpolation(folder), read_bundle(folder / "bundle")
+    assert [one.name for one in stored.outputs] == ["upper", "LH", "LH_spread"]
+    pump = load_dataset("tanks")["V"]["pump"][:, None]
+    run_there, whole = stored.line.simulate(pump, [1.0, 4.0, 9.0]), read_assembly(folder).simulate(pump)
+    assert_allclose(run_there["upper"][0], whole["upper"], atol=1e-12)
+    assert_allclose(run_there["upper"][2], whole["lower"], atol=1e-12)
+    fields = [0.625 * whole[f"upper_{k}"] + 0.375 * whole[f"lower_{k}"] for k in (1, 2)]
+    expected = [np.clip(0.9 * field, 0.0, 1.0) for field in fields]
+    assert_allclose(run_there["LH"][1], np.mean(expected, axis=0), atol=1e-12)
+    assert_allclose(run_there["LH_spread"][1], np.ptp(expected, axis=0), atol=1e-12)
+    assert run_there["LH_spread"][1].max() > 1e-3
+    scores = assembly_results(folder).interpolation
+    assert scores is not None
+    assert scores.outputs["LH"].positions == [1.0, 4.0, 9.0]
+    error = run_there["upper"][0] - load_dataset("places")["V"]["upper1"]
+    assert scores.outputs["upper"].mse["V"][0] == pytest.approx(np.mean(error**2))
+    assert bundle.outputs
+    words = ["simulate", "tanks", "--command", str(workspace / "command.json"), "--positions", "4", "--out", "line.csv"]
+    rows = '{"command": [[0, 0], [5, 1.5], [60, 0.5], [90, 0.5]], "unit": "cm", "time_unit": "s"}'
+    (workspace / "command.json").write_text(rows, encoding="utf-8")
+    told = CliRunner().invoke(app, words)
+    assert told.exit_code == 0, told.output
+    assert "upper4" in Path("line.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "LH_spread4" in Path("line.csv").read_text(encoding="utf-8").splitlines()[0]
+
+
+def test_a_whole_beside_that_has_no_such_positions_is_refused_before_anything_is_trained(workspace: Path) -> None:
+    """A mean of earlier wholes has the channel of each of them at a position, not the one that is asked for."""
+    write_places(workspace / "datasets" / "places")
+    first = run(workspace, "tanks", FIRST + LINE)
+    text = FIRST.replace("name: tanks", "name: third", 1) + LINE.replace("seeds: [4]", f"beside: [{first / 'bundle'}]")
+    with pytest.raises(ConfigError, match="cannot be had at a position") as told:
+        run(workspace, "third", text)
+    assert "mean, beside" in str(told.value)
+    assert not list((workspace / "runs" / "third").rglob("fit.json"))
 
 
 @pytest.mark.parametrize(

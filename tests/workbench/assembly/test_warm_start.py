@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -89,6 +90,13 @@ def test_a_line_is_begun_from_as_well(tmp_path: Path) -> None:
         assert whole.member(name).theta is given.member(name).theta
     assert str(whole.member("AR10").mapping) == "BP10 -> AR10"
     assert_array_equal(whole.member("AR10").theta, given.member("AR").theta)
+
+
+def test_the_mean_of_lines_is_nothing_to_begin_from(tmp_path: Path) -> None:
+    mean = replace(line(), beside=(line(),))
+    (tmp_path / "line.json").write_text(json.dumps(mean.to_dict()), encoding="utf-8")
+    with pytest.raises(ConfigError, match="mean of several wholes is none to begin from"):
+        read_whole(tmp_path)
 
 
 def test_what_is_declared_is_the_new_pipelines(workspace: Path, trained: Path) -> None:
