@@ -7,6 +7,7 @@ workbench; nothing is unpickled. A table has a row a sample, and a column ``name
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,11 +58,28 @@ def rests(about: dict[str, Any]) -> dict[str, tuple[str, float]]:
         about: Content of ``model.json``.
 
     Returns:
-        By the parameter's name the output and its declared level; none of an output that stands where an input does.
+        By the parameter's name the output and its declared level; none of an output that stands where an input does,
+        nor of one whose level no state heeds.
     """
-    levels = about["initialisation"]["levels"]
-    names = [channel["name"] for channel in about["outputs"]]
+    levels, heeded = about["initialisation"]["levels"], _heeded(about)
+    names = [channel["name"] for channel in about["outputs"] if channel["name"] in heeded]
     return {f"{name}_at_rest": (name, levels[name]) for name in names if not isinstance(levels[name], str)}
+
+
+def _heeded(about: dict[str, Any]) -> set[str]:
+    """The channels whose level at rest a state follows; equations begin where they are declared or found."""
+    found = {line["channel"] for line in about["state"]["lines"]}
+    for space in about["state"].get("state_spaces", []):
+        found |= {name for i, name in enumerate(space["channels"]) if np.any(np.array(space["at_rest"])[:, i])}
+    return found.union(*(_walk(about, name) for name in found))
+
+
+def _walk(about: dict[str, Any], name: str, ends: Iterable[str] = ()) -> list[str]:
+    """A channel, the one where it is declared to begin, as a committee's members are, and so on to one of the ends."""
+    declared, walk = about["model"].get("rest") or {}, [name]
+    while walk[-1] not in ends and isinstance(level := declared.get(walk[-1]), str) and level not in walk:
+        walk.append(level)
+    return walk
 
 
 class Table:
@@ -95,7 +113,8 @@ class Table:
             row, the units and the sample time.
 
         Raises:
-            ValueError: If a column lacks, the index is of another sample time, or a parameter cannot be taken.
+            ValueError: If a column lacks, the index is of another sample time, or a parameter is unknown or cannot be
+                taken.
         """
         import pandas as pd
 
@@ -144,9 +163,12 @@ class Table:
     def _beginning(self, inputs: NDArray[np.float64], params: dict[str, Any]) -> NDArray[np.float64]:
         """The state before the first row, as it was given, or at rest."""
         given = np.asarray(params.get(STATE, []), dtype=np.float64)
-        size = self.about["state"]["size"]
+        size, known = self.about["state"]["size"], rests(self.about)
+        if strangers := set(params) - {STATE, *known}:
+            took = ", ".join([STATE, *known])
+            raise ValueError(f"{', '.join(sorted(strangers))}: this surrogate has no such parameter; expected {took}")
         moved = {}
-        for parameter, (name, declared) in rests(self.about).items():
+        for parameter, (name, declared) in known.items():
             value = float(params.get(parameter, declared))
             if not np.isfinite(value):
                 raise ValueError(f"{parameter}: expected a finite number, got {value}")
@@ -167,18 +189,15 @@ class Table:
             channel["name"]: value for channel, value in zip(about["inputs"], inputs[0] + 0.0 * inputs[0], strict=True)
         }
         rest = {name: first.get(level, level) for name, level in start["levels"].items()} | self._followed(moved)
-        heeded = set()
         state = np.zeros(about["state"]["size"])
         for line in about["state"]["lines"]:
             begin = line["first"]
             state[begin : begin + line["length"]] = (rest[line["channel"]] - line["offset"]) / line["scale"]
-            heeded.add(line["channel"])
         for space in about["state"].get("state_spaces", []):
             scaled = (np.array([rest[name] for name in space["channels"]]) - space["offset"]) / space["scale"]
             levels = np.array(space["constant"]) + np.array(space["at_rest"]) @ scaled
             bound = space.get("bound", np.inf)
             state[space["first"] : space["first"] + space["size"]] = np.clip(levels, -bound, bound)
-            heeded |= {name for i, name in enumerate(space["channels"]) if np.any(np.array(space["at_rest"])[:, i])}
         for equations in about["state"].get("equations", []):
             at = slice(equations["first"], equations["first"] + equations["size"])
             if None not in equations["declared"]:
@@ -190,20 +209,12 @@ class Table:
                     f"where {', '.join(equations['names'])} are at rest at these inputs has to be searched for, which "
                     f"is not done here: give {STATE}, as it stands in model.json under initialisation.state"
                 )
-        if strangers := set(moved) - heeded:
-            raise ValueError(f"{', '.join(strangers)} at rest: this surrogate does not remember it; leave it out")
         return state
 
     def _followed(self, moved: dict[str, float]) -> dict[str, float]:
         """The same with what is declared to begin where one of them does, as the members of a committee."""
-        declared, found = self.about["model"].get("rest") or {}, dict(moved)
-        for name in declared:
-            walk = [name]
-            while walk[-1] not in moved and isinstance(level := declared.get(walk[-1]), str) and level not in walk:
-                walk.append(level)
-            if walk[-1] in moved:
-                found[name] = moved[walk[-1]]
-        return found
+        ends = {name: _walk(self.about, name, moved)[-1] for name in self.about["model"].get("rest") or {}}
+        return moved | {name: moved[end] for name, end in ends.items() if end in moved}
 
 
 def _load_pyfunc(path: str) -> Table:

@@ -11,11 +11,12 @@ import pandas as pd
 import pytest
 
 from sysid.export import EXPORTERS, Surrogate
+from sysid.export.heeded import heeded
 from sysid.export.manifest import describe
 from sysid.models import NARX, AbstractModel, Cascade, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.units import Reference
-from sysid.workbench.tracking.served_table import Table
+from sysid.workbench.tracking.served_table import Table, rests
 from tests.export.cascades import build_committee, build_limited
 from tests.export.grey_boxes import GREY_BOXES
 from tests.export.single_models import build_arx, build_narx
@@ -115,13 +116,23 @@ def test_all_members_of_a_mean_stand_where_it_is_said_to_stand(tmp_path: Path) -
         ("NARX", {"state": [1.0]}, r"state: expected 6 numbers.*got 1 numbers"),
         ("NARX", {"state": [0.0] * 6, "BC_at_rest": 3.0}, r"no level at rest beside it.*BC = 3"),
         ("NARX", {"BC_at_rest": np.inf}, r"BC_at_rest: expected a finite number, got inf"),
-        ("declared states", {"BC_at_rest": 3.0}, r"does not remember it"),
+        ("declared states", {"BC_at_rest": 3.0}, r"BC_at_rest: this surrogate has no such parameter; expected state$"),
     ],
 )
 def test_a_beginning_that_cannot_be_is_refused(source: str, params: dict, match: str, tmp_path: Path) -> None:
     _, table, frame = opened(SOURCES[source](), tmp_path)
     with pytest.raises(ValueError, match=match):
         table.predict(frame, params)
+
+
+@pytest.mark.parametrize("name", [*SOURCES, "committee"])
+def test_a_level_is_offered_where_a_state_heeds_it(name: str, tmp_path: Path) -> None:
+    source = SOURCES[name]() if name in SOURCES else build_committee(2, mean=True)
+    surrogate, table, _ = opened(source, tmp_path)
+    levels = table.about["initialisation"]["levels"]
+    says = zip(surrogate.outputs, heeded(surrogate), strict=True)
+    own = [f"{port.name}_at_rest" for port, yes in says if yes and not isinstance(levels[port.name], str)]
+    assert list(rests(table.about)) == own
 
 
 def test_states_that_have_to_be_searched_for_are_asked_for(tmp_path: Path) -> None:
