@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sysid.advice.answered import answered
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import Record, stacked
+from sysid.advice.stuck import check_stuck
 from sysid.estimation.remarks.held_output import held_for, straight_for
 from sysid.estimation.remarks.record_drift import sums_up, trend_of
 from sysid.estimation.remarks.wrapped import jumping, period_of
@@ -41,6 +42,7 @@ def check_channels(record: Record) -> Iterator[Finding]:
     found += list(_trends(record))
     found += list(_held(record))
     found += list(_wraps(record))
+    found += list(check_stuck(record))
     if not any(one.verdict is Verdict.LOOK for one in found):
         yield Finding(topic=Topic.CHANNELS, code="channels.sound", verdict=Verdict.FINE)
     yield from found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -30,6 +31,8 @@ BRINGS = 0.5
 """Share of the output's variance that has to come from the sum: one that brings nothing does no harm either."""
 BENDS = 0.3
 """The same of what lines in time leave of both: an offset that is summed up is a line, and so is any drift."""
+FORGETS = 0.1
+"""Share of a record within which a model has forgotten where it was: where one does as well, nothing adds up."""
 
 
 def integrates(traces: Sequence[Trace], mapping: Mapping) -> bool:
@@ -38,7 +41,8 @@ def integrates(traces: Sequence[Trace], mapping: Mapping) -> bool:
     Linear state spaces are fitted to the free run, with and without a pole that is 1 exactly. A pole that is found near
     1 says little: of a plant with friction it lies beside 1 by more than its interval. What a record does show is
     whether anything is lost where the level of the output changes nothing. A plant integrates where the sum brings
-    most of the output, beside a line in time too, and the model that has it leaves about as little as one that is free.
+    most of the output, beside a line in time too, and the model that has it leaves about as little as one that is free,
+    and less than one that is free and forgets: beside other slow poles a sum may bring anything, and they take it off.
 
     Args:
         traces: The records.
@@ -58,12 +62,15 @@ def integrates(traces: Sequence[Trace], mapping: Mapping) -> bool:
     values = [y[counts] for (_, y), counts in zip(records.signals, records.counted, strict=True)]
     variance = float(np.var(np.concatenate(values)))
     off_line = _off_lines(values)
-    free = min(_left(records, states, 0)[0] for states in STATES)
-    if free > UNEXPLAINED * variance:
+    free = [_left(records, states, 0) for states in STATES]
+    least = min(free).error
+    if least > UNEXPLAINED * variance:
         return False
-    left, brought, bent = min(_left(records, states, 1) for states in STATES)
-    adds_up = left <= max(NO_WORSE * free, EXACT * variance) and brought >= BRINGS * variance
-    return adds_up and bent >= BENDS * off_line
+    summed = min(_left(records, states, 1) for states in STATES)
+    adds_up = summed.error <= max(NO_WORSE * least, EXACT * variance) and summed.brought >= BRINGS * variance
+    memory = FORGETS * max(map(len, values))
+    forgotten = any(one.memory < memory and one.error <= NO_WORSE * summed.error for one in free)
+    return adds_up and summed.bent >= BENDS * off_line and not forgotten
 
 
 def _off_lines(values: Sequence[NDArray[np.float64]]) -> float:
@@ -76,8 +83,17 @@ def _off_lines(values: Sequence[NDArray[np.float64]]) -> float:
     return squares / max(count, 1)
 
 
-def _left(records: NeuralProvider, states: int, integrators: int) -> tuple[float, float, float]:
-    """Mean squared error of the best linear model, the variance of its mode at 1, with lines in time and without."""
+class _Left(NamedTuple):
+    """A linear model's mean squared error, variance of its mode at 1, also without lines in time, and slowest decay."""
+
+    error: float
+    brought: float
+    bent: float
+    memory: float
+
+
+def _left(records: NeuralProvider, states: int, integrators: int) -> _Left:
+    """What the best linear model of so many states leaves, and what its sum brings."""
     sizes = replace(records.template.sizes, states=states, integrators=integrators)
     form = replace(records.template, sizes=sizes, theta=np.zeros(sizes.count))
     provider = replace(records, template=form)
@@ -89,4 +105,6 @@ def _left(records: NeuralProvider, states: int, integrators: int) -> tuple[float
     brings = float(theta[sizes.output_linear][:states] @ shape) / float(mode @ shape or 1.0)
     paths = [brings * (path @ mode) for path in provider.states(theta)]
     error = 2.0 * provider.loss(theta) / provider.n_samples
-    return error, float(np.var(np.concatenate(paths))), _off_lines(paths)
+    size = float(np.abs(values).max())
+    memory = np.inf if size >= 1.0 else -1.0 / np.log(max(size, 1e-300))
+    return _Left(error, float(np.var(np.concatenate(paths))), _off_lines(paths), float(memory))

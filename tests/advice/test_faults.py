@@ -27,6 +27,28 @@ def test_limits_spikes_jumps_and_drifts() -> None:
     assert coarse["step"] == pytest.approx(0.08)
 
 
+def test_a_sensor_that_is_stuck_is_told_with_its_time() -> None:
+    u = steps(1500, 11)
+    y = np.round(plant(u) + noise(1500, 11, 0.01), 3)
+    stuck = y.copy()
+    stuck[700:760] = y[700]
+    figures = finding(look(trace(u, stuck)), "channel.stuck", "y").figures
+    assert (figures["stays"], figures["seconds"]) == (1, 350.0)
+    assert figures["samples"] == pytest.approx(60, abs=1)
+    assert look(trace(u, y)).find("channel.stuck", "y") is None
+
+
+def test_an_output_at_rest_is_not_stuck() -> None:
+    """Before the first step, between steps and where each value is held nothing moves it, or it always stands."""
+    u = steps(1500, 11)
+    u[:300] = 0.0
+    exact = np.round(plant(u), 3)
+    noisy = np.where(np.arange(1500) < 300, 0.0, exact + np.round(noise(1500, 11, 0.02), 3))
+    held = np.repeat((plant(u) + noise(1500, 11, 0.02))[::12], 12)
+    for y in (exact, noisy, held):
+        assert look(trace(u, y)).find("channel.stuck", "y") is None
+
+
 @pytest.mark.parametrize("dead", [1, 3])
 def test_a_fast_plant_that_has_answered_is_at_no_limit(dead: int) -> None:
     u = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 60), 5)

@@ -68,6 +68,22 @@ def test_what_settles_is_not_taken_for_it(u: Array, y: Array, noise: float) -> N
     assert not integrates([a_trace(u, y, noise)], MAPPING)
 
 
+def test_a_sum_that_other_slow_poles_take_off_again_is_none() -> None:
+    """Of a curve and three inputs, two of which do nothing, a sum brought more than the output's movement."""
+    rng = np.random.default_rng(11)
+    heat, flow = (
+        np.repeat(rng.uniform(low, high, -(-1500 // k)), k)[:1500] for low, high, k in ((0, 100, 40), (2, 12, 60))
+    )
+    air = 18 + 3 * np.sin(np.arange(1500) / 180) + 0.1 * rng.standard_normal(1500)
+    y = np.asarray(lfilter([0.0, 0.3], [1.0, -0.7], 0.012 * flow**2)) + 0.01 * rng.standard_normal(1500)
+    means = [x.reshape(500, 3).mean(axis=1) for x in (heat, flow, air, y)]
+    trace = trace_of(
+        dict(zip(("heat", "flow", "air", "y"), means, strict=True)), name="a", sample_time=6.0,
+        units={"heat": "1", "flow": "1", "air": "1", "y": "1"},
+    )  # fmt: skip
+    assert not integrates([trace], Mapping.parse("heat+flow+air -> y"))
+
+
 def look(u: Array, y: Array) -> Advice:
     return advise(TraceSet(name="x", traces=(a_trace(u, y),), roles={"a": Role.ESTIMATION}), MAPPING)
 

@@ -69,6 +69,12 @@ SAID: Final[dict[str, Words]] = {
         "Single samples of {who} jump away and back: {count:.0f}, by up to {largest:.3g} {unit}.",
         "Mask them, or fit with a robust loss: repairs: {{nan: mask}} after they are emptied in the file.",
     ),
+    "channel.stuck": Words(
+        "{who}: the output stands exactly still {stays:.0f} times while its inputs move on, longest at {value:.4g}"
+        " {unit} from {seconds:.6g} s to {until:.6g} s ({samples:.0f} samples).",
+        "Where the sensor is stuck: empty these cells in the file, and repairs: {{nan: mask}}; or cut the record there"
+        " (start, stop). Where the plant is held (friction, a dead zone): leave them.",
+    ),
     "channel.held": Words(
         "{who} changes only after {samples:.0f} samples ({seconds:.3g} s): it is measured more slowly than recorded.",
         "A model takes the hold for the plant's lag. Count new values alone: repairs: {{repeats: {{{who}: mask}}}}.",
