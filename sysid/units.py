@@ -385,5 +385,24 @@ def squared(unit: str) -> str:
     return f"{unit}²" if _SINGLE.fullmatch(unit) else f"({unit})²"
 
 
+def per(unit: str, other: str) -> str:
+    """The unit of a ratio, such as of a gain.
+
+    Args:
+        unit: Of what stands above.
+        other: Of what stands below.
+
+    Returns:
+        The ratio as people write it.
+
+    Example:
+        >>> per("degC", "l/min"), per("V", "V"), per("cm", "1"), per("1", "V")
+        ('degC/(l/min)', 'V/V', 'cm', '1/V')
+    """
+    if other in {"", "1"}:
+        return unit
+    return f"{unit}/{other}" if _SINGLE.fullmatch(other) else f"{unit}/({other})"
+
+
 _SINGLE = re.compile(r"[^\W\d]+|%|°\w*")
 """A unit whose exponent is its own: one word."""

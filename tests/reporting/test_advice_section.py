@@ -8,6 +8,7 @@ import sysid
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.advice.words import said
+from sysid.reporting.figures.advice_figure import advice_figure
 from sysid.reporting.parts import Picture
 from sysid.reporting.sections.advice import advice_section
 from sysid.reporting.tables import Table
@@ -29,6 +30,16 @@ def test_every_finding_is_a_row_and_the_responses_are_drawn() -> None:
     pictures = [part for part in section.parts if isinstance(part, Picture)]
     assert len(pictures) == 2
     assert "valve &lt;1&gt;" in pictures[0].svg
+
+
+def test_responses_have_the_unit_of_a_ratio() -> None:
+    u = np.repeat(np.random.default_rng(0).uniform(-1, 1, 60), 5)
+    units = {"valve <1>": "l/min", "level": "cm"}
+    found = record(u, np.convolve(u, [0.0, 0.3, 0.2, 0.1])[:300]).model_copy(update={"units": units})
+    figure = advice_figure(found)
+    assert figure is not None
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == ["response [cm/(l/min)]", "gain [cm/(l/min)]", "coherence"]
 
 
 def test_a_record_without_a_response_has_no_picture() -> None:

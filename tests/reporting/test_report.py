@@ -345,6 +345,7 @@ def _two_mappings(document: dict[str, Any]) -> None:
             _worse_is_chosen, "NARX free run has a lower mean free-run mse on the unseen", id="another-is-better"
         ),
         pytest.param(_least, "none was marked as the best", id="only-the-required-keys"),
+        pytest.param(_least, "Every fit of this run, in the order of the pipeline.", id="nothing-that-chooses"),
         pytest.param(_two_mappings, "by case. pump → flow.", id="two-mappings"),
     ],
 )

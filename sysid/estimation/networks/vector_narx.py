@@ -175,7 +175,7 @@ def _result(fit: CascadeFit) -> FitResult:
         seed=fit.seed,
         evidence=fit.evidence,
         attempts=fit.attempts,
-        notes=(*fit.notes, *fit.warnings, f"Errors that count as one: {sizes}."),
+        notes=(*fit.notes, *fit.warnings, f"Errors that weigh the same: {sizes}."),
         warnings=fit.warnings,
     )
 

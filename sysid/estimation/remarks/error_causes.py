@@ -88,7 +88,8 @@ def _of_output(
     if standing:
         return [*told, standing.format(name=name)]
     kept = informative(run.inputs[sound]) if kept is None else kept
-    inputs = " and ".join(model.mapping.inputs[j] for j in kept)
+    names = [model.mapping.inputs[j] for j in kept]
+    inputs = " and ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])
     if kept:
         groups = features(run.inputs[:, list(kept)], s)
         found = _drift(groups, y, sound, name) or _nothing(model, (y, s), groups, sound).format(
@@ -161,7 +162,7 @@ def _of_inputs(groups: dict[str, list[Array]], target: Array, usable: Mask) -> s
             " after a play, as with backlash, friction or hysteresis, which the model lacks. Try a network with more "
             "lags of the output, more states, or more"
         )
-    return f"{share}{how} starts. (Or {{inputs}} is fed back from {{name}}.)"
+    return f"{share}{how} starts. (Or {{name}} is fed back to {{inputs}}.)"
 
 
 def _explained(columns: list[Array], target: Array, usable: Mask) -> float:

@@ -7,8 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from sysid.models import Mapping
 from sysid.reporting.advice.record import AdviceRecord, ImpulseRecord, ResponseRecord
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
+from sysid.units import per
 
 MOST_INPUTS = 4
 """Columns of a picture that is still read; further inputs are in the data."""
@@ -33,11 +35,13 @@ def advice_figure(advice: AdviceRecord) -> Figure | None:
         heights = [2.0] * (impulse is not None) + [2.0, 1.4] * (response is not None)
         figure = new_figure(max(7.6, 2.4 * len(inputs)), sum(heights) + 0.4)
         grid = figure.add_gridspec(len(heights), len(inputs), height_ratios=heights)
+        output = advice.units.get(Mapping.parse(advice.mapping).output, "1")
         for j, name in enumerate(inputs):
+            unit = per(output, advice.units.get(name, "1"))
             if impulse is not None:
-                _impulse(figure.add_subplot(grid[0, j]), impulse, j, name)
+                _impulse(figure.add_subplot(grid[0, j]), impulse, (j, name), unit)
             if response is not None:
-                _gain(figure.add_subplot(grid[len(heights) - 2, j]), response, j, name)
+                _gain(figure.add_subplot(grid[len(heights) - 2, j]), response, (j, name), unit)
         if response is not None:
             _coherence(figure.add_subplot(grid[-1, :]), response)
         return figure
@@ -47,17 +51,19 @@ def _array(values: list[float]) -> NDArray[np.float64]:
     return np.asarray(values, dtype=np.float64)
 
 
-def _impulse(axes: Axes, impulse: ImpulseRecord, j: int, name: str) -> None:
+def _impulse(axes: Axes, impulse: ImpulseRecord, which: tuple[int, str], unit: str) -> None:
+    j, name = which
     time, values, spread = _array(impulse.time), _array(impulse.values[j]), 1.96 * _array(impulse.deviation[j])
     axes.fill_between(time, values - spread, values + spread, color=BAND_COLOUR, label="95 %")
     axes.axhline(0.0, color=TARGET, linewidth=0.6)
     axes.plot(time, values, color=PALETTE[0], marker=".", markersize=3, label=name)
     axes.set_xlabel("time after a pulse [s]")
-    axes.set_ylabel("impulse response")
+    axes.set_ylabel(f"response [{unit}]")
     axes.legend()
 
 
-def _gain(axes: Axes, response: ResponseRecord, j: int, name: str) -> None:
+def _gain(axes: Axes, response: ResponseRecord, which: tuple[int, str], unit: str) -> None:
+    j, name = which
     frequency, gain = _array(response.frequency) / (2.0 * np.pi), _array(response.gain[j])
     low, high = _array(response.low[j]), _array(response.high[j])
     seen = np.isfinite(gain) & (gain > 0.0)
@@ -69,7 +75,7 @@ def _gain(axes: Axes, response: ResponseRecord, j: int, name: str) -> None:
     axes.fill_between(frequency[banded], np.maximum(low[banded], floor), high[banded], color=BAND_COLOUR, label="95 %")
     axes.loglog(frequency[seen], gain[seen], color=PALETTE[0], label=name)
     axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel("gain")
+    axes.set_ylabel(f"gain [{unit}]")
     axes.legend(loc="lower left")
 
 

@@ -11,7 +11,7 @@ from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
 from sysid.reporting.linear_views import linear_views
-from sysid.units import in_unit
+from sysid.units import in_unit, per
 
 if TYPE_CHECKING:
     from sysid.reporting.linear.responses import Bode, StepResponse
@@ -48,7 +48,7 @@ def bode_figure(found: Bode) -> Figure:
                 below.fill_between(w, found.phase_low[:, j], found.phase_high[:, j], color=BAND_COLOUR)
             above.loglog(w, gain[:, j], color=PALETTE[0], label=name)
             below.semilogx(w, phase[:, j], color=PALETTE[0])
-            above.set_ylabel(f"gain [{y}/{u}]")
+            above.set_ylabel(f"gain [{per(y, u)}]")
             below.set_ylabel("phase [degrees]")
             below.set_xlabel("frequency [rad/s]")
             above.legend(loc="lower left")
@@ -75,7 +75,8 @@ def step_figure(found: StepResponse) -> Figure:
                 # A draw that is not stable must not take the picture with it.
                 room = max(float(np.ptp(y)), 1e-12)
                 ends = (np.clip(one[::every, j], y.min() - room, y.max() + room) for one in (found.low, found.high))
-                place.fill_between(time, *ends, color=BAND_COLOUR, label="95 %")
+                held = "post" if every == 1 else None
+                place.fill_between(time, *ends, step=held, color=BAND_COLOUR, linewidth=0.0, label="95 %")
             place.plot(time, y[::every], drawstyle=shape, color=PALETTE[0], label=f"{name}, {in_unit('1', u_unit)}")
             place.set_xlabel("time [s]")
             place.set_ylabel(f"{found.outputs[j]} [{y_unit}]")
@@ -96,8 +97,10 @@ def pole_zero_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, s
     """
     views = linear_views(model, uncertainty, seed)
     with styled():
-        figure = new_figure(max(7.6, 2.2 * len(views)), 3.8)
+        width, named = max(7.6, 2.2 * len(views)), set[tuple[str, ...]]()
+        figure = new_figure(width, min(3.8, width / len(views) + 0.7))
         axes = figure.subplots(1, len(views), squeeze=False)[0]
+        axes[0].set_ylabel("imaginary part" if views[0].discrete else "imaginary part [1/s]")
         for place, view in zip(axes, views, strict=True):
             poles, zeros = view.roots(view.F[0]), view.roots(view.B[0])
             draws = view.F[1 : 1 + CLOUD // max(len(poles), 1)]
@@ -118,5 +121,9 @@ def pole_zero_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, s
             else:
                 place.axvline(0.0, color=TARGET, linewidth=0.6)
             place.set_title(view.name)
-            place.legend(loc="lower left")
+            place.set_xlabel("real part" if view.discrete else "real part [1/s]")
+            # In a narrow panel a legend hides part of the circle: one that says nothing new is left out.
+            if (labels := tuple(place.get_legend_handles_labels()[1])) not in named:
+                place.legend(loc="lower left")
+            named.add(labels)
         return figure

@@ -13,6 +13,7 @@ from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.reporting.figures.style import DASHES, PALETTE, TARGET, new_figure, styled
 from sysid.reporting.linear_views import linear_views
+from sysid.units import per
 
 BAND_COLOUR = "#DDDDDD"
 
@@ -36,7 +37,7 @@ def impulse_figure(found: ImpulseResponse) -> Figure:
             axes.axhline(0.0, color=TARGET, linewidth=0.6)
             axes.plot(found.time, values, color=PALETTE[0], marker=".", markersize=3, label=f"pulse of {name}")
             axes.set_xlabel("time [s]")
-            axes.set_ylabel(f"{found.mapping.output} [{found.output_unit}/{unit}]")
+            axes.set_ylabel(f"{found.mapping.output} [{per(found.output_unit, unit)}]")
             axes.legend()
         return figure
 
@@ -61,7 +62,7 @@ def response_figure(found: FrequencyResponse, fits: Sequence[FitResult] = ()) ->
             _measured(above, below, found, j)
             for number, fit in enumerate(fits):
                 _model(above, below, found, fit, (name, number))
-            above.set_ylabel(f"gain [{found.output_unit}/{found.input_units[j]}]")
+            above.set_ylabel(f"gain [{per(found.output_unit, found.input_units[j])}]")
             below.set_ylabel("phase [degrees]")
             above.set_title(name)
             above.legend(loc="lower left")

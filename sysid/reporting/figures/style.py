@@ -41,7 +41,10 @@ _STYLE: Final[Any] = {
     "axes.formatter.useoffset": False,
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.6,
-    "legend.frameon": False,
+    # Its words are read over what is drawn, and what is drawn is seen through it.
+    "legend.framealpha": 0.75,
+    "legend.edgecolor": "none",
+    "legend.fancybox": False,
     "legend.fontsize": 8.5,
     "lines.linewidth": 1.3,
     "figure.facecolor": "white",
@@ -192,9 +195,14 @@ class _Powers(LogFormatterSciNotation):
         '4'
     """
 
+    PLAIN = (1e-4, 1e5)
+    """Axes within these have plain numbers, as the tables beside them do."""
+
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """The label of a tick."""
-        return self._words(super().__call__(x, pos))
+        """The label of a tick; none where there are many."""
+        words = self._words(super().__call__(x, pos))
+        least, greatest = sorted(self.axis.get_view_interval()) if self.axis is not None else (0.0, 0.0)
+        return f"{x:.6g}" if words and self.PLAIN[0] <= least and greatest <= self.PLAIN[1] else words
 
     def _words(self, formula: str) -> str:
         plain = re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", formula)

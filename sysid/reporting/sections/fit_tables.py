@@ -246,6 +246,7 @@ def ranking_table(results: Results) -> Table:
         results.fits, key=lambda fit: (order.index(fit.mapping), math.isnan(fit.selection_mse), fit.selection_mse)
     )
     best = {fit.name for fit in results.best_fits}
+    chosen_by = any(math.isfinite(fit.selection_mse) for fit in ranked)
     rows = []
     for fit in ranked:
         effective = None if fit.evidence is None else sum(fit.evidence.effective_parameters.values())
@@ -262,7 +263,8 @@ def ranking_table(results: Results) -> Table:
             )
         )
     return Table(
-        caption="Every fit of this run, best first on the traces that choose between fits.",
+        caption="Every fit of this run, "
+        + ("best first on the traces that choose between fits." if chosen_by else "in the order of the pipeline."),
         head=(
             ("fit", ""),
             ("structure", ""),

@@ -245,7 +245,7 @@ def attempts_figure(fit: FitRecord) -> Figure:
         _scatter(panels[-1], fit, [a.log_evidence for a in fit.attempts], errors)
         panels[-1].set_xlabel("log evidence")
         panels[-1].set_ylabel("" if both else f"mse on the estimation records [{error_unit(fit)}]")
-        panels[-1].legend(loc="upper right")
+        figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside upper left", ncols=2)
         return figure
 
 

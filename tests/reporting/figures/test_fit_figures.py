@@ -112,3 +112,15 @@ def test_what_has_no_error_has_no_logarithm_and_the_caption_says_so() -> None:
     some = [*exact, Series(name="b", values={"A": 1.0, "B": 2.0})]
     assert cases_figure(some, ["A", "B"], quantity="mse").axes[0].get_yscale() == "log"
     assert cases_caption(some[1:], "Free-run mse", "fit").endswith("A fit without a mark diverges.")
+
+
+@pytest.mark.parametrize(
+    ("mse", "shown", "never"), [((0.0065, 0.0082), "0.008", "×10"), ((1e-9, 1e-3), "10⁻⁶", "0.000001")]
+)
+def test_numbers_of_a_logarithmic_axis_are_plain_where_tables_have_plain_ones(
+    mse: tuple[float, float], shown: str, never: str
+) -> None:
+    curve = LearningCurve(iteration=[0, 1], mse=list(mse), effective_parameters=[1.0, 1.0], elapsed_s=[0.0, 0.1])
+    text = svg(learning_figure({"a": curve}, unit="V²"), title="t", description="d", name="n")
+    assert f">{shown}<" in text
+    assert never not in text

@@ -91,6 +91,29 @@ def test_a_zero_far_off_is_counted_and_does_not_shrink_the_circle() -> None:
     assert "zeros (1 outside)" in [text.get_text() for text in axes.get_legend().get_texts()]
 
 
+def test_the_band_of_a_step_response_holds_its_line() -> None:
+    """The line goes in steps: a band that goes straight from sample to sample lay beside it."""
+    fit = fitted(0.01, "discrete")
+    axes = step_figure(step_of([(fit.model, fit.uncertainty)])).axes[0]
+    (band,) = axes.collections
+    x, y = axes.lines[0].get_data()
+    path = band.get_paths()[0]
+    late = [(x[k] + 0.9 * (x[k + 1] - x[k]), y[k]) for k in range(1, 6)]
+    assert path.contains_points(late, radius=1e-9).all()
+
+
+def test_poles_have_named_axes_and_narrow_panels_one_legend() -> None:
+    rng = np.random.default_rng(0)
+    u = steps(400, 3, rng)
+    y = signal.lfilter([0.0, 0.3], [1.0, -0.7], u.sum(axis=1)) + 0.01 * rng.normal(size=400)
+    fit = sysid.fit(sysid.data((u, y), sample_time=1.0), "u1+u2+u3 -> y", sysid.ARX(na=1, nb=1, nk=1))
+    figure = pole_zero_figure(fit.model, fit.uncertainty)
+    assert {axes.get_xlabel() for axes in figure.axes} == {"real part"}
+    assert figure.axes[0].get_ylabel() == "imaginary part"
+    assert [axes.get_legend() is not None for axes in figure.axes] == [True, *[False] * (len(figure.axes) - 1)]
+    assert figure.get_figheight() < figure.get_figwidth() / len(figure.axes) + 1.0
+
+
 def test_an_output_without_any_response_has_a_bode_diagram_and_no_warning() -> None:
     """Its coefficients are 0 with a deviation: the draws' phases were told by a quotient of 0."""
     rng = np.random.default_rng(0)

@@ -259,7 +259,7 @@ class Joint:
             evidence=chosen.solution.evidence if chosen.solution else None,
             notes=(
                 *told,
-                f"Chosen {how} among {len(seen)} states: {chosen.sentence}.",
+                f"Chosen {how} among {len(seen)} checkpoints: {chosen.sentence}.",
                 *_others([one for one in seen if one is not chosen]),
             ),
             warnings=(*warnings, *left_told(left)),
@@ -307,7 +307,7 @@ def _others(seen: Sequence[_Candidate]) -> list[str]:
         by_origin.setdefault(one.origin, []).append(f"{one.loss if alone else one.score:.4g} ({one.iteration})")
     what = "mean squared residual" if alone else "error on the selection traces"
     return [
-        f"The other states from {origin}, {what} (iterations): {', '.join(errors)}."
+        f"The other checkpoints from {origin}, {what} (iterations): {', '.join(errors)}."
         for origin, errors in by_origin.items()
     ]
 
