@@ -259,4 +259,4 @@ def _options(
     _: Annotated[bool, typer.Option("--debug", help="Show the full trace of an error.")] = False,
     __: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")] = False,
 ) -> None:
-    """Reference traces of a slow, trusted model in; a small, fast, frozen surrogate of known accuracy out."""
+    """Measured records or a slow model in; a small, fast model of known accuracy out, as files that run elsewhere."""

@@ -273,7 +273,9 @@ def test_a_file_is_shown_and_a_data_set_proposed(workspace: Path, capsys: pytest
     assert run_cli(["ingest", "datasets/rig/run-1.csv", "--propose", str(proposal)]) == 0
     assert proposal.with_name("run-1.ingest.svg").is_file(), "beside what was proposed"
     assert run_cli(["ingest", str(proposal)]) == 0
-    assert "400" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "400" in told
+    assert "--mapping 'inlet+valve -> outlet'  (inputs -> outputs: yours may be others)" in told
     assert run_cli(["ingest", "datasets/rig/run-1.csv", "--propose", str(proposal)]) == 2
     assert "is there already" in capsys.readouterr().err
 

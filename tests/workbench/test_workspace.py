@@ -59,6 +59,18 @@ def test_nothing_that_is_there_is_written_over(tmp_path: Path) -> None:
     assert files[0].read_text() == "mine"
 
 
+def test_what_comes_next_is_what_can_be_typed_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run_cli(["init", "."]) == 0
+    told = capsys.readouterr().out
+    assert "files here. Next:" in told
+    assert "cd ." not in told
+    assert run_cli(["init", "other"]) == 0
+    assert "cd other" in capsys.readouterr().out
+
+
 def test_a_full_disk_is_named_and_the_same_call_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -86,6 +86,14 @@ class Words:
                 got=f"more than {MOST_WORDS} different texts, the first: {self.texts[0][:40]!r}",
                 remedy="leave the column out",
             )
+        if len(self.texts) == 1 and not any(map(str.isalnum, self.texts[0])):
+            return ReaderError(
+                "the column holds one mark and no values",
+                where=where,
+                expected="numbers, or words",
+                got=f"{self.texts[0][:30]!r} in every row that has something",
+                remedy="leave the column out",
+            )
         shown = ", ".join(f"{text[:30]!r}" for text in self.texts[:6])
         shown = shown if len(self.texts) <= 6 else f"{shown} and {len(self.texts) - 6} more"
         if all(sum(map(str.isdigit, text)) >= _DIGITS_OF_STAMPS for text in self.texts):

@@ -111,9 +111,10 @@ class Mapping:
         if len(self.outputs) != 1:
             raise ConfigError(
                 f"{what or 'a mapping here'} has one output",
-                expected="input channels, an arrow and one output channel, as in BP+AR -> BC",
+                expected="input channels, an arrow and one output channel",
                 got=str(self),
-                remedy=f"write one mapping for each output; {LISTS}",
+                remedy=f"write one mapping for each output, {' and '.join(repr(str(one)) for one in self.each[:2])}"
+                + (" and so on" if len(self.outputs) > 2 else ""),
             )
 
     @classmethod

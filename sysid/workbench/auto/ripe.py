@@ -151,7 +151,7 @@ def young_told(trials: Sequence[Trial], rank: Rank, n_outputs: int, folds: int =
     named = [f"{one.label} ({_count(_iterations_each(one, n_outputs) / folds)})" for one in young[:NAMED]]
     more = f" and {len(young) - NAMED} more" if len(young) > NAMED else ""
     return (
-        f"In the time that there was, {', '.join(named)}{more} came to fewer than {RIPE} iterations, too few to tell "
+        f"In the time that there was, {', '.join(named)}{more} came to fewer than {RIPE}, too few to tell "
         "what they are worth: allow more minutes, or fit fewer samples."
     )
 
@@ -159,5 +159,5 @@ def young_told(trials: Sequence[Trial], rank: Rank, n_outputs: int, folds: int =
 def _count(iterations: float) -> str:
     """Iterations of each training, as a reader counts; the starts of some structures take what time there is."""
     if iterations < 1.0:
-        return "less than one" if iterations else "none"
-    return f"{iterations:.2g}"
+        return "less than one iteration" if iterations else "no iteration"
+    return "1 iteration" if iterations == 1.0 else f"{iterations:.2g} iterations"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -126,8 +127,9 @@ def _show_file(found: FileFinding, propose: Path | None, split: Sequence[float] 
         said = f"the file says {column.said}, which is no unit that is known" if column.said else ""
         still = "never changes" if column.constant else ""
         remark = column.problem or column.aside or said or column.far or still or _steps(column)
-        unit = f"{column.unit}{reference}{guess}"
-        span = (f"{column.minimum:.6g}", f"{column.maximum:.6g}")
+        empty = math.isnan(column.minimum)
+        unit = "" if empty else f"{column.unit}{reference}{guess}"
+        span = ("", "") if empty else (f"{column.minimum:.6g}", f"{column.maximum:.6g}")
         table.add_row(column.name, unit, *span, str(column.missing), remark)
     target.print(table)
     for problem in found.problems:
@@ -180,5 +182,9 @@ def _show_dataset(traces: TraceSet, path: Path) -> None:
         for sentence in trace.provenance:
             target.print(f"{trace.name}: {sentence}", soft_wrap=True)
     target.print(f"digest {traces.digest}")
-    look = shlex.join(("sysid", "advise", traces.name, "--mapping", "INPUT -> OUTPUT"))
-    target.print(f"Next: {look}", markup=False, soft_wrap=True)
+    from sysid import models  # here: what only looks into a file needs nothing that computes
+
+    *inputs, output = [channel.name for channel in traces.channels]
+    mapping = models.Mapping(inputs=tuple(inputs), output=output)
+    look = shlex.join(("sysid", "advise", traces.name, "--mapping", str(mapping)))
+    target.print(f"Next: {look}  (inputs -> outputs: yours may be others)", markup=False, soft_wrap=True)

@@ -24,5 +24,7 @@ def init_command(folder: Path, *, reference: str | None, wish: Wish) -> None:
         commands = [f"sysid run {name} --dry-run", f"sysid surrogate {name} --minutes 60"]
         for note in notes:
             target.print(note, soft_wrap=True, markup=False)
-    target.print(f"Made {len(files)} files in {folder}. Next:", soft_wrap=True)
-    target.print("\n".join(f"  {one}" for one in (f"cd {folder}", *commands)), soft_wrap=True, markup=False)
+    here = folder.resolve() == Path.cwd()
+    target.print(f"Made {len(files)} files {'here' if here else f'in {folder}'}. Next:", soft_wrap=True)
+    ways = commands if here else [f"cd {folder}", *commands]
+    target.print("\n".join(f"  {one}" for one in ways), soft_wrap=True, markup=False)

@@ -8,7 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    Task,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 from rich.text import Text
 
@@ -17,6 +26,15 @@ from sysid.workbench.runner.events import Event, RunStarted, StepDone, StepProgr
 
 if TYPE_CHECKING:
     from sysid.workbench.runner.dry_run import PlannedStep
+
+
+class Left(TimeRemainingColumn):
+    """How long a step will take yet, where that is known: "left" alone was read of the time that it has taken."""
+
+    def render(self, task: Task) -> Text:
+        """The time, and what it is."""
+        known = super().render(task)
+        return Text.assemble(known, (" left", "dim")) if task.total and task.time_remaining is not None else Text("")
 
 
 class Screen:
@@ -69,8 +87,7 @@ class Screen:
             TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=24),
             TimeElapsedColumn(),
-            TextColumn("left", style="dim"),
-            TimeRemainingColumn(),
+            Left(),
             TextColumn("{task.fields[detail]}", style="dim", markup=False),
             console=self._console,
             transient=True,

@@ -136,6 +136,10 @@ def parameters(ready: FitReady) -> dict[str, str]:
     return {name: tracking_text(value) for name, value in chosen.items()}
 
 
+TITLES = {"r": "correlation"}
+"""Merits whose own name nobody would search for."""
+
+
 def metrics(ready: FitReady) -> dict[str, float]:
     """The figures; a slash groups a figure's cases in one section.
 
@@ -148,10 +152,11 @@ def metrics(ready: FitReady) -> dict[str, float]:
     fit, cases = ready.fit, ready.evaluation.cases
     unseen = [role for role in (Role.VALIDATION, Role.TEST) if any(case.role is role for case in cases.values())]
     fits = [case.free_run.nrmse_fit for case in cases.values()]
+    scored = [case.free_run.nrmse_fit for case in cases.values() if case.role in unseen]
     found: dict[str, float] = {
         "mean_free_run_mse": ready.evaluation.mean_mse(*unseen),
         "worst_free_run_mse": max(case.free_run.mse for case in cases.values()),
-        "mean_nrmse_fit": mean_fit(case.free_run.nrmse_fit for case in cases.values() if case.role in unseen),
+        "mean_nrmse_fit": mean_fit(scored or fits),
         "least_nrmse_fit": min((fit for fit in fits if not math.isnan(fit)), default=math.nan),
         "selection_mse": ready.selection_mse,
         "parameters": fit.model.n_parameters,
@@ -168,7 +173,7 @@ def metrics(ready: FitReady) -> dict[str, float]:
         case_name = keys[name]
         found[f"free_run_mse/{case_name}"] = case.free_run.mse
         found[f"one_step_mse/{case_name}"] = case.one_step.mse
-        found |= {f"{one.key}/{case_name}": getattr(case.free_run, one.key) for one in MERITS[1:]}
+        found |= {f"{TITLES.get(one.key, one.key)}/{case_name}": getattr(case.free_run, one.key) for one in MERITS[1:]}
         found[f"run_time_s/{case_name}"] = case.run_time_s
         if case.intervals is not None:
             found[f"free_run_coverage/{case_name}"] = case.intervals.free_run.share

@@ -133,6 +133,14 @@ def test_a_column_of_remarks_is_left_out_and_told(write: Write) -> None:
     assert proposed(path).channels[0].name == "u"
 
 
+def test_a_column_of_nothing_but_a_mark_is_no_column_of_words(write: Write) -> None:
+    """A bar between columns; of + and - nobody knows whether they are states."""
+    path = write("run.csv", "t [s];|;sign;u [V];y [V]\n" + rows(20, lambda i: f"{i};|;{'+-'[i > 9]};{i};{i % 7}"))
+    bar, sign = inspect_file(path).problems
+    assert bar == "|: the column holds one mark and no values"
+    assert sign.startswith("sign: the column holds words ('+', '-')")
+
+
 def test_a_value_far_from_all_others_is_told(write: Write) -> None:
     """What no list of usual marks has: 1e308 had been a value like any other."""
     path = write("run.csv", "t [s],u [V]\n" + rows(40, lambda k: f"{k / 10},{'1e308' if k == 7 else k % 5}"))

@@ -99,14 +99,16 @@ def test_the_best_come_first_where_there_is_not_time_for_all(at: float, count: i
 def test_what_says_little_is_named() -> None:
     young = [tried(number, 1, float(number)) for number in (5, 4, 3, 2)]
     said = young_told([*young, tried(1, RIPE)], RANK, 1)
-    assert "NSS 1/2 (1), NSS 1/3 (1), NSS 1/4 (1) and 1 more" in said
+    assert "NSS 1/2 (1 iteration), NSS 1/3 (1 iteration), NSS 1/4 (1 iteration) and 1 more" in said
     assert "allow more minutes" in said
     assert young_told([tried(1, RIPE)], RANK, 1) == ""
     # Twenty iterations of one of four parts are five of each.
-    assert "NSS 1/1 (5)" in young_told([tried(1, RIPE)], RANK, 1, folds=4)
+    assert "NSS 1/1 (5 iterations)" in young_told([tried(1, RIPE)], RANK, 1, folds=4)
 
 
-@pytest.mark.parametrize(("iterations", "said"), [(0, "(none)"), (1, "(less than one)"), (9, "(2.2)")])
+@pytest.mark.parametrize(
+    ("iterations", "said"), [(0, "(no iteration)"), (1, "(less than one iteration)"), (9, "(2.2 iterations)")]
+)
 def test_what_came_to_no_iteration_is_told_in_words(iterations: int, said: str) -> None:
     """The starts of block-oriented models alone can take the time of a trial."""
     assert f"NSS 1/1 {said} came to fewer" in young_told([tried(1, iterations)], RANK, 1, folds=4)

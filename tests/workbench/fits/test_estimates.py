@@ -25,6 +25,6 @@ def test_the_check_of_a_free_run_is_timed_on_a_few_of_its_sequences(monkeypatch:
     config = PipelineConfig(name="p", data="d", mapping="u -> y", fits=(fit,))
     assert traces.with_role(Role.ESTIMATION)
     found = how_long(fit, config, Data(traces=traces, selection=()))
-    assert asked == [FEW_SEQUENCES]
+    assert asked == [1, FEW_SEQUENCES], "what only the first check does, as to load what is compiled, is not counted"
     assert found.seconds is not None
     assert found.seconds > 0.0

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import pytest
+from rich.progress import Progress
 
 from sysid.workbench.runner.events import Event, RunStarted, StepDone, StepProgress, StepStarted
-from sysid.workbench.runner.screen import SILENCE_S, LogFile
+from sysid.workbench.runner.screen import SILENCE_S, Left, LogFile
 
 STEP = "Training end to end"
 
@@ -80,3 +81,17 @@ def test_every_step_has_a_minute_of_its_own(log: LogFile, clock: Clock, tmp_path
     clock.now += SILENCE_S - 1.0
     log(progress(0.5))
     assert told(tmp_path) == [f"{STEP} ...", f"{STEP} ..."]
+
+
+def test_of_a_step_of_unknown_length_no_time_is_said_to_be_left(clock: Clock) -> None:
+    left = Left()
+    left.max_refresh = None
+    bar = Progress(left, get_time=clock)
+    bar.add_task(STEP, total=None)
+    (task,) = bar.tasks
+    assert left(task).plain == ""
+    bar.update(task.id, total=100.0)
+    for _ in range(3):
+        clock.now += 10.0
+        bar.advance(task.id, 10.0)
+    assert left(task).plain == "0:01:10 left"

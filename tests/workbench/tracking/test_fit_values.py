@@ -10,6 +10,8 @@ import pytest
 from sysid.estimation import Status
 from sysid.reporting.sections.fit_tables import DRAWN
 from sysid.traces import Role
+from sysid.validation import Evaluation
+from sysid.validation.metrics import Figures
 from sysid.workbench.tracking import fit_values
 from sysid.workbench.tracking.fit_values import MAX_METRICS, batches, drawn
 
@@ -51,3 +53,20 @@ def test_what_is_warned_of_stands_first_and_once_in_what_a_run_says() -> None:
     run: Any = SimpleNamespace(pipeline="search", command="sysid auto rig.csv")
     told = [line for line in fit_values.description(ready, run, {}).splitlines() if line.startswith("* ")]
     assert told == ["* Not shown by the record.", "* Chosen by evidence."]
+
+
+@pytest.mark.parametrize(("roles", "mean"), [(("ESTIMATION",), 70.0), (("ESTIMATION", "TEST"), 80.0)])
+def test_the_mean_fit_is_over_what_scores_or_over_all_where_nothing_does(roles: tuple[str, ...], mean: float) -> None:
+    """A first record has one case: the column and the charts of the fit were empty."""
+    cases = {}
+    for fit, role in zip((70.0, 80.0), roles, strict=False):
+        figures = Figures(mse=1.0, nrmse_fit=fit, max_abs_error=1.0, r=0.9, unit="V")
+        cases[role] = SimpleNamespace(
+            role=Role[role], free_run=figures, one_step=figures, run_time_s=0.1, intervals=None
+        )
+    evaluation = Evaluation(cases=cast("Any", cases))
+    fit = SimpleNamespace(model=SimpleNamespace(n_parameters=3), train_time_s=1.0, evidence=None, stability=None)
+    ready: Any = SimpleNamespace(fit=fit, evaluation=evaluation, selection_mse=float("nan"))
+    found = fit_values.metrics(ready)
+    assert found["mean_nrmse_fit"] == mean
+    assert found["correlation/ESTIMATION"] == 0.9
