@@ -42,7 +42,7 @@ class Comparison:
     Args:
         evaluations: By label of the model: what it does on every case, in free run and one step ahead.
         outputs: By label: name and unit of the output that it is a model of.
-        notes: What is to be known of the figures: records that go where none was fitted.
+        notes: What is to be known of the figures: fits that are not usable, records that go where none was fitted.
     """
 
     evaluations: dict[str, Evaluation]
@@ -144,7 +144,8 @@ def compare(traces: TracesLike, *fits: Compared | Sequence[Compared], start: Sta
             label = judged.label if judged.label not in evaluations else f"{judged.label} ({len(evaluations) + 1})"
             evaluations[label], outputs[label] = judged.evaluation, (judged.output, judged.unit)
         for fit in [one] if isinstance(one, FitResult) else [*getattr(one, "fits", {}).values()]:
-            notes |= dict.fromkeys((*_beyond(fit, traces), *_begun(fit, traces, start)))
+            unsound = [] if fit.status.usable else [f"{fit.model.label}: {fit.status.value}"]
+            notes |= dict.fromkeys((*unsound, *_beyond(fit, traces), *_begun(fit, traces, start)))
     return Comparison(evaluations=evaluations, outputs=outputs, notes=tuple(notes))
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import sysid
 from sysid.api.comparison import Comparison
 from sysid.errors import ConfigError
+from sysid.estimation import Status
 
 U = np.repeat([0.0, 1.0, -1.0, 0.5, 0.0], 20)
 Y = np.convolve(U, 0.2 * 0.8 ** np.arange(40))[:100]
@@ -55,3 +58,11 @@ def test_fits_are_compared_one_by_one_or_in_a_list_and_nothing_else_is(compariso
     for strange, named in (((fit.model,), "ARXModel"), ((), "none"), (([],), "none")):
         with pytest.raises(ConfigError, match=f"got: +{named}"):
             sysid.compare(traces, *strange)
+
+
+def test_a_fit_that_cannot_be_used_is_told_below_the_table(comparison: Comparison) -> None:
+    traces = sysid.data((U, Y), sample_time=0.1, split=0.6)
+    fit = sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=1, nk=0))
+    runs_away = dataclasses.replace(fit, status=Status.UNSTABLE)
+    assert f"{fit.model.label}: {Status.UNSTABLE.value}" in str(sysid.compare(traces, runs_away)).splitlines()
+    assert "leaves its bounds" not in str(sysid.compare(traces, fit))

@@ -179,13 +179,23 @@ def _trace(
             where=label,
             expected="sample_time in seconds, a column named t or time, or an index that is time",
             got="neither",
-            remedy="write for example sample_time=0.1",
+            remedy=_clock_like(table, names) or "write for example sample_time=0.1",
         )
     if sample_time is None:
         step = survey(stamps_in_seconds(table, files), longest_step=grid.longest_step).step
         sample_time = float(f"{step:.9g}")  # stamps such as 0.30000000000000004 are decimal numbers, rounded
     asked = Wanted(name=label, channels=tuple(wanted), sample_time=float(sample_time))
     return assemble(table, asked, files=files, grid=grid, repairs=repairs)
+
+
+def _clock_like(table: RawTable, names: Sequence[str]) -> str:
+    """What to do where a column that is no channel rises evenly; empty where none does."""
+    for column in table.columns:
+        steps = np.diff(column.values) if column.name not in names and column.problem is None else np.empty(0)
+        if len(steps) and float(steps.min()) > 0.0 and float(np.ptp(steps)) < 0.01 * float(np.median(steps)):
+            step = f"{float(np.median(steps)):.6g}"
+            return f"{column.name} rises evenly: where it is time in seconds, write sample_time={step}"
+    return ""
 
 
 def _units(names: Sequence[str], units: Mapping[str, str] | Sequence[str] | str | None) -> dict[str, str]:

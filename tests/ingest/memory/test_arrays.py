@@ -249,3 +249,11 @@ def test_a_channel_that_is_called_as_time_is_a_channel_where_it_is_asked_for(nam
     stamps = {"u": u, name: 0.5 * np.arange(50)}  # one that is both, as a ramp is
     (trace,) = data(stamps, inputs=name, outputs="u")
     assert trace.sample_time == 0.5
+
+
+def test_a_column_that_rises_evenly_is_named_where_nothing_tells_the_sample_time() -> None:
+    frame = pd.DataFrame({"sampling": 0.25 * np.arange(len(U)), "u": U, "y": Y})
+    with pytest.raises(ConfigError, match=r"sampling rises evenly: .* write sample_time=0\.25$"):
+        data(frame, inputs="u", outputs="y")
+    with pytest.raises(ConfigError, match=r"write for example sample_time=0\.1$"):
+        data(frame.drop(columns="sampling"), inputs="u", outputs="y")
