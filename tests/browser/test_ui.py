@@ -76,10 +76,10 @@ def open_runs(page, address: str, shown: str = RUNS[0]) -> None:
 
 def test_the_page_that_opens_lists_the_fits_best_first_with_the_columns_that_matter(page, address, picture) -> None:
     open_runs(page, address)
-    names = [row.inner_text() for row in page.get_by_role("link", name=re.compile(f"{MAPPING} · ")).all()]
+    names = [row.inner_text() for row in page.get_by_role("link", name=re.compile(f" · {MAPPING}")).all()]
     picture("runs")
-    assert names[0] == f"{MAPPING} · {BEST}"
-    assert set(names) == {f"{MAPPING} · {run}" for run in RUNS}
+    assert names[0] == f"{BEST} · {MAPPING}"
+    assert set(names) == {f"{run} · {MAPPING}" for run in RUNS}
     heads = [(head.bounding_box(), head.inner_text().strip()) for head in page.get_by_role("columnheader").all()]
     placed = sorted((box["x"], text) for box, text in heads if box is not None and text in COLUMNS)
     assert tuple(dict.fromkeys(text for _, text in placed)) == COLUMNS

@@ -84,7 +84,7 @@ def sweep_points(folder: Path, published: PublishedTable | None) -> list[tuple[s
     text = (
         f"{winner.label} has the least {FIGURES[record.choose_by].words} on {chose}, "
         f"{quantity(least, unit)}, of {trials} ({_shown(record)}). They took "
-        f"{seconds(record.wall_s)} on {record.workers} workers."
+        f"{seconds(record.wall_s)} on {record.workers} worker{'s' if record.workers != 1 else ''}."
     )
     best = next(iter(_published(record, published)["error"]), None)
     if best is not None:

@@ -44,17 +44,17 @@ def colour(number: int) -> str:
 
 
 def run_name(ready: FitReady) -> str:
-    """The fit as an engineer recognises it.
+    """The fit as an engineer recognises it; where a page cuts it, the mapping goes, which all fits beside it share.
 
     Args:
         ready: The fit.
 
     Returns:
-        For example ``BP+AR -> BC · NARX 4/4/20 · closed``.
+        For example ``NARX 4/4/20 · closed · BP+AR -> BC``.
     """
     model = ready.fit.model
     mapping = shortened(visible(ready.pipeline.mapping), 180)
-    return f"{mapping} · {model.label} · {ready.fit.loop.value}"
+    return f"{model.label} · {ready.fit.loop.value} · {mapping}"
 
 
 def tags(ready: FitReady, run: RunStarted, data: DataLoaded) -> dict[str, str]:

@@ -41,7 +41,7 @@ COLUMNS: Final = {
 """What matters first stands first."""
 
 NAME_WIDTH: Final = 330
-"""Pixels for a name such as ``BP+AR -> BC · NARX 4/4/20 · closed``, which MLflow would cut in half."""
+"""Pixels for a name such as ``NARX 4/4/20 · closed · BP+AR -> BC``, which MLflow would cut in half."""
 
 METRIC_WIDTH: Final = 150
 """Pixels for the name of a metric: with :data:`ORDER_WIDTH`, the number of parameters still fits on a wide screen."""

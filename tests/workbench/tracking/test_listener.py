@@ -78,9 +78,9 @@ def test_fits_stand_flat_in_the_experiment_of_their_mapping(tracked_once) -> Non
     _, client, _ = tracked_once
     found = runs_of(client)
     assert {run.info.run_name for run in found.values()} == {
-        "inlet+valve -> outlet · ARX [1; 1 1; 1 1] · open",
-        "inlet+valve -> outlet · NARX 1/1/2 · open",
-        "inlet+valve -> outlet · NARX 1/1/2 · closed",
+        "ARX [1; 1 1; 1 1] · open · inlet+valve -> outlet",
+        "NARX 1/1/2 · open · inlet+valve -> outlet",
+        "NARX 1/1/2 · closed · inlet+valve -> outlet",
     }
     assert {run.info.status for run in found.values()} == {"FINISHED"}
     assert not any("mlflow.parentRunId" in run.data.tags for run in found.values())
