@@ -21,6 +21,7 @@ from sysid.export.fmi.platforms import own_platform
 from sysid.export.fmi.units import unit_definitions
 from sysid.export.heeded import heeded
 from tests.export.grey_boxes import build_grey
+from tests.export.test_state_space import MODELS
 
 VERSIONS = {"fmi2": FMU2Slave, "fmi3": FMU3Slave}
 
@@ -130,6 +131,19 @@ def test_what_stands_where_the_inputs_say_is_shown_there_from_the_beginning(form
     )
     assert heeded(surrogate) == (False,)
     np.testing.assert_allclose(found["BC"], np.full(6, 48.0), rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("format_name", VERSIONS)
+def test_what_integrates_begins_at_its_output_at_rest(format_name, tmp_path):
+    """It had begun at 0, whatever the model's level was."""
+    surrogate = Surrogate.of(MODELS["a sum"](), {"BP": (0.0, 100.0), "AR": (0.0, 100.0)})
+    (file,) = EXPORTERS[format_name].write(surrogate, tmp_path)
+    names, u = [port.name for port in surrogate.inputs], np.array([80.0, 70.0])
+    found = fmpy.simulate_fmu(
+        str(tmp_path / file.name), stop_time=2.0, output_interval=0.1, start_values=dict(zip(names, u, strict=True))
+    )
+    expected = surrogate.simulate(np.tile(u, (20, 1)))
+    np.testing.assert_allclose(found["BC"][1:], expected[:, 0], rtol=0.0, atol=1e-9)
 
 
 def test_description_has_units_start_values_and_meaning(fmu, surrogate):

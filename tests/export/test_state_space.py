@@ -24,6 +24,7 @@ from sysid.kernels.neurons import NEURONS
 from sysid.models import (
     BJ,
     NARX,
+    OE,
     AbstractModel,
     Cascade,
     Domain,
@@ -195,6 +196,7 @@ MODELS = {
     "discrete": build,
     "continuous": lambda: build(Domain.CONTINUOUS),
     "without dead time": lambda: build(delays=(0, 0)),
+    "a sum": lambda: build_polynomial(OE(nb=(1, 2), nf=(2, 1), nk=(3, 0)), [0.1, 0.2, -0.1, -1.5, 0.5, -0.9, 0.1]),
     "20 poles an input": lambda: build(poles=20),
 }
 FEW = ("innovations, two outputs", "neural, two outputs, output neurons, absolute", "discrete")

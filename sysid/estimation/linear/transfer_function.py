@@ -255,7 +255,7 @@ class _Problem(AbstractProblem):
     def unbounded(self) -> _Problem:
         """With inputs as they are: the offset of an input adds up in an integrator, and no constant undoes it."""
         scaling = replace(self.scaling, input_offset=(0.0,) * len(self.scaling.input_offset))
-        unknown = tuple(e if e.free else replace(e, past=np.zeros(1, dtype=np.bool_)) for e in self.experiments)
+        unknown = tuple(e.begun_anywhere for e in self.experiments)
         return replace(
             self, scaling=scaling, experiments=unknown, training=replace(self.training, stable=False)
         )  # fmt: skip

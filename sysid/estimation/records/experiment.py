@@ -144,6 +144,11 @@ class Experiment:
         """Whether the state before the record is estimated: nothing was declared of what came before it."""
         return self.past is not None
 
+    @property
+    def begun_anywhere(self) -> Experiment:
+        """The same record with nothing declared of what came before it: what integrates has no equilibrium there."""
+        return self if self.free else replace(self, past=np.zeros(1, dtype=np.bool_))
+
     def from_measured(self, lags: Lags) -> Experiment:
         """The same record from where all lags of a row are in it, its first samples being the history.
 

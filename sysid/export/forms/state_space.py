@@ -75,12 +75,11 @@ class StateSpaceForm:
         """A linear state space: no neurons, no bound."""
         n, row = lowered.n_state, lowered.n_state + lowered.n_inputs
         p = lowered.n_outputs
-        units, none, silent = np.eye(lowered.n_inputs), np.zeros(lowered.n_inputs), np.zeros(p)
-        gain, rest = [lowered.equilibrium(unit) for unit in units], np.zeros(n)
-        if lowered.K is not None:
-            rest = lowered.standing(none, silent)
-            gain = [lowered.standing(unit, silent) - rest for unit in units]
-            gain += [lowered.standing(none, unit) - rest for unit in np.eye(p)]
+        none, silent = np.zeros(lowered.n_inputs), np.zeros(p)
+        rest = lowered.resting(none, silent)
+        gain = [lowered.resting(unit, silent) - rest for unit in np.eye(lowered.n_inputs)]
+        by_output = [lowered.resting(none, unit) - rest for unit in np.eye(p)]
+        gain += by_output if np.any(by_output) else []
         return cls(
             ends=ends,
             lowered=lowered,

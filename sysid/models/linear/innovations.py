@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.kernels import innovations as kernel
+from sysid.models.linear.at_rest import state_at_rest
 
 Array = NDArray[np.float64]
 
@@ -128,7 +129,7 @@ class Innovations:
     def standing(self, inputs: Array, outputs: Array) -> Array:
         """The predictor's state after inputs and outputs that have stood at some values for ever.
 
-        Without a model of the noise outputs have no say, and it is the equilibrium of the inputs.
+        Without a model of the noise outputs have a say where the system integrates alone.
 
         Args:
             inputs: Shape ``(n_inputs,)``.
@@ -137,6 +138,8 @@ class Innovations:
         Returns:
             Shape ``(n_state,)``; the shortest where there are many.
         """
+        if not self.K.any():
+            return state_at_rest((self.A, self.B, self.C, self.D, self.constant), inputs, outputs)
         drive = self.B @ inputs + self.K @ (outputs - self.D @ inputs - self.constant)
         return np.asarray(scipy.linalg.lstsq(np.eye(self.n_state) - self.predictor, drive, cond=1e-9)[0])
 

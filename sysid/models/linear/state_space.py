@@ -14,6 +14,7 @@ from sysid.kernels import linear as kernel
 from sysid.models.channels.history import History, fitting_columns
 from sysid.models.channels.scaling import Scaling, VectorScaling
 from sysid.models.contract.form import AbstractForm, no_prediction
+from sysid.models.linear.at_rest import AT_ONE, state_at_rest
 from sysid.models.linear.innovations import Innovations
 
 HISTORY_NOISE = 1e-6
@@ -22,9 +23,6 @@ enough to follow a clean record, large enough that states which it does not show
 
 EXACT = 1e-18
 """Variance of what a state leaves unexplained, relative to the output's, below which a history has no noise."""
-
-AT_ONE = 1e-9
-"""Distance from 1 below which an eigenvalue is that of an integrator, which stays wherever it is."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,7 +52,7 @@ class StateSpace(AbstractForm):
 
     the mean of a state with covariance :math:`P`, that of white inputs, given the output; :math:`O` is the
     observability matrix. A history of one sample is a system at rest, whose output is the model's; of an integrator,
-    which may rest anywhere, it is the sample's.
+    which may rest anywhere, it is the sample's (:mod:`sysid.models.linear.at_rest`).
 
     Args:
         A: Shape ``(n_state, n_state)``.
@@ -150,7 +148,7 @@ class StateSpace(AbstractForm):
         """The state before the oldest sample of a history; of a single one, the state after it."""
         inputs, output = self._checked(history.inputs), self._scaled(history.output)
         if len(inputs) == 1:
-            return self._resting(inputs[0], output[0])
+            return self.resting(inputs[0], output[0])
         x = self.equilibrium(inputs[0]) if self._radius < 1.0 - AT_ONE else np.zeros(self.n_state)
         return x + self._correction(inputs, output, x, history.known)
 
@@ -165,21 +163,22 @@ class StateSpace(AbstractForm):
         """Largest magnitude of an eigenvalue."""
         return float(np.abs(scipy.linalg.eigvals(self.A)).max(initial=0.0)) if self.n_state else 0.0
 
-    def _resting(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Equilibrium at scaled inputs, with the output where the model leaves it open.
+    def resting(self, inputs: NDArray[np.float64], output: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The state of a system at rest.
 
         With a model of the noise it is the filter's state after that output and these inputs stood for ever: like a
         recursion over past outputs, the free run then begins at the output that is declared.
+
+        Args:
+            inputs: Scaled inputs, shape ``(n_inputs,)``.
+            output: Scaled outputs, shape ``(n_outputs,)``.
+
+        Returns:
+            Shape ``(n_state,)``.
         """
         if self.K is not None:
             return self.standing(inputs, output)
-        x = self.equilibrium(inputs)
-        if abs(self._radius - 1.0) > AT_ONE:
-            return x
-        _, sizes, rows = scipy.linalg.svd(np.eye(self.n_state) - self.A)
-        free = rows[sizes <= AT_ONE * max(float(sizes[0]), 1.0)]
-        level = output - self.C @ x - self.D @ inputs - self.constant
-        return np.asarray(x + free.T @ scipy.linalg.lstsq(self.C @ free.T, level)[0]) if len(free) else x
+        return state_at_rest((self.A, self.B, self.C, self.D, self.constant), inputs, output)
 
     def equilibrium(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The state at which the system stays while its inputs are held.

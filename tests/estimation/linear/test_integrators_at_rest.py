@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import sysid
 
@@ -37,6 +38,24 @@ def test_each_input_has_its_own_integrator_and_neither_record_nor_plant_is_calle
     fit = sysid.fit(summed(400, 10.0, seed), "u1+u2 -> y", orders, start=REST)
     assert any("not stable: an integrator" in note for note in fit.notes)
     assert not any("does not begin in equilibrium" in note for note in fit.notes)
+
+
+@pytest.mark.parametrize("start", [REST, sysid.Start(kind="estimated")], ids=["at rest", "estimated"])
+@pytest.mark.parametrize("orders", [sysid.OE(nb=1, nf=2, nk=4), sysid.TransferFunction(poles=2, zeros=0, delays=4)])
+def test_a_sum_is_found_and_begins_at_rest_where_its_input_does_not_stand_at_zero(
+    orders: sysid.OE | sysid.TransferFunction, start: sysid.Start
+) -> None:
+    """OE saw an equilibrium that no plant has and fitted none of it; either ran off before its dead time was over."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.standard_normal(30), 10)
+    u[:20] = 1.0
+    y = 5.0 + 0.1 * np.cumsum(lfilter([0, 0, 0, 0, 1.0], [1.0, -0.5], u))
+    y += 0.01 * rng.standard_normal(len(y))
+    fit = sysid.fit(sysid.data((u[:, np.newaxis], y), sample_time=1.0), "u -> y", orders, start=start, rest_output=5.0)
+    run = fit.model.simulate(u[:, np.newaxis])
+    assert fit.model.pole_radius == pytest.approx(1.0, abs=1e-9)
+    assert np.abs(run[:4] - 5.0).max() < 1e-9
+    assert np.std(run - y) < 0.005 * np.std(y)
 
 
 def test_inputs_that_say_nothing_are_left_out_of_smaller_structures_too() -> None:

@@ -22,7 +22,7 @@ from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.contained import has_common, next_smaller, parts_of, with_root
-from sysid.estimation.linear.polynomial.slow import of_transfer_function
+from sysid.estimation.linear.polynomial.slow import of_transfer_function, suggested
 from sysid.estimation.linear.polynomial.starts import LongARX, long_models, looked_at, of_state_space, starts_of
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
@@ -208,10 +208,11 @@ def _slow(
     training: PolynomialTraining,
     given: tuple[Any, Scaling, float],
 ) -> tuple[PredictionErrors, Solution, Scaling]:
-    """What was found, or where a pole is as slow as the records, what the transfer function of these orders is."""
+    """What was found, or where a pole may be as slow as the records, what the transfer function of these orders is."""
     (data, scaling, until), lengths = given, [len(segment) for segment in errors.segments]
     radius = errors.chart.system(solution.theta).radius
-    if not slow_poles.unseen(radius, lengths):
+    slow = slow_poles.unseen(radius, lengths)
+    if not slow and not slow_poles.unseen(suggested(errors.segments, orders), lengths):
         return errors, solution, scaling
     found = of_transfer_function(data, orders, errors, scaling, seconds=until - now())
     if found is None:
@@ -220,7 +221,7 @@ def _slow(
     at_one = abs(problem.chart.system(theta).radius - 1.0) <= slow_poles.FAR  # from where steps would lead away
     other = _run(problem, theta, replace(training, max_iterations=0) if at_one else _within(training, until))
     other = replace(other, status=Status.CONVERGED) if at_one else other  # the transfer function has
-    beyond = at_one or radius > problem.largest
+    beyond = slow and (at_one or radius > problem.largest)
     return (problem, other, own) if beyond or other.at.loss < solution.at.loss else (errors, solution, scaling)
 
 

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError, TraceError
-from sysid.estimation.linear.segments import segments_of
+from sysid.estimation.linear.polynomial.starts import LongARX
+from sysid.estimation.linear.segments import Segment, delayed_inputs, segments_of
 from sysid.estimation.linear.state_space.provider import PredictionErrors
+from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_problem import SLOWEST
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
@@ -29,6 +31,31 @@ Array = NDArray[np.float64]
 
 ROUNDED = 1e-9
 """How far a pole is brought within the bound that it is at: its polynomial is rounded."""
+
+
+def suggested(segments: Sequence[Segment], orders: AbstractPolynomial) -> float:
+    """Magnitude of the slowest pole of an ARX model with as many lags, which need not be stable.
+
+    A search among stable poles may end far from the slow one that the records have: where one begins at rest while its
+    input stands, a pole near 1 has an equilibrium far away, and one at 1 has none.
+
+    Args:
+        segments: The records, in scaled numbers.
+        orders: Of a model without noise.
+
+    Returns:
+        It; 0 where there is none.
+    """
+    lags, dead = max(orders.denominators), [max(k - 1, 0) for k in orders.nk]
+    late = [
+        replace(piece, inputs=delayed_inputs(piece.inputs, piece.inputs[0], dead))
+        for segment in segments
+        for piece in segment.pieces()
+        if len(piece) > 2 * (lags + 1)
+    ]
+    if not lags or not late:
+        return 0.0
+    return float(np.abs(np.roots(LongARX.of_order(Windows.of(late, lags, 1), lags).A)).max(initial=0.0))
 
 
 def of_transfer_function(
@@ -72,7 +99,7 @@ def of_transfer_function(
     problem = replace(errors, stable=model.pole_radius <= largest + ROUNDED, largest=largest)
     if not problem.stable:
         scaling = replace(scaling, input_offset=(0.0,) * len(zeros))
-        problem = replace(problem, segments=tuple(segments_of(experiments, scaling)))
+        problem = replace(problem, segments=segments_of([one.begun_anywhere for one in experiments], scaling))
     theta = _coefficients(model, orders, scaling, problem)
     linear = [*range(sum(orders.nb)), *range(len(theta) - orders.level, len(theta))]
     here = problem.linearise(theta)

@@ -80,13 +80,28 @@ class LongARX:
         windows = Windows.of(pieces, max(min(max(most, least), longest - 1), 1), 1)
         chosen = 1 + int(np.argmin(arx_orders(windows)))
         order = min(max(round(chosen * more), least), windows.past)
-        columns = [windows.constant, windows.at(-order, 0), windows.inputs(0, 1)]
+        yardstick = Yardstick.of(windows, order, feedthrough=True)
+        return replace(cls.of_order(windows, order), yardstick=yardstick)
+
+    @classmethod
+    def of_order(cls, windows: Windows, order: int) -> LongARX:
+        """The model with so many lags.
+
+        Args:
+            windows: Of the pieces, with as many past samples or more.
+            order: How many.
+
+        Returns:
+            The model.
+        """
+        inputs_now = windows.inputs(0, 1)
+        m, columns = inputs_now.shape[1], [windows.constant, windows.at(-order, 0), inputs_now]
         theta = regress(np.concatenate(columns, axis=1), windows.outputs(0, 1))[:, 0]
         lagged = theta[1 : 1 + order * (m + 1)].reshape(order, m + 1)[::-1]  # newest lag first
         now = theta[1 + order * (m + 1) :]
         A = np.concatenate([[1.0], -lagged[:, m]])
         B = tuple(np.concatenate([[now[j]], lagged[:, j]]) for j in range(m))
-        return cls(A=A, B=B, constant=float(theta[0]), yardstick=Yardstick.of(windows, order, feedthrough=True))
+        return cls(A=A, B=B, constant=float(theta[0]))
 
     @classmethod
     def of_state_space(cls, pieces: Sequence[Segment], orders: AbstractPolynomial) -> LongARX | None:
