@@ -72,11 +72,11 @@ def state_at_rest(matrices: tuple[Array, Array, Array, Array, Array], inputs: Ar
     rows, staying = sums_of(A)
     if not len(rows):
         return np.asarray(sizes * scipy.linalg.lstsq(np.eye(len(A)) - A, B @ inputs)[0])
-    speed = _known(rows @ B, np.linalg.norm(B))
+    speed = _known(rows @ B, float(np.linalg.norm(B)))
     held = inputs - scipy.linalg.lstsq(speed, speed @ inputs)[0]
     x = scipy.linalg.lstsq(np.eye(len(A)) - A, B @ held, cond=AT_ONE)[0]
     level = outputs - C @ x - D @ inputs - constant
-    x = x + staying.T @ scipy.linalg.lstsq(_known(C @ staying.T, np.linalg.norm(C)), level)[0]
+    x = x + staying.T @ scipy.linalg.lstsq(_known(C @ staying.T, float(np.linalg.norm(C))), level)[0]
     return np.asarray(sizes * x)
 
 
