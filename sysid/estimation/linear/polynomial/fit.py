@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from scipy import linalg
 from sysid.errors import ConfigError, FitDivergedError, TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
-from sysid.estimation.least_squares.provider import Linearisation
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
@@ -22,7 +22,8 @@ from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.contained import has_common, next_smaller, parts_of, with_root
-from sysid.estimation.linear.polynomial.slow import of_transfer_function, suggested
+from sysid.estimation.linear.polynomial.slow import AbstractWays, next_to_transfer_function
+from sysid.estimation.linear.polynomial.slow_noise import next_to_output_error
 from sysid.estimation.linear.polynomial.starts import LongARX, long_models, looked_at, of_state_space, starts_of
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
@@ -32,7 +33,7 @@ from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.estimation.results.uncertainty import Uncertainty
-from sysid.models import Mapping, Scaling, Start
+from sysid.models import Mapping, Start
 from sysid.models.linear.polynomial import PolynomialModel
 from sysid.models.linear.polynomial_orders import AbstractPolynomial
 from sysid.models.orders.typed_fields import TypedFields
@@ -119,9 +120,11 @@ def fit_polynomial(
     with one_blas_thread():  # threads that wake for such small matrices cost more than they give
         from_part = part and _from_part(segments_of(part, scaling), segments, orders, training, until)
         errors, solution = from_part or _search(segments, orders, training, until)
-        if not orders.noise and training.stable is None:
+        if training.stable is None:
+            next_to = next_to_output_error if orders.noise else next_to_transfer_function
             data = traces, mapping, start or Start(), rest, experiments
-            errors, solution, scaling = _slow(errors, solution, orders, training, (data, scaling, until))
+            ways = _Ways(data=data, training=training, until=until)
+            errors, solution, scaling = next_to((errors, solution, scaling), orders, ways)
         at = errors.linearise(solution.theta)
         system = errors.chart.system(solution.theta)
         variance = float(errors.covariance(system)[0, 0])
@@ -201,28 +204,23 @@ def _search(
     return (errors, beyond) if better else (bounded, inside)
 
 
-def _slow(
-    errors: PredictionErrors,
-    solution: Solution,
-    orders: AbstractPolynomial,
-    training: PolynomialTraining,
-    given: tuple[Any, Scaling, float],
-) -> tuple[PredictionErrors, Solution, Scaling]:
-    """What was found, or where a pole may be as slow as the records, what the transfer function of these orders is."""
-    (data, scaling, until), lengths = given, [len(segment) for segment in errors.segments]
-    radius = errors.chart.system(solution.theta).radius
-    slow = slow_poles.unseen(radius, lengths)
-    if not slow and not slow_poles.unseen(suggested(errors.segments, orders), lengths):
-        return errors, solution, scaling
-    found = of_transfer_function(data, orders, errors, scaling, seconds=until - now())
-    if found is None:
-        return errors, solution, scaling
-    problem, theta, own = found
-    at_one = abs(problem.chart.system(theta).radius - 1.0) <= slow_poles.FAR  # from where steps would lead away
-    other = _run(problem, theta, replace(training, max_iterations=0) if at_one else _within(training, until))
-    other = replace(other, status=Status.CONVERGED) if at_one else other  # the transfer function has
-    beyond = slow and (at_one or radius > problem.largest)
-    return (problem, other, own) if beyond or other.at.loss < solution.at.loss else (errors, solution, scaling)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Ways(AbstractWays):
+    """How structures beside the one that is fitted are."""
+
+    training: PolynomialTraining
+
+    def fitted(self, orders: AbstractPolynomial) -> PolynomialModel:
+        """A polynomial model in the time that is left; see the base class."""
+        traces, mapping, start, rest, _ = self.data
+        training = _within(self.training, self.until)
+        model = fit_polynomial(traces, mapping, orders, training, start=start, rest_output=rest).model
+        return cast("PolynomialModel", model)
+
+    def run(self, problem: AbstractProvider, theta: Array, *, stays: bool = False) -> Solution:
+        """To the minimum; see the base class."""
+        training = replace(self.training, max_iterations=0) if stays else _within(self.training, self.until)
+        return _run(problem, theta, training)
 
 
 def _errors(segments: Sequence[Segment], orders: AbstractPolynomial, training: PolynomialTraining) -> PredictionErrors:
@@ -312,7 +310,7 @@ def _minimum(
     return LevenbergMarquardt(termination=_limits(training), evidence_after=None).resume(errors, best.state)
 
 
-def _run(errors: PredictionErrors, theta: Array, training: PolynomialTraining) -> Solution:
+def _run(errors: AbstractProvider, theta: Array, training: PolynomialTraining) -> Solution:
     engine = LevenbergMarquardt(termination=_limits(training), evidence_after=None)
     return engine.minimise(errors, theta, flat_prior(len(theta)))
 

@@ -6,14 +6,19 @@ the poles, where a search over all coefficients stops; it decides whether a pole
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError, TraceError
+from sysid.estimation.clock import now
+from sysid.estimation.least_squares.levenberg_marquardt import Solution
+from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.polynomial.starts import LongARX
 from sysid.estimation.linear.segments import Segment, delayed_inputs, segments_of
 from sysid.estimation.linear.state_space.provider import PredictionErrors
@@ -22,15 +27,86 @@ from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_problem import SLOWEST
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import Status
 from sysid.models import Mapping, Scaling, Start, TransferFunction, TransferFunctionModel
+from sysid.models.linear.polynomial import PolynomialModel
 from sysid.models.linear.polynomial_orders import AbstractPolynomial
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]
 
 
+Data = tuple[Sequence[Trace], Mapping, Start, float, Sequence[Experiment]]
+"""Traces, mapping, start, output at rest, and the records as they are fitted."""
+Found = tuple[PredictionErrors, Solution, Scaling]
+"""A problem, where its search ended, and the scaling of its coefficients."""
+
 ROUNDED = 1e-9
 """How far a pole is brought within the bound that it is at: its polynomial is rounded."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AbstractWays(ABC):
+    """What is needed to look at structures beside the one that is fitted.
+
+    Args:
+        data: What is fitted.
+        until: When the time is up.
+    """
+
+    data: Data
+    until: float
+
+    @abstractmethod
+    def fitted(self, orders: AbstractPolynomial) -> PolynomialModel:
+        """A polynomial model of the same records.
+
+        Args:
+            orders: The structure.
+
+        Returns:
+            The model.
+        """
+
+    @abstractmethod
+    def run(self, problem: AbstractProvider, theta: Array, *, stays: bool = False) -> Solution:
+        """From a point to a minimum.
+
+        Args:
+            problem: The problem.
+            theta: Where to begin.
+            stays: Whether to stay there.
+
+        Returns:
+            The end.
+        """
+
+
+def next_to_transfer_function(found: Found, orders: AbstractPolynomial, ways: AbstractWays) -> Found:
+    """What was found, or where a pole may be as slow as the records, what the transfer function of these orders is.
+
+    Args:
+        found: What was found.
+        orders: Of a model without noise.
+        ways: To other structures.
+
+    Returns:
+        The problem, its solution, its scaling.
+    """
+    errors, solution, scaling = found
+    lengths, radius = [len(one) for one in errors.segments], errors.chart.system(solution.theta).radius
+    slow = slow_poles.unseen(radius, lengths)
+    if not slow and not slow_poles.unseen(suggested(errors.segments, orders), lengths):
+        return found
+    other = of_transfer_function(ways.data, orders, errors, scaling, seconds=ways.until - now())
+    if other is None:
+        return found
+    problem, theta, own = other
+    at_one = abs(problem.chart.system(theta).radius - 1.0) <= slow_poles.FAR  # from where steps would lead away
+    ended = ways.run(problem, theta, stays=at_one)
+    ended = replace(ended, status=Status.CONVERGED) if at_one else ended  # the transfer function has
+    beyond = slow and (at_one or radius > problem.largest)
+    return (problem, ended, own) if beyond or ended.at.loss < solution.at.loss else found
 
 
 def suggested(segments: Sequence[Segment], orders: AbstractPolynomial) -> float:
@@ -59,7 +135,7 @@ def suggested(segments: Sequence[Segment], orders: AbstractPolynomial) -> float:
 
 
 def of_transfer_function(
-    data: tuple[Sequence[Trace], Mapping, Start, float, Sequence[Experiment]],
+    data: Data,
     orders: AbstractPolynomial,
     errors: PredictionErrors,
     scaling: Scaling,
@@ -69,7 +145,7 @@ def of_transfer_function(
     """The coefficients of the transfer function of the same orders.
 
     Args:
-        data: Traces, mapping, start, output at rest, and the records as they are fitted.
+        data: What is fitted.
         orders: Of a model without noise.
         errors: The least-squares problem.
         scaling: Of the coefficients.

@@ -186,7 +186,7 @@ def _box_jenkins_start(
             v - scipy.signal.lfilter(delayed, np.concatenate([[1.0], f]), u) for v, u in zip(left, inputs, strict=True)
         ]
     level = float(np.mean(np.concatenate(left)))
-    noise = _noise([v - level for v in left], orders.order("nc"), orders.order("nd"))
+    noise = noise_of([v - level for v in left], orders.order("nc"), orders.order("nd"))
     return np.concatenate([*B, *F, *noise, [level] * orders.level])
 
 
@@ -206,7 +206,7 @@ def _state_space_start(pieces: Sequence[Segment], orders: AbstractPolynomial, sa
     A = np.real(np.poly(np.where(size >= EDGE, roots / size * ALLOWED, roots)))
     left = [p.outputs[:, 0] - scipy.signal.lfilter(b, A, p.inputs[:, 0]) for p in pieces]
     level = float(np.mean(np.concatenate(left)))
-    noise = _noise([v - level for v in left], orders.order("nc"), orders.order("nd"))
+    noise = noise_of([v - level for v in left], orders.order("nc"), orders.order("nd"))
     return np.concatenate([b[first:last], A[1:], *noise, [level] * orders.level])
 
 
@@ -271,8 +271,17 @@ def _rational(
     return (b, f_best) if np.isfinite(best) else (b, np.zeros(nf))
 
 
-def _noise(series: Sequence[Array], nc: int, nd: int) -> tuple[Array, Array]:
-    """``C`` and ``D`` of what is left: innovations by a long AR model, then one regression."""
+def noise_of(series: Sequence[Array], nc: int, nd: int) -> tuple[Array, Array]:
+    """``C`` and ``D`` of what is left: innovations by a long AR model, then one regression.
+
+    Args:
+        series: What is left of each piece.
+        nc: Order of ``C``.
+        nd: Order of ``D``.
+
+    Returns:
+        Coefficients of both, from lag 1 on.
+    """
     if nc + nd == 0:
         return np.zeros(0), np.zeros(0)
     order = max(min(20, min(map(len, series)) // 4), 1)
