@@ -254,6 +254,34 @@ def test_a_step_that_is_not_whole_samples_is_refused(slave, step):
         slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=step)
 
 
+@pytest.mark.parametrize("at", [0.2, 0.0, -0.1, 0.15, 1e6, float("nan")])
+def test_a_step_from_where_the_last_one_did_not_end_is_refused_with_a_word_and_changes_nothing(slave, at, capfd):
+    """It had gone on from the state of another time, and said that it was there."""
+    walk(slave, np.full((1, len(slave.inputs)), 60.0))
+    before = slave.get(slave.outputs)
+    with pytest.raises(FMICallException):
+        slave.doStep(currentCommunicationPoint=at, communicationStepSize=0.1)
+    assert f"a step from {at:.9g} s, though the last one ended at 0.1 s" in capfd.readouterr().out.replace(
+        "-nan", "nan"
+    )
+    assert slave.get(slave.outputs) == before
+    walk(slave, np.full((1, len(slave.inputs)), 60.0), first=1)  # it goes on from there
+
+
+def test_one_may_go_back_to_where_a_state_was_kept_and_add_up_time_with_rounding(slave):
+    fmi2 = isinstance(slave, FMU2Slave)
+    kept = slave.getFMUstate() if fmi2 else slave.getFMUState()
+    once, time = [], 0.0
+    for _ in range(50):
+        slave.doStep(currentCommunicationPoint=time, communicationStepSize=0.1)
+        once.append(slave.get(slave.outputs))
+        time += 0.1 + 1e-7  # of a master whose clock is not exact
+    (slave.setFMUstate if fmi2 else slave.setFMUState)(kept)
+    (slave.freeFMUstate if fmi2 else slave.freeFMUState)(kept)
+    again, _ = walk(slave, np.full((50, len(slave.inputs)), 50.0))
+    np.testing.assert_array_equal(again, once)
+
+
 def resting(slave, surrogate):
     """The last output whose level at rest can be set, and the parameter that does."""
     there = [k for k, port in enumerate(surrogate.outputs) if f"{port.name}_at_rest" in slave.references]

@@ -1,4 +1,4 @@
-"""Noise beside a pole as slow as the records: the free run is that of the output error, at 1 where a plant integrates."""
+"""Noise beside a pole as slow as the records: the free run is that of the output error."""
 
 from __future__ import annotations
 
