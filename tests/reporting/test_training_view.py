@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sysid.reporting.results import read_results
+from sysid.reporting.sections import training
 from sysid.reporting.sections.training import (
     attempts_figure,
     attempts_table,
@@ -50,6 +51,8 @@ def test_coverage_stands_by_case_with_its_width(results):
     assert [row[0] for row in rows] == ["NARX free run|free run", "NARX free run|one step ahead"]
     assert rows[0][1] == "96.3|± 0.250 psi; 91.2 % alone"
     assert len(rows[0]) == 1 + len(results.fits[2].cases)
+    case = next(iter(results.fits[2].cases.values()))
+    assert training._coverage_cell(case, "free_run", "1").below == "± 0.250; 91.2 % alone"
 
 
 def test_an_unstable_fit_is_named_so_with_how_many_sequences_and_which(results):

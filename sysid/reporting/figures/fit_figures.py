@@ -140,6 +140,10 @@ def _limit(above: Axes, below: Axes, target: NDArray[np.float64], simulated: NDA
     above.text(0.01, 0.95, text, transform=above.transAxes, color=PALETTE[0], va="top", weight="bold")
 
 
+ONE_LINE = 30
+"""Letters of a title that fit beside two other panels."""
+
+
 def instants_figure(
     instants: Sequence[Instant], signals: Dict[str, CaseSignals], *, title: str, label: str, unit: str
 ) -> Figure:
@@ -161,7 +165,7 @@ def instants_figure(
         figure = new_figure(7.6, 0.5 + 2.2 * rows)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for number, (axes, instant) in enumerate(zip(panels, instants, strict=False)):
+        for rank, (axes, instant) in enumerate(zip(panels, instants, strict=False), 1):
             case = signals[instant.case]
             window = slice(instant.first, instant.last + 1)
             _line(axes, case.time[window], case.target[window], _COLUMNS, color=TARGET, linewidth=1.1, label="target")
@@ -169,10 +173,13 @@ def instants_figure(
             axes.axvline(instant.time, color=PALETTE[1], linewidth=0.9, linestyle=DASHES[2])
             error = "diverged"
             if np.isfinite(instant.error):
-                error = in_unit(f"{instant.error:+.3g}", unit)
-            axes.set_title(f"{number + 1}. {instant.case}, {instant.time:g} s: {error}", fontsize=8.5)
+                error = in_unit(f"{'+' * (instant.error > 0.0)}{number(instant.error)}", unit)
+            place, what = f"{rank}. {instant.case},", f"{instant.time:g} s: {error}"
+            # What a panel's title is cut to would leave half of the figure.
+            apart = "\n" if len(place) + len(what) > ONE_LINE else " "
+            axes.set_title(f"{place}{apart}{what}", fontsize=8.5)
             axes.set_xlabel("time [s]")
-            axes.set_ylabel(f"{label} [{unit}]" if number % columns == 0 else "")
+            axes.set_ylabel(f"{label} [{unit}]" if rank % columns == 1 % columns else "")
             axes.locator_params(nbins=4)
         for axes in panels[len(instants) :]:
             axes.set_visible(False)
@@ -197,7 +204,7 @@ def regression_figure(signals: Dict[str, CaseSignals], r: Dict[str, float], *, l
         rows = -(-len(signals) // columns)
         figure = new_figure(7.6 if columns == 3 else 2.7 * columns, 2.7 * rows)
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for number, (axes, (case, signal)) in enumerate(zip(panels, signals.items(), strict=False)):
+        for rank, (axes, (case, signal)) in enumerate(zip(panels, signals.items(), strict=False), 1):
             low, high = float(signal.target.min()), float(signal.target.max())
             axes.plot([low, high], [low, high], color=TARGET, linewidth=0.8, label="free run = target")
             axes.plot(
@@ -206,7 +213,7 @@ def regression_figure(signals: Dict[str, CaseSignals], r: Dict[str, float], *, l
             )  # fmt: skip
             axes.set_title(f"{case}: R = {r[case]:.6f}" if np.isfinite(r[case]) else f"{case}: R is not defined")
             axes.set_xlabel(f"target {label} [{unit}]")
-            axes.set_ylabel(f"free run [{unit}]" if number % columns == 0 else "")
+            axes.set_ylabel(f"free run [{unit}]" if rank % columns == 1 % columns else "")
             axes.locator_params(nbins=5)
         for axes in panels[len(signals) :]:
             axes.set_visible(False)

@@ -49,7 +49,7 @@ def step_of(known: Known, *, samples: int | None = None, seed: int = 0) -> StepR
 
     Args:
         known: The models, with one sample time.
-        samples: Length; by default until the slowest pole has settled, 3000 at most.
+        samples: Length; by default until the slowest pole has settled, 20,000 at most.
         seed: Of the draws for the intervals.
 
     Returns:

@@ -78,11 +78,11 @@ def _crossing_at(time: Matrix, y: Matrix, k: int, level: float) -> float:
 
 
 def settling(view: LinearView) -> int:
-    """Samples until the slowest pole has settled to a hundredth, 50 to 3000; 300 where it never does."""
+    """Samples until the slowest pole has settled to a hundredth, 50 to 20,000; 300 where it never does."""
     poles = view.roots(view.F[0])
     rate = poles.real * view.sample_time if not view.discrete else np.log(np.maximum(np.abs(poles), 1e-6))
     slowest = float(rate.max(initial=-1.0))
-    return int(np.clip(np.ceil(-5.0 / slowest), 50, 3000)) + view.delay if slowest < 0.0 else 300
+    return int(np.clip(np.ceil(-5.0 / slowest), 50, 20_000)) + view.delay if slowest < 0.0 else 300
 
 
 def step_response(A: Matrix, B: Matrix, C: Matrix, D: Matrix, n: int) -> Matrix:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from sysid.estimation import FitResult
 from sysid.estimation.linear.modes import Mode, modes
 from sysid.reporting.numbers import number
@@ -41,10 +43,13 @@ def modes_table(name: str, fit: FitResult) -> Table | None:
 
 
 def _row(mode: Mode, *, several: bool) -> tuple[Cell, ...]:
-    pair = f" ± {number(abs(mode.pole.imag))}i" if mode.pole.imag else ""
+    # Of fast sampling every pole is 1.00 by three digits: what counts is how far it is from the circle.
+    away = abs(1.0 - abs(mode.pole))
+    digits = min(max(3, 1 + math.ceil(-math.log10(away))), 9) if away > 0.0 else 3
+    pair = f" ± {number(abs(mode.pole.imag), digits=digits)}i" if mode.pole.imag else ""
     said = "no continuous form" if mode.rate is None else "integrates" if mode.rate == 0.0 else ""
     said = said or ("grows" if mode.rate is not None and mode.rate.real > 0.0 else "")
-    first = Cell(text=f"{number(mode.pole.real)}{pair}", header=not several, below=said)
+    first = Cell(text=f"{number(mode.pole.real, digits=digits)}{pair}", header=not several, below=said)
     cells = [Cell(text=mode.of, header=True), first] if several else [first]
     for key, _, _ in COLUMNS:
         value, ends = getattr(mode, key), mode.intervals.get(key)

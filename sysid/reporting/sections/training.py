@@ -16,7 +16,7 @@ from sysid.reporting.parts import Part, Section, identifier, picture
 from sysid.reporting.results import Results
 from sysid.reporting.sections.fit_tables import case_columns
 from sysid.reporting.tables import Cell, Table, figure_cell, plain_cell
-from sysid.units import squared
+from sysid.units import in_unit, squared
 
 RELATIVE = "relative"
 """Unit of errors that several outputs have in common."""
@@ -131,7 +131,7 @@ def _coverage_cell(case: CaseRecord | None, kind: str, unit: str) -> Cell:
     found = None if case is None or case.coverage is None else case.coverage.get(kind)
     if found is None or np.isnan(found.share):
         return Cell(text="none")
-    below = f"± {number(found.mean_half_width)} {unit}; {100.0 * found.share_before_spread:.1f} % alone"
+    below = f"± {in_unit(number(found.mean_half_width), unit)}; {100.0 * found.share_before_spread:.1f} % alone"
     return Cell(text=f"{100.0 * found.share:.1f}", value=found.share, below=below, mark="number")
 
 

@@ -47,6 +47,13 @@ def worst_told(scores: steps.Scores) -> str:
 
 
 def looked_told(found: Sequence[Mapping[str, Any]]) -> str:
-    """How many findings ask to be looked at."""
+    """How many findings ask to be looked at, and where they stand.
+
+    Example:
+        >>> looked_told([{"findings": [{"verdict": "LOOK"}, {"verdict": "FINE"}]}])
+        '1 of 2 findings ask to be looked at, in the report under: What is in this record?'
+    """
     verdicts = [one["verdict"] for advice in found for one in advice["findings"]]
-    return f"{verdicts.count('LOOK')} of {len(verdicts)} findings ask to be looked at"
+    looks = verdicts.count("LOOK")
+    where = ", in the report under: What is in this record?" if looks else ""
+    return f"{looks} of {len(verdicts)} findings ask to be looked at{where}"

@@ -10,10 +10,19 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from sysid.reporting.figures.fit_figures import Series, case_figure, cases_caption, cases_figure, learning_figure
+from sysid.reporting.figures.fit_figures import (
+    Series,
+    case_figure,
+    cases_caption,
+    cases_figure,
+    instants_figure,
+    learning_figure,
+)
 from sysid.reporting.figures.style import DASHES, MARKERS, PALETTE, series_style
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.fit_records import LearningCurve
+from sysid.reporting.signals import CaseSignals
+from sysid.reporting.worst_instants import Instant
 
 TIME = 0.1 * np.arange(20_000)
 TARGET = 30.0 + 20.0 * np.sin(TIME / 60.0)
@@ -124,3 +133,14 @@ def test_numbers_of_a_logarithmic_axis_are_plain_where_tables_have_plain_ones(
     text = svg(learning_figure({"a": curve}, unit="V²"), title="t", description="d", name="n")
     assert f">{shown}<" in text
     assert never not in text
+
+
+def test_the_title_of_an_instant_is_not_cut_where_its_case_has_a_long_name() -> None:
+    signals = CaseSignals(time=TIME, target=TARGET, simulated=TARGET + 2540.0, predicted=None)
+    there = {"case": "validation", "sample": 7, "time": 4779.88, "target": 30.0, "simulated": 2570.0}
+    instants = [Instant(**there, first=0, last=99) for _ in range(3)]
+    figure = instants_figure(instants, {"validation": signals}, title="t", label="speed", unit="1")
+    text = svg(figure, title="t", description="d", name="n")
+    assert "4779.88 s: +2540" in text
+    assert "e+03" not in text
+    assert "…" not in text

@@ -15,6 +15,7 @@ from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.linear.computing import bode_of, step_of
 from sysid.reporting.linear.step_responses import band, filter_step
+from sysid.reporting.sections.modes_table import modes_table
 from tests.estimation.linear_systems import steps, trace_of
 
 
@@ -125,3 +126,25 @@ def test_an_output_without_any_response_has_a_bode_diagram_and_no_warning() -> N
     assert np.all(found.values[:, 1] == 0.0)
     assert "y2 from u: no effect in the model" in str(found)
     assert np.all(found.phase_low[:, 0] <= found.phase[:, 0]) and np.all(found.phase[:, 0] <= found.phase_high[:, 0])
+
+
+def slow(pole: float) -> FitResult:
+    """Sampled so fast that it stands beside the circle."""
+    rng = np.random.default_rng(0)
+    u = steps(3000, 1, rng)
+    y = signal.lfilter([0.0, 1.0 - pole], [1.0, -pole], u[:, 0]) + 1e-4 * rng.normal(size=3000)
+    return sysid.fit(sysid.data((u, y), sample_time=0.01), "u -> y", sysid.ARX(na=1, nb=1, nk=1))
+
+
+def test_a_response_is_shown_until_it_has_settled_however_fast_it_is_sampled() -> None:
+    found = step_of([(slow(0.999).model, None)])
+    assert len(found.time) > 4000
+    assert found.values[-1, 0] == pytest.approx(found.gain[0], rel=0.02)
+
+
+def test_a_pole_beside_the_circle_has_digits_enough_to_tell() -> None:
+    fit = slow(0.999)
+    table = modes_table("slow", fit)
+    assert table is not None
+    (text,) = [row[0].text for row in table.rows]
+    assert abs(1.0 - float(text)) == pytest.approx(1e-3, rel=0.2)
