@@ -160,13 +160,16 @@ def in_unit(
     unit = declared or column.unit or "1"
     reference = given.reference or _for_channel(files.references, channel.name) or column.reference
     if channel.reference is not Reference.NONE and reference is None:
+        # Who copies a remedy must not move a pressure by an atmosphere: it names what is wanted here.
+        meant = channel.reference.value
+        other = (Reference.GAUGE if channel.reference is Reference.ABSOLUTE else Reference.ABSOLUTE).value
         raise UnitError(
             "the file does not say what a pressure is measured from",
             where=where,
             expected="gauge or absolute",
             got="neither",
-            remedy=f"write '{column.name} [{unit} gauge]' (or absolute) as its header, "
-            f"or files: {{references: {{{channel.name}: gauge}}}} in a dataset.yaml",
+            remedy=f"where it is {meant}, as here, write '{column.name} [{unit} {meant}]' as its header, "
+            f"or files: {{references: {{{channel.name}: {meant}}}}} in a dataset.yaml; {other} where it is that",
         )
     if channel.reference is Reference.NONE and isinstance(files.references, Reference):
         reference = column.reference  # one reference for all pressures is not meant for the others

@@ -61,6 +61,11 @@ REFUSED: dict[str, Refused] = {
         UnitError,
         r"measured from.*channel u.*gauge or absolute.*neither.*references: \{u: gauge\}",
     ),
+    "a pressure without reference where an absolute one is wanted": (
+        {"unit": "kPa", "channel": Channel(name="u", unit="bar", reference=Reference.ABSOLUTE)},
+        UnitError,
+        r"measured from.*where it is absolute, as here.*references: \{u: absolute\}.*gauge where it is that",
+    ),
     "no unit of time": (
         {"time_unit": None},
         UnitError,
