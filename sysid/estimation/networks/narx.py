@@ -21,7 +21,7 @@ from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
-from sysid.estimation.networks.pretraining import StepSamples
+from sysid.estimation.networks.pretraining import StepSamples, WhileUsed
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.regressed import regressed
 from sysid.estimation.networks.starts import multistart as starts
@@ -261,11 +261,12 @@ def _pretraining(training: Training, task: _Task, experiments: Sequence[Experime
 
 def _prepared(training: Training, task: _Task, experiments: Sequence[Experiment]) -> starts.Prepared:
     """What is linear in a random start by least squares; a start that was given or pretrained stays as it is."""
-    samples = None if training.pretraining else _step_samples(training, task, experiments, sys.maxsize)
+    kept = WhileUsed(lambda: _step_samples(training, task, experiments, sys.maxsize))
 
     def prepared(multistart: starts.Multistart, number: int, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         given = number == 0 and multistart.initial is not None
-        return theta if samples is None or given else regressed(theta, samples, multistart.provider)
+        samples = None if training.pretraining or given else kept.made()
+        return theta if samples is None else regressed(theta, samples, multistart.provider)
 
     return prepared
 

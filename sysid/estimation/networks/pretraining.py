@@ -22,7 +22,9 @@ from where a few lead; the samples chosen are in memory with their Jacobian bloc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+import weakref
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -101,14 +103,22 @@ class StepSamples(AbstractProvider):
             weights = experiment.one_step(layout.lags).weights
             counted = np.ones(len(target), dtype=bool) if weights is None else weights > 0.0
             counted = counted & (target > low) & (target < high)
-            rows.append(lagged(u, y, layout.lags, len(target))[counted])
+            whole = lagged(u, y, layout.lags, len(target))
+            rows.append(whole if counted.all() else whole[counted])
             targets.append(target[counted])
-        regressors = (np.concatenate(rows) - basis.centre) @ basis.matrix.T
-        chosen = space_filling(regressors, samples, np.random.default_rng(seed))
+            del whole  # of long records each copy is the largest thing that there is
+        plain = rows[0] if len(rows) == 1 else np.concatenate(rows)
+        rows.clear()
+        plain -= basis.centre
+        regressors, target = plain @ basis.matrix.T, np.concatenate(targets)
+        del plain
+        if len(regressors) > samples:
+            chosen = space_filling(regressors, samples, np.random.default_rng(seed))
+            regressors, target = regressors[chosen], target[chosen]
         return cls(
             layout=layout,
-            regressors=np.ascontiguousarray(regressors[chosen]),
-            target=np.concatenate(targets)[chosen],
+            regressors=np.ascontiguousarray(regressors),
+            target=target,
             neuron=NEURONS[template.network.activation],
         )
 
@@ -186,6 +196,27 @@ class StepSamples(AbstractProvider):
         if layout.gated:
             J[:, layout.gates] = (h[:, :, None] * x[:, None, :]).reshape(len(x), -1)
         return J
+
+
+@dataclass(frozen=True, eq=False)
+class WhileUsed:
+    """Samples that are there while starts use them: of all samples they are as large as the records with all lags.
+
+    Args:
+        make: Makes them; ``None`` where there are none.
+    """
+
+    make: Callable[[], StepSamples | None]
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _last: list[weakref.ref[StepSamples]] = field(default_factory=list)
+
+    def made(self) -> StepSamples | None:
+        """Those that another start has at the moment, or new ones."""
+        with self._lock:
+            found = self._last[0]() if self._last else None
+            if found is None and (found := self.make()) is not None:
+                self._last[:] = [weakref.ref(found)]
+            return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sysid.estimation import FitProgress, Training, fit_narx
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import Layout
-from sysid.estimation.networks.pretraining import StepSamples
+from sysid.estimation.networks.pretraining import StepSamples, WhileUsed
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.regressed import regressed
 from sysid.estimation.records.experiment import Experiment
@@ -125,3 +128,51 @@ def test_a_fit_is_close_within_few_iterations():
     errors = curve(trace_of({"u": u, "y": y}), replace(NETWORK, neurons=8), 10)
     assert errors[0] < 0.02 * np.var(y)
     assert errors[-1] < 2e-3 * np.var(y)
+
+
+def test_samples_are_made_for_random_starts_alone_and_let_go_when_no_start_has_them(monkeypatch: pytest.MonkeyPatch):
+    """They were held in memory for the whole fit, with all lags of all records, also where nobody asked for them."""
+    made: list[weakref.ref[StepSamples]] = []
+    whole = StepSamples.of
+
+    def watched(*arguments: Any, **options: Any) -> StepSamples:
+        found = whole(*arguments, **options)
+        made.append(weakref.ref(found))
+        return found
+
+    monkeypatch.setattr(StepSamples, "of", watched)
+    held: list[int] = []
+
+    def watch(_: FitProgress) -> None:
+        gc.collect()
+        held.append(sum(one() is not None for one in made))
+
+    u = levels(400)
+    record, training = trace_of({"u": u, "y": tank(u)}), Training(max_iterations=4, starts=2, workers=1)
+    first = fit_narx([record], Mapping.parse("u -> y"), NETWORK, training, on_progress=watch)
+    assert made
+    assert held
+    assert not any(held)
+    made.clear()
+    fit_narx([record], Mapping.parse("u -> y"), NETWORK, replace(training, starts=1), initial=first)
+    assert not made
+
+
+def test_starts_that_begin_side_by_side_share_their_samples():
+    u = levels(200)
+    samples, _, _ = parts(NETWORK, u, tank(u))
+    count: list[int] = []
+
+    def make() -> StepSamples:
+        count.append(1)
+        return replace(samples)
+
+    kept = WhileUsed(make)
+    one, two = kept.made(), kept.made()
+    assert one is two
+    assert len(count) == 1
+    del one, two
+    gc.collect()
+    assert kept.made() is not None
+    assert len(count) == 2
+    assert WhileUsed(lambda: None).made() is None
