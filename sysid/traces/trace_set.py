@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 import numpy as np
 
@@ -22,6 +23,24 @@ class Role(enum.Enum):
     SELECTION = "selection"
     VALIDATION = "validation"
     TEST = "test"
+
+
+class Roles(dict[str, Role]):
+    """Roles by name that stay as they are: a set of traces is what its digest says. With ``|`` others are made."""
+
+    def __reduce__(self) -> tuple[type[Roles], tuple[dict[str, Role]]]:
+        return Roles, (dict(self),)
+
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
+        raise TraceError(
+            "the roles of a trace set stay as they are",
+            expected="another set with other roles",
+            got="a change of its roles",
+            remedy='write dataclasses.replace(traces, roles=traces.roles | {"A": Role.TEST})',
+        )
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,9 +64,8 @@ class TraceSet:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "traces", tuple(self.traces))
-        object.__setattr__(
-            self, "roles", {t.name: self.roles.get(t.name, Role.VALIDATION) for t in self.traces} | dict(self.roles)
-        )
+        roles = {t.name: self.roles.get(t.name, Role.VALIDATION) for t in self.traces} | dict(self.roles)
+        object.__setattr__(self, "roles", Roles(roles))
         if not self.traces:
             raise TraceError("the trace set is empty", where=f"data set {self.name}", remedy="give at least one trace")
         names = self.names

@@ -16,6 +16,7 @@ from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.models import AbstractStructure
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.finish import MOST, MOST_KEPT, SPILL, slowness
+from sysid.workbench.runner.screen import duration
 from sysid.workbench.sweep.search_space import Point
 
 REFIT, TRIAL = 0.2, 0.15
@@ -180,8 +181,7 @@ class Budget:
     def left(self) -> str:
         """What is left, in words."""
         if self.wall_s is not None:
-            seconds = max(0.0, self.wall_s - self.clock())
-            return f"{seconds / 60:.0f} min left" if seconds >= 90 else f"{seconds:.0f} s left"
+            return f"{duration(max(0.0, self.wall_s - self.clock()))} left"
         return f"{max(0, (self.iterations or 0) - self.spent):,} iterations left"
 
     def limits(self, share: float) -> dict[str, Any]:

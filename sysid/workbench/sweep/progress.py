@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from sysid.reporting.sweep_record import Trial
+from sysid.workbench.runner.screen import duration
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import FAILED, Job
 
@@ -86,7 +87,7 @@ class Progress:
             value = self.rank(self.best)[-1]
             best = f", best so far {self.best.label}: {self.by} {value:.3g}"
         left = self.left()
-        ahead = "" if left is None else f", {_duration(left)} left"
+        ahead = "" if left is None else f", {duration(left)} left"
         total = max(self.expected, self.finished, 1.0)
         detail = f"{self.n_done} of {max(self.n_expected, self.n_done)}{ahead}{best}"
         self.show_at(min(1.0, self.finished / total), detail)
@@ -96,7 +97,3 @@ class Progress:
         if self.worked <= 0.0:
             return None
         return max(0.0, self.expected - self.finished) * self.session_s() / self.worked
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds / 60:.0f} min" if seconds >= 90 else f"{seconds:.0f} s"

@@ -118,3 +118,9 @@ def test_scores_export_and_report_are_over_in_time_too() -> None:
     assert found.is_late()
     assert budget(100.0, finishing_s=1e6).ends_s == 50.0
     assert not budget(None, iterations=10, finishing_s=1e6, clock=[1e9]).is_late()
+
+
+@pytest.mark.parametrize(("wall_s", "words"), [(36_000.0, "10 h 00 min left"), (100.0, "1 min 40 s left")])
+def test_what_is_left_is_said_as_every_step_says_it(wall_s: float, words: str) -> None:
+    """Ten hours were 600 minutes, and 100 s were 2."""
+    assert budget(wall_s).left() == words
