@@ -60,7 +60,7 @@ class Origins:
             For example ``valve.yaml, line 7, field channels[0].unit``.
         """
         file, there = self.of(loc)
-        return f"{file}{line_of(file, there)}, field {path_text(there)}"
+        return f"{file}{line_of(file, there)}, field {path_text(there)}" if there else str(file)
 
 
 def check(model: type[Model], data: Mapping[str, Any], *, where: object) -> Model:

@@ -120,6 +120,10 @@ def test_a_part_stands_in_its_file(origins: Origins, tmp_path: Path) -> None:
     assert origins.place(("steps", 1, "neurons")) == f"{tmp_path / 'own.yaml'}, line 4, field steps[0].neurons"
 
 
+def test_what_is_of_a_whole_file_is_of_no_field(origins: Origins) -> None:
+    assert origins.place(()) == str(origins.file)
+
+
 def test_what_was_joined_twice_stands_where_it_was_written(origins: Origins, tmp_path: Path) -> None:
     further = Origins(file=tmp_path / "further.yaml", parts={("steps",): (origins, ("steps",))})
     assert further.of(("steps", 0, "delays")) == (tmp_path / "base.yaml", ("steps", 1, "delays"))
