@@ -125,6 +125,10 @@ class AttemptRecord(Record):
     chosen: bool = Field(default=False, description="Whether it is the result.")
     members: list[int] = Field(default=[], description="Of an ensemble, the starts that it unites, once for each pick.")
     without: list[str] = Field(default=[], description="Inputs that it does without.")
+    cautious: bool = Field(
+        default=False,
+        description="Whether it counts errors that persist as fewer samples.",
+    )
     status: str = Field(default="", description="Name of the status that it had then; empty where not recorded.")
 
 

@@ -39,12 +39,12 @@ def fitted(name: str, seed: int, iterations: int, samples: int, noise: float) ->
 
     began = time.process_time()
     training = Training(seed=seed, max_iterations=iterations, workers=1)
-    model = fit_narx([record], mapping, NETWORK, training, on_progress=watch).model
+    fit = fit_narx([record], mapping, NETWORK, training, on_progress=watch)
     took = time.process_time() - began
-    least = np.minimum.accumulate(errors) / np.var(record[mapping.output])
-    shares = [least[min(look, len(least) - 1)] for look in (*LOOKS, iterations)]
-    own = [100.0 * (1.0 - float(np.sqrt(share))) for share in shares]
-    return (*own, followed(model, levels), followed(model, ramps), took)
+    least = np.minimum.accumulate(errors)
+    shares = [*(least[min(look, len(least) - 1)] for look in LOOKS), fit.history["mse"][-1]]
+    own = [100.0 * (1.0 - float(np.sqrt(share / np.var(record[mapping.output])))) for share in shares]
+    return (*own, followed(fit.model, levels), followed(fit.model, ramps), took)
 
 
 def main(samples: int, noise: float, seeds: list[int], iterations: int) -> None:

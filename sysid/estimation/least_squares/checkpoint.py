@@ -7,7 +7,7 @@ the sweep's choice would depend on how often it looked. Everything that is not r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -86,7 +86,7 @@ class Checkpoint:
             at=provider.linearise(theta),
             damping=damping_of(kept["damping"]),
             iteration=int(kept["iteration"]),
-            prior=Prior(centre=prior.centre, groups=prior.groups, alphas=alphas, beta=float(kept["beta"])),
+            prior=replace(prior, alphas=alphas, beta=float(kept["beta"])),
             evidence=None if evidence is None else Evidence(**evidence),
             losses=tuple(float(loss) for loss in kept["losses"]),
             # A number that JSON has no word for is kept as a string.

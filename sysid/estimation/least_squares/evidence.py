@@ -55,6 +55,15 @@ SAMPLES_PER_PARAMETER = 4.0
 """Independent samples that each parameter is granted at least: a record so short, or residuals so persistent, that
 fewer remain would leave the precision of the residuals undetermined."""
 
+SAMPLES_PER_EFFECTIVE_PARAMETER = 2.0
+"""The same for each parameter that the data determine, where the evidence is cautious: a prior that holds most of many
+parameters at their centre then leaves the samples of these to the others. Of 1, 2, 4 and 8, two did best on plants and
+measured records of 300 to 1,000 samples (``tests/benchmarks/short_records.py``)."""
+
+
+STEPS = 5
+"""Steps of the evidence's fixed-point iteration where parameters do not move meanwhile."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Group:
@@ -80,12 +89,14 @@ class Prior:
         groups: Disjoint groups that cover all parameters.
         alphas: Precision of each group, shape ``(n_groups,)``.
         beta: Precision of the residuals over their correlation time: what multiplies the loss.
+        cautious: Whether samples are granted to those parameters alone that the data determine.
     """
 
     centre: NDArray[np.float64]
     groups: tuple[Group, ...]
     alphas: NDArray[np.float64]
     beta: float
+    cautious: bool = False
 
     @cached_property
     def precision(self) -> NDArray[np.float64]:
@@ -120,14 +131,17 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     Returns:
         The prior with new precisions, and the evidence found.
     """
-    tau = min(at.correlation_time, max(1.0, n_samples / (SAMPLES_PER_PARAMETER * max(len(theta), 1))))
-    independent = n_samples / tau
     root = np.sqrt(prior.beta / prior.precision)
     M = at.gauss_newton * root[:, None] * root[None, :]
     add_to_diagonal(M, 1.0)
     shrunk, log_det = _inverse_diagonal(M)
     determined = np.clip(1.0 - shrunk, 0.0, 1.0)
     gammas = np.array([determined[group.members].sum() for group in prior.groups])
+    granted = SAMPLES_PER_PARAMETER * len(theta)
+    if prior.cautious:
+        granted = SAMPLES_PER_EFFECTIVE_PARAMETER * float(gammas.sum())
+    tau = min(at.correlation_time, max(1.0, n_samples / max(granted, 1.0)))
+    independent = n_samples / tau
     energies = np.array([0.5 * np.sum((theta - prior.centre)[group.members] ** 2) for group in prior.groups])
     penalised = prior.beta * at.loss + float(prior.alphas @ energies)
     evidence = Evidence(
@@ -145,6 +159,24 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     left = max(independent - float(gammas.sum()), 1.0)
     beta = min(left / max(2.0 * at.loss, tiny * left), BETA_LIMIT)
     return replace(prior, alphas=alphas, beta=beta), evidence
+
+
+def settled(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_samples: int) -> tuple[Prior, Evidence]:
+    """Precisions and evidence of parameters that do not move meanwhile.
+
+    Args:
+        prior: Precisions now.
+        theta: Flat parameters.
+        at: Loss, Gauss-Newton matrix and correlation time there.
+        n_samples: Samples that count.
+
+    Returns:
+        The prior after some steps of the iteration, and the evidence before the last of them.
+    """
+    prior, evidence = update(prior, theta, at, n_samples)
+    for _ in range(STEPS - 1):
+        prior, evidence = update(prior, theta, at, n_samples)
+    return prior, evidence
 
 
 def _named(groups: Sequence[Group], values: NDArray[np.float64]) -> dict[str, float]:

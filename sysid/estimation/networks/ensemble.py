@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.estimation.least_squares.evidence import update
+from sysid.estimation.least_squares.evidence import settled
 from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Solution
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.threads import one_blas_thread
@@ -56,9 +56,6 @@ ELIGIBLE = 40
 
 WORTH = 0.01
 """Least share by which a pick has to lower the error: neurons that bring less are not worth their run time."""
-
-EVIDENCE_ROUNDS = 5
-"""Steps of the evidence's fixed-point iteration at the united parameters, which do not move meanwhile."""
 
 
 def check(training: Training, selection: Sequence[Trace]) -> None:
@@ -189,8 +186,8 @@ def as_candidate(
     prior, evidence = first_prior(multistart.training, task.layout, task.provider, theta, centre), None
     with one_blas_thread():
         at = task.provider.linearise(theta)
-        for _ in range(EVIDENCE_ROUNDS if multistart.training.regularisation is None else 0):
-            prior, evidence = update(prior, theta, at, task.provider.n_samples)
+        if multistart.training.regularisation is None:
+            prior, evidence = settled(prior, theta, at, task.provider.n_samples)
     lead = members[next(iter(ensemble.picks))].solution
     last = lead.curve[-1]
     entry = Iteration(

@@ -24,6 +24,7 @@ from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.pretraining import StepSamples, WhileUsed
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.networks.regressed import regressed
+from sysid.estimation.networks.starts import cautious
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.advancing import with_evidence
 from sysid.estimation.networks.starts.choosing import Choice, choose
@@ -108,9 +109,12 @@ def fit_narx(
         pretraining=_pretraining(training, task, seen),
         prepared=_prepared(training, task, seen),
         until=starts.deadline(began, training, on_progress),
+        again=True,
     )
     tasks = _started(multistart, task, seen)
-    on_checkpoint(Checkpoint.of(choose(list(tasks), training.choose_by).chosen.solution.state))
+    # A cautious fit is made anew, so that a fit that goes on ends where one in a single run would.
+    raced = [one for one in tasks if not one.cautious] or list(tasks)
+    on_checkpoint(Checkpoint.of(choose(raced, training.choose_by).chosen.solution.state))
     tasks |= _with_ensemble(multistart, list(tasks), experiments, vet)
     choice, tasks = _chosen(multistart, windows, tasks, vet)
     chosen = choice.chosen
@@ -125,7 +129,8 @@ def fit_narx(
     fit = with_note(multistart_result(choice, list(tasks), training, status, seconds, left=left), windows)
     # All of them have the template's limits.
     held = (told(template.between, mapping.output, template.output_unit),) if template.limits else ()
-    return replace(fit, posterior=posterior, notes=(*fit.notes, *held))
+    twice = cautious.told(list(tasks), chosen, tasks[chosen].provider.n_samples)
+    return replace(fit, posterior=posterior, notes=(*fit.notes, *twice, *held))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -224,6 +229,7 @@ def _started(
                 resume=None,
                 pretraining=_pretraining(view.training, part, experiments),
                 prepared=_prepared(view.training, part, experiments),
+                again=False,
             )
         found = run_race(own)
         named = [replace(one, number=one.number + view.first, without=view.without) for one in found]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.least_squares.evidence import update
+from sysid.estimation.least_squares.evidence import settled
 from sysid.estimation.least_squares.levenberg_marquardt import Solution
 from sysid.estimation.parameters.named import Named
 from sysid.estimation.results.uncertainty import Uncertainty
@@ -50,9 +50,6 @@ UNLIKE = 0.2
 WITHIN = re.compile(r"_at?\d")
 """Names, in equations that nobody wrote, of what lies within the range of its signal: breakpoints, and poles."""
 
-EVIDENCE_STEPS = 3
-"""Steps of the evidence of a fit that ended before its first."""
-
 
 class Scaled(Protocol):
     """What is trained: in which scales, and between which bounds."""
@@ -79,9 +76,7 @@ def with_evidence(solution: Solution, n_samples: int) -> Solution:
     if solution.evidence is not None or not solution.at.finite:
         return solution
     state = solution.state
-    prior, evidence = state.prior, state.evidence
-    for _ in range(EVIDENCE_STEPS):
-        prior, evidence = update(prior, state.theta, state.at, n_samples)
+    prior, evidence = settled(state.prior, state.theta, state.at, n_samples)
     return replace(solution, state=replace(state, prior=prior, evidence=evidence))
 
 

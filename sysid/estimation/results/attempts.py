@@ -25,6 +25,7 @@ class Attempt:
         chosen: Whether it is the result.
         members: Of an ensemble, the starts that it unites, once for each pick.
         without: Inputs that it does without.
+        cautious: Whether it counts errors that persist as fewer samples.
         status: Name of the status that it had then; empty where it was not recorded.
     """
 
@@ -40,6 +41,7 @@ class Attempt:
     chosen: bool = False
     members: tuple[int, ...] = ()
     without: tuple[str, ...] = ()
+    cautious: bool = False
     status: str = ""
 
     def to_dict(self) -> dict[str, Any]:

@@ -204,6 +204,8 @@ def _attempt_row(attempt: AttemptRecord) -> tuple[Cell, ...]:
     name, origin = f"{attempt.start}", "from the initial fit" if attempt.seed is None else f"seed {attempt.seed}"
     if attempt.without:
         origin += f", without {' and '.join(attempt.without)}"
+    if attempt.cautious:
+        origin += ", cautious"
     if attempt.members:
         name, origin = "ensemble", f"of starts {', '.join(map(str, attempt.members))}"
     words = {None: "not checked", True: "stable", False: "refused"}[attempt.stable]

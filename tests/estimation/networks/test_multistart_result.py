@@ -11,10 +11,9 @@ from sysid.estimation.networks.starts.result import multistart_status
 from sysid.estimation.results.result import Status
 
 
-def candidate(number: int, iteration: int, status: Status) -> Any:
-    return SimpleNamespace(
-        number=number, model=None, solution=SimpleNamespace(status=status, state=SimpleNamespace(iteration=iteration))
-    )
+def candidate(number: int, iteration: int, status: Status, cautious: bool = False) -> Any:
+    solution = SimpleNamespace(status=status, state=SimpleNamespace(iteration=iteration))
+    return SimpleNamespace(number=number, model=None, cautious=cautious, solution=solution)
 
 
 @pytest.mark.parametrize(
@@ -25,11 +24,12 @@ def candidate(number: int, iteration: int, status: Status) -> Any:
         ((0, 30, Status.MAX_ITERATIONS), [(1, 300, Status.MAX_ITERATIONS)], Status.STOPPED_EARLY),
         ((0, 30, Status.CONVERGED), [(1, 300, Status.MAX_ITERATIONS)], Status.CONVERGED),
         ((0, 30, Status.TIME_LIMIT), [(1, 300, Status.TIME_LIMIT)], Status.TIME_LIMIT),
+        ((0, 30, Status.CONVERGED), [(0, 300, Status.MAX_ITERATIONS, True)], Status.CONVERGED),
     ],
-    ids=["ran out", "did better before", "given up for others", "a minimum", "no time"],
+    ids=["ran out", "did better before", "given up for others", "a minimum", "no time", "beside a cautious fit"],
 )
 def test_iterations_ran_out_only_where_there_were_no_more(
-    chosen: tuple[int, int, Status], others: list[tuple[int, int, Status]], ended: Status
+    chosen: tuple[int, int, Status], others: list[tuple[Any, ...]], ended: Status
 ) -> None:
     best = candidate(*chosen)
     assert multistart_status(best, [best, *(candidate(*one) for one in others)], [], interrupted=False) is ended

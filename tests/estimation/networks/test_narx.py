@@ -13,6 +13,7 @@ from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import Loop, Status, Training, fit_narx
 from sysid.estimation.networks.starts.advancing import judged
 from sysid.estimation.networks.starts.choosing import rank
+from sysid.estimation.networks.starts.multistart import Place
 from sysid.models import NARX, Start, StartKind
 from sysid.traces import Trace
 from tests.estimation.tank import TANK, tank
@@ -91,7 +92,8 @@ def test_who_stays_within_a_tolerance_on_every_selection_trace_comes_before_who_
             for one, run, share in zip((tank(2), tank(4), tank(5)), runs, shares, strict=True)
         ]
         mean, outside = judged(SimpleNamespace(selection=traces, training=training, start=Start()), model)
-        return SimpleNamespace(score=mean, outside=outside, solution=SimpleNamespace(status=Status.CONVERGED))
+        solution = SimpleNamespace(status=Status.CONVERGED)
+        return SimpleNamespace(score=mean, outside=outside, solution=solution, place=Place.BY_EVIDENCE)
 
     fails, holds = off_by(1e-5, 1e-5, 0.02), off_by(0.005, 0.005, 0.005)
     assert (fails.outside, holds.outside) == (1, 0)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.damping import DAMPINGS
-from sysid.estimation.least_squares.evidence import Prior, update
+from sysid.estimation.least_squares.evidence import Prior, settled
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.termination import Termination
@@ -63,6 +63,7 @@ def advance(multistart: Multistart, number: int, before: Candidate | None, share
             theta = _pretraining(multistart, multistart.pretraining, number, seed, centre)
         drawn, theta = theta, multistart.prepared(multistart, number, theta)
         prior = first_prior(training, multistart.layout, multistart.provider, theta, centre, drawn=drawn)
+        prior = replace(prior, cautious=multistart.cautious)
         solution = keep.minimise(run, in_time(), multistart.provider, theta, prior)
     elif before.solution.status is Status.MAX_ITERATIONS or before.solution.status is Status.TIME_LIMIT:
         seed, solution = before.seed, keep.resume(run, in_time(), multistart.provider, before.solution.state)
@@ -103,6 +104,7 @@ def advanced(
         at = provider.linearise(theta)
         # Precisions that suited the residuals as they were may hold the weights where they are.
         prior = first_prior(multistart.training, multistart.layout, provider, theta, centre)
+        prior = replace(prior, cautious=state.prior.cautious)
         damping = DAMPINGS[multistart.training.damping]()
         first = replace(state, theta=theta, at=at, prior=prior, losses=(at.loss,), damping=damping)
         engine = multistart.trained(before.number, state.iteration + iterations, multistart.left(name))
@@ -122,12 +124,14 @@ def with_evidence(before: Candidate, provider: AbstractProvider) -> Candidate:
         provider: Its residuals.
 
     Returns:
-        The same, with the evidence of the precisions that it has.
+        The same, with the precisions that the evidence finds where it stands.
     """
     state = before.solution.state
     at = provider.linearise(state.theta)
-    _, evidence = update(state.prior, state.theta, at, provider.n_samples)
-    return replace(before, solution=replace(before.solution, state=replace(state, at=at, evidence=evidence)))
+    prior, evidence = settled(state.prior, state.theta, at, provider.n_samples)
+    last = replace(state.curve[-1], effective_parameters=evidence.total_effective_parameters)
+    state = replace(state, at=at, prior=prior, evidence=evidence, curve=(*state.curve[:-1], last))
+    return replace(before, solution=replace(before.solution, state=state))
 
 
 def _pretraining(

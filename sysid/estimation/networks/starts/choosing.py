@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid.estimation.networks.starts.multistart import Candidate, Network
+from sysid.estimation.networks.starts.multistart import Candidate, Network, Place
 from sysid.estimation.results.result import NOT_STABLE
 
 
-def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, float]:
+def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, int, float]:
     """Sorting key, best first; fits that did not improve come last.
 
     Args:
@@ -24,13 +24,14 @@ def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, float]:
     Returns:
         The key.
     """
+    place = candidate.place
     if choose_by != "evidence" and np.isfinite(candidate.score):
-        value = candidate.score
+        value, place = candidate.score, Place.BY_EVIDENCE
     elif choose_by != "loss" and candidate.solution.evidence is not None:
         value = -candidate.log_evidence
     else:
         value = candidate.loss
-    return not candidate.solution.status.usable, candidate.outside if choose_by == "selection" else 0, value
+    return not candidate.solution.status.usable, candidate.outside if choose_by == "selection" else 0, place, value
 
 
 VETTED = 10
@@ -93,10 +94,11 @@ def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Netwo
 
 def _few_of_each(candidates: Sequence[Candidate], order: Sequence[int]) -> list[int]:
     """The candidates in order, of each start the best looks."""
-    seen: Counter[int] = Counter()
+    seen: Counter[tuple[int, bool]] = Counter()
     found = []
     for i in order:
-        seen[candidates[i].number] += 1
-        if seen[candidates[i].number] <= LOOKS:
+        start = candidates[i].number, candidates[i].cautious
+        seen[start] += 1
+        if seen[start] <= LOOKS:
             found.append(i)
     return found

@@ -15,6 +15,7 @@ import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from typing import TypeAlias
 
 import numpy as np
@@ -48,6 +49,19 @@ SETTLED = 5
 INITIAL_ALPHA = 1e-2
 """Precision of the weights before the evidence has spoken: weak, but enough to keep the first steps of an
 underdetermined network small."""
+
+
+SHORT = 20.0
+"""Samples per parameter below which a record is fitted once more, cautiously: of residuals that persist over more than
+five samples the evidence otherwise makes more than they say."""
+
+
+class Place(IntEnum):
+    """Where a candidate stands if no selection traces choose."""
+
+    FIRST = 0
+    BY_EVIDENCE = 1
+    LAST = 2
 
 
 Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel | EquationModel
@@ -97,6 +111,10 @@ class Multistart:
     enough: Callable[[Candidate], bool] = lambda _: False
     """Whether one of them is so good that the others need not begin."""
     prepared: Prepared = lambda _, __, theta: theta
+    again: bool = False
+    """Whether a short record is fitted once more, cautiously."""
+    cautious: bool = False
+    """Whether this is that fit."""
     least: int = 1
     """Starts that are trained to their end, whoever is ahead: those that an ensemble unites."""
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
@@ -110,6 +128,12 @@ class Multistart:
     def model(self, theta: NDArray[np.float64]) -> Network:
         """The model with these parameters of the basis."""
         return replace(self.template, theta=self.to_plain @ self.learnt(theta))
+
+    @property
+    def twice(self) -> bool:
+        """Whether the record is short, and what is short is fitted once more."""
+        found = self.again and self.training.regularisation is None and self.training.loop is Loop.CLOSED
+        return found and self.initial is None and self.provider.n_samples < SHORT * len(self.layout.centre())
 
     def left(self, run: str) -> float:
         """Seconds that a run may take, what earlier sessions have spent on it included."""
@@ -129,8 +153,9 @@ class Multistart:
             The engine.
         """
         training, scale = self.training, self.template.scaling.error_unit
-        planned = planned_iterations(training, self.least)
+        planned = planned_iterations(training, self.least) + (training.max_iterations if self.twice else 0)
         own = "free run" if training.loop is Loop.CLOSED else "one step ahead"
+        own += ", cautious" if self.cautious else ""
 
         def report(entry: Iteration) -> None:
             if stage is None:
@@ -184,6 +209,7 @@ class Candidate:
         outside: Selection traces on which it leaves the tolerance of the training; 0 where that has none.
         members: Starts that an ensemble unites, once for each pick; empty for a single start.
         without: Inputs that it does without.
+        place: Where it stands among the others if no selection traces choose.
     """
 
     number: int
@@ -194,6 +220,12 @@ class Candidate:
     outside: int = 0
     members: tuple[int, ...] = ()
     without: tuple[str, ...] = ()
+    place: Place = Place.BY_EVIDENCE
+
+    @property
+    def cautious(self) -> bool:
+        """Whether it counts errors that persist as fewer samples."""
+        return self.solution.state.prior.cautious
 
     @property
     def log_evidence(self) -> float:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from sysid.estimation.least_squares.threads import one_blas_thread
+from sysid.estimation.networks.starts import cautious
 from sysid.estimation.networks.starts.advancing import advance
 from sysid.estimation.networks.starts.halving import better_half, rungs_of, turns
 from sysid.estimation.networks.starts.multistart import Candidate, Multistart, check_samples
@@ -25,7 +27,7 @@ def run_race(multistart: Multistart) -> list[Candidate]:
         multistart: What they have in common.
 
     Returns:
-        Every start at every rung that it reached.
+        Every start at every rung that it reached; before them the cautious fit of a short record.
 
     Raises:
         TraceError: If no sample counts.
@@ -58,7 +60,18 @@ def run_race(multistart: Multistart) -> list[Candidate]:
             latest = reached
             order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
             numbers = [candidate.number for candidate in better_half(order, multistart.least)]
-    return seen
+        return [*_cautious(multistart, seen), *seen]
+
+
+def _cautious(multistart: Multistart, seen: Sequence[Candidate]) -> list[Candidate]:
+    """One more fit of a short record, with its place among the others."""
+    begun = cautious.begun(multistart, seen)
+    if begun is None:
+        return []
+    own, number = begun
+    reached: dict[int, Candidate] = {}
+    _rung(own, [number], {}, (1.0, math.inf), reached)
+    return [cautious.placed(one, seen, multistart.provider.n_samples) for one in reached.values()]
 
 
 def _one_by_one(multistart: Multistart, numbers: Sequence[int]) -> list[Sequence[int]]:

@@ -43,10 +43,8 @@ def multistart_status(
     status = chosen.solution.status
     # Of a start that was given up for others its iterations did not run out: they were not wanted.
     given_up = status is Status.MAX_ITERATIONS
-    later = any(
-        (given_up or c.number == chosen.number) and c.solution.state.iteration > chosen.solution.state.iteration
-        for c in candidates
-    )
+    alike = [c for c in candidates if c.cautious == chosen.cautious and (given_up or c.number == chosen.number)]
+    later = any(c.solution.state.iteration > chosen.solution.state.iteration for c in alike)
     return Status.STOPPED_EARLY if later else status
 
 
@@ -150,6 +148,7 @@ def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[A
             chosen=candidate is choice.chosen,
             members=tuple(number + 1 for number in candidate.members),
             without=candidate.without,
+            cautious=candidate.cautious,
             status=candidate.solution.status.name,
         )
         for candidate, stable in zip(candidates, choice.stable, strict=True)

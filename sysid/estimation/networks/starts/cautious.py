@@ -1,0 +1,104 @@
+r"""A second, cautious fit of a short record, which counts errors that persist as fewer samples.
+
+Residuals of a free run persist. The evidence counts them by their correlation time, but grants each parameter some
+independent samples (:data:`~sysid.estimation.least_squares.evidence.SAMPLES_PER_PARAMETER`): otherwise what a rough
+model leaves, which persists too, would pass for noise, and the model would stay rough. On a record of a few samples per
+parameter that switches the correction off. A network then learns the noise by heart, and its run over other commands
+may be anything. Which of the two a record needs cannot be seen before it is fitted.
+
+So both are fitted, from the same start. The cautious fit grants samples to those parameters alone that the data
+determine. Selection traces choose between the two as between all starts. Without such traces the other fit has to pay
+for what it has more: with mean squared errors :math:`E`, effective parameters :math:`\gamma`, and :math:`N/\tau`
+independent samples by the cautious fit's correlation time, it is taken where
+
+.. math:: \frac{N}{\tau} \ln\frac{E_\text{cautious}}{E_\text{other}}
+    > (\gamma_\text{other} - \gamma_\text{cautious}) \ln\frac{N}{\tau},
+
+which is the information criterion of Schwarz (1978, "Estimating the dimension of a model") over independent samples.
+
+Limits: two fits in place of one, where there are fewer than :data:`SHORT` samples per parameter; the criterion judges
+two local minima, and knows nothing of commands that the record does not hold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from sysid.estimation.networks.starts.choosing import rank
+from sysid.estimation.networks.starts.multistart import Candidate, Multistart, Place
+
+
+def begun(multistart: Multistart, seen: Sequence[Candidate]) -> tuple[Multistart, int] | None:
+    """What a cautious fit has in common with the others, and the start that it begins with.
+
+    Args:
+        multistart: The multistart.
+        seen: Its candidates.
+
+    Returns:
+        Both; ``None`` where none is wanted: the record is long enough, or the fit goes on from a given one.
+    """
+    best = min(seen, key=lambda one: rank(one, multistart.training.choose_by))
+    if not multistart.twice or best.seed is None or multistart.stop.is_set() or multistart.left("") <= 0.0:
+        return None
+    done = float(sum(multistart.iterations.values()))
+    own = replace(
+        multistart,
+        cautious=True,
+        resume=None,
+        name=f"{multistart.name}cautious ",
+        iterations={-1: round(done)},
+    )
+    return own, best.number
+
+
+def placed(cautious: Candidate, seen: Sequence[Candidate], n_samples: int) -> Candidate:
+    """A cautious fit with its place where no selection traces choose.
+
+    Args:
+        cautious: The fit.
+        seen: The other candidates.
+        n_samples: Samples that count.
+
+    Returns:
+        The candidate, before all others or after them.
+    """
+    best = min(seen, key=lambda one: rank(one, "evidence"))
+    ours, others = cautious.solution.evidence, best.solution.evidence
+    if ours is None or others is None:
+        return replace(cautious, place=Place.LAST)
+    independent = max(n_samples / ours.correlation_time, math.e)
+    gained = independent * _log_ratio(cautious.loss, best.loss)
+    paid = (others.total_effective_parameters - ours.total_effective_parameters) * math.log(independent)
+    return replace(cautious, place=Place.LAST if gained > paid else Place.FIRST)
+
+
+def _log_ratio(one: float, other: float) -> float:
+    """Of two losses, either of which may be zero or none."""
+    if not math.isfinite(one) or not math.isfinite(other):
+        return math.inf if not math.isfinite(one) else -math.inf
+    tiny = 1e-300
+    return math.log(max(one, tiny) / max(other, tiny))
+
+
+def told(candidates: Sequence[Candidate], chosen: Candidate, n_samples: int) -> tuple[str, ...]:
+    """What a fit says of it.
+
+    Args:
+        candidates: All of them.
+        chosen: The one that was chosen.
+        n_samples: Samples that count.
+
+    Returns:
+        None, or a sentence.
+    """
+    if not any(one.cautious for one in candidates):
+        return ()
+    taken = "it was taken" if chosen.cautious else "it was not taken"
+    parameters = len(chosen.solution.theta)
+    return (
+        f"The record is short: {n_samples:,} samples for {parameters} parameters. So a second, cautious fit was made, "
+        f"which counts errors that persist as fewer samples; {taken}.",
+    )
