@@ -56,14 +56,19 @@ def advise(traces: TraceSet, mapping: Mapping, *, suggest: bool = True) -> Advic
         TraceError: If a channel has values that cannot be squared.
     """
     chosen = traces.with_role(Role.ESTIMATION, Role.SELECTION) or traces.traces
-    key = repr((traces.name, mapping, suggest, [(trace.name, trace.digest) for trace in chosen]))
+    spans = [(trace.name, trace.start_time, len(trace)) for trace in traces]
+    key = repr((traces.name, mapping, suggest, [(trace.name, trace.digest) for trace in chosen], spans))
     return _memory.get(key, lambda: _advice(traces, mapping, chosen, suggest=suggest))
 
 
 def _advice(traces: TraceSet, mapping: Mapping, chosen: Sequence[Trace], *, suggest: bool) -> Advice:
     for trace in chosen:
         trace.check_sizes([*mapping.inputs, *mapping.outputs])
-    record = Record(traces=tuple(trace.seen_by(mapping.channels, each=True) for trace in chosen), mapping=mapping)
+    record = Record(
+        traces=tuple(trace.seen_by(mapping.channels, each=True) for trace in chosen),
+        mapping=mapping,
+        others=tuple(trace for trace in traces if trace not in chosen),
+    )
     findings = tuple(finding for check in CHECKS for finding in check(record))
     impulse, response = record.slowed[0].impulse, record.response
     if not isinstance(response, str):  # others have it too

@@ -254,7 +254,7 @@ def _trend(
         return
     figures = {"size": found.size, "share": abs(found.size) / size}
     if found.at is not None:
-        figures["seconds"] = (first + found.at * factor) * record.sample_time
+        figures["seconds"] = record.time_of(trace, first + found.at * factor)
     code = "output.jump" if found.at is not None else "output.sums" if summed else "output.drift"
     subject = (*summed, *([] if summed else [record.mapping.output]), trace)
     yield Finding(topic=Topic.CHANNELS, code=code, verdict=Verdict.LOOK, subject=subject, figures=figures)

@@ -45,7 +45,8 @@ class Finding:
         verdict: How it is to be taken.
         subject: Channels, or names of traces, that it is about.
         figures: By name; seconds, samples, shares (0 to 1) and units are said by the words.
-        reason: Why something cannot be said, where an estimate was refused.
+        reason: Why something cannot be said, where an estimate was refused; or what to write, where that depends on
+            more than figures.
     """
 
     topic: Topic

@@ -48,15 +48,22 @@ class Record:
     Args:
         traces: The experiments.
         mapping: Inputs and output.
+        others: Experiments of the same data set that are not looked at.
     """
 
     traces: tuple[Trace, ...]
     mapping: Mapping
+    others: tuple[Trace, ...] = ()
 
     @property
     def sample_time(self) -> float:
         """Seconds."""
         return self.traces[0].sample_time
+
+    def time_of(self, trace: str, sample: float) -> float:
+        """When a sample is, in seconds of the record's own time, in which ``start``, ``stop`` and masks are written."""
+        start = next(one.start_time for one in self.traces if one.name == trace)
+        return start + sample * self.sample_time
 
     @cached_property
     def moving(self) -> tuple[str, ...]:

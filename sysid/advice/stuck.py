@@ -6,7 +6,9 @@ stay chance makes; and a linear response says whether the output had reason to m
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+import re
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -19,6 +21,8 @@ MOVES, EXPLAINED = 0.1, 0.3
 """Part of its span by which the response to the inputs has to move meanwhile; what it has to explain to be asked."""
 AT_END = 0.002
 """Part of the output's span that counts as its end: what stands there is told as a limit."""
+TOLD = 12
+"""Stays of which it is written out how they are masked, the longest ones."""
 
 
 def check_stuck(record: Record) -> Iterator[Finding]:
@@ -48,7 +52,7 @@ def check_stuck(record: Record) -> Iterator[Finding]:
             value = float(segment.output[begin])
             inside = min(value - low, high - value) > AT_END * (high - low)
             if inside and np.ptp(run[begin:end]) > MOVES * span:
-                seconds = (segment.first + begin) * record.sample_time
+                seconds = record.time_of(segment.trace, segment.first + begin)
                 stays.append((end - begin, seconds, value, segment.trace))
                 repeats, pairs = repeats - (end - begin - 1), pairs - (end - begin)
     share, samples = (repeats + 1.0) / (pairs + 2.0), sum(map(len, y))
@@ -64,4 +68,22 @@ def check_stuck(record: Record) -> Iterator[Finding]:
                 "stays": len(stays), "samples": length, "value": value, "seconds": seconds,
                 "until": seconds + (length - 1) * record.sample_time,
             },
+            reason=_masks(record, stays),
         )  # fmt: skip
+
+
+def _masks(record: Record, stays: Sequence[tuple[int, float, float, str]]) -> str:
+    """What masks these stays in a ``dataset.yaml``; a case is named where others are recorded at that time, too."""
+    lines = []
+    for length, start, _, trace in sorted(sorted(stays)[-TOLD:], key=lambda one: (one[3], one[1])):
+        stop = start + (length - 1) * record.sample_time
+        there = [one for one in (*record.traces, *record.others) if one.time[0] <= stop and one.time[-1] >= start]
+        case = f", cases: [{_plain(trace)}]" if len(there) > 1 else ""
+        lines.append(f"{{channel: {_plain(record.mapping.output)}, start: {start:.15g}, stop: {stop:.15g}{case}}}")
+    more = f", and {len(stays) - TOLD} shorter ones" if len(stays) > TOLD else ""
+    return f"repairs: {{mask: [{', '.join(lines)}]}}{more}"
+
+
+def _plain(name: str) -> str:
+    """A name as YAML has it."""
+    return name if re.fullmatch(r"(?!(?i:true|false|null|yes|no|on|off)$)[A-Za-z_]\w*", name) else json.dumps(name)

@@ -13,6 +13,7 @@ from sysid.errors import ChannelError, ConfigError
 from sysid.export.bundle import Bundle, channel_of
 from sysid.ingest import FileOptions, GridOptions, RawTable, RepairOptions, read_table
 from sysid.ingest.assembling.assemble import Wanted, assemble
+from sysid.ingest.assembling.masks import check_masks
 from sysid.ingest.inspecting.undescribed import guessed_time
 from sysid.traces import Channel, Trace
 
@@ -95,6 +96,7 @@ def read_inputs(bundle: Bundle, path: Path, options: InputOptions | None = None)
         grid=options.grid,
         repairs=repairs.model_copy(update={"constant": "accept"}),
     )
+    check_masks(repairs, [trace], cases=[trace.name], where=str(path))
     return with_constants(trace, channels, options.constants)
 
 

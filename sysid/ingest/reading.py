@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sysid.errors import UnitError
 from sysid.ingest.assembling.assemble import Wanted, assemble
 from sysid.ingest.assembling.in_units import stamps_in_seconds
+from sysid.ingest.assembling.masks import check_masks
 from sysid.ingest.assembling.timing import Timing, even_step, round_step, survey
 from sysid.ingest.readers import READERS, choose_reader, read_with
 from sysid.ingest.readers.text_source import bare_stem
@@ -94,7 +95,8 @@ def read_trace(
     path, files = Path(path), files or FileOptions()
     grid, repairs = grid or GridOptions(), repairs or RepairOptions()
     table = read_table(path, files=files, repairs=repairs)
-    if name is None and channels is None and sample_time is None:
+    changed = repairs.mask or repairs.repeats or repairs.drift
+    if name is None and channels is None and sample_time is None and not changed:
         own = _as_written(table)
         if own is not None:
             return own
@@ -103,7 +105,9 @@ def read_trace(
     wanted = Wanted(name=name or bare_stem(path), channels=chosen, sample_time=step, timing=timing)
     held = [table]
     del table  # given away: what assembles it lets go of columns that it no longer needs, and they may be large
-    return assemble(held.pop(), wanted, files=files, grid=grid, repairs=repairs)
+    trace = assemble(held.pop(), wanted, files=files, grid=grid, repairs=repairs)
+    check_masks(repairs, [trace], cases=[trace.name], where=str(path))
+    return trace
 
 
 def _as_written(table: RawTable) -> Trace | None:

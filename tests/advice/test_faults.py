@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from sysid.models import NARX
+import sysid
+from sysid.advice import advise
+from sysid.models import NARX, Mapping
+from sysid.reporting.advice.words import said
+from sysid.traces import Role, TraceSet
+from sysid.yaml_files import parse_yaml
 from tests.advice.looks import Array, codes, finding, look, looks, noise, plant, steps, trace
 
 
@@ -36,6 +43,27 @@ def test_a_sensor_that_is_stuck_is_told_with_its_time() -> None:
     assert (figures["stays"], figures["seconds"]) == (1, 350.0)
     assert figures["samples"] == pytest.approx(60, abs=1)
     assert look(trace(u, y)).find("channel.stuck", "y") is None
+
+
+def test_a_sensor_that_is_stuck_is_masked_by_the_line_that_is_told() -> None:
+    """In the time of the file, and of that case alone where others are recorded at the same time."""
+    u = steps(1500, 11)
+    y = np.round(plant(u) + noise(1500, 11, 0.01), 3)
+    stuck = y.copy()
+    stuck[700:760], stuck[900:940] = y[700], y[900]
+    late = replace(trace(u, stuck, name="run 3"), start_time=40.0)
+    line = said(finding(look(late), "channel.stuck", "y"), {"y": "m"})[1]
+    found = parse_yaml(line.split("under source: ")[1].split(". Where")[0], where="the advice")["repairs"]
+    assert [set(one) for one in found["mask"]] == [{"channel", "start", "stop"}] * 2
+    columns = {"t": late.time, "u": u, "y": stuck}
+    masked = sysid.data(columns, inputs="u", outputs="y", repairs=found).traces[0]
+    hidden = np.flatnonzero(~masked.usable_of(["y"]))
+    assert set(range(701, 760)) | set(range(901, 940)) <= set(hidden) <= set(range(699, 761)) | set(range(899, 941))
+    assert look(trace(u, stuck, usable=masked.usable)).find("channel.stuck", "y") is None
+    other = replace(trace(u, y), start_time=100.0)
+    assert finding(look(late, other), "channel.stuck").reason.count('cases: ["run 3"]') == 2
+    unseen = TraceSet(name="x", traces=(late, other), roles={"run 3": Role.ESTIMATION, "a": Role.VALIDATION})
+    assert finding(advise(unseen, Mapping.parse("u1 -> y")), "channel.stuck").reason.count('cases: ["run 3"]') == 2
 
 
 def test_an_output_at_rest_is_not_stuck() -> None:

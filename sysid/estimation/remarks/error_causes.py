@@ -124,7 +124,7 @@ def _of_lone(error: Array, lone: Mask, usable: Mask, name: str) -> str:
     return (
         f"{int(lone.sum())} lone samples of {name} jump away from their neighbours and back (the first at sample {at} "
         f"of the run), and carry {100 * share:.0f} % of the squared error: the fit bends to them. If they are faults "
-        "of the recording, leave their cells empty and mask them (repairs: {nan: mask})."
+        f"of the recording, mask them (repairs: {{mask: [{{channel: {name}, start: ..., stop: ...}}]}})."
     )
 
 
@@ -141,7 +141,7 @@ def _standing(y: Array, s: Array, usable: Mask) -> str:
             f"{{name}} stands at its {side} value in {100 * len(stands) / usable.sum():.0f} % of the samples, and "
             "the free run goes on moving then: a plant or a sensor at its end, of which the model knows nothing. "
             "Where the plant ends there, fit what has an end (NARX limits: found, HammersteinWiener output: "
-            "saturation, min and max in equations); where only the sensor does, mask these samples."
+            "saturation, min and max in equations); where only the sensor does, mask these samples (repairs: mask)."
         )
     return ""
 

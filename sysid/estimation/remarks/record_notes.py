@@ -120,7 +120,7 @@ def _far_off(name: str, column: NDArray[np.float64]) -> list[str]:
     return [
         f"{int(far.sum())} of {len(column)} samples of {name} lie up to {float(away.max() / (high - low)):.3g} times "
         "the range of all others away from them, and squared errors see nothing else. If they are faults of the "
-        "recording, leave their cells empty and mask them (repairs: {nan: mask})."
+        f"recording, mask them (repairs: {{mask: [{{channel: {name}, start: ..., stop: ...}}]}})."
     ]
 
 

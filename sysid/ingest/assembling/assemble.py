@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError, UserError
+from sysid.ingest.assembling import masks
 from sysid.ingest.assembling import repairs as repair
 from sysid.ingest.assembling.grid import Gridded, fill, grid_places, place, resample
 from sysid.ingest.assembling.in_units import check_units_said, clock_by_its_steps, in_unit, stamps_in_seconds
@@ -48,6 +49,12 @@ class Wanted:
     stop: float | None = None
     fixed: bool = False
     timing: Timing | None = None
+
+    def span(self, stamps: NDArray[np.float64]) -> tuple[float, float]:
+        """The first and the last second that is not cut off, where a stamp may lie a little outside."""
+        fuzz = 1e-9 * self.sample_time + 4.0 * float(np.spacing(np.abs(stamps[np.isfinite(stamps)]).max(initial=0.0)))
+        low = -np.inf if self.start is None else self.start - fuzz
+        return low, np.inf if self.stop is None else self.stop + fuzz
 
     def survey(self, stamps: NDArray[np.float64], *, longest_step: float | None) -> Timing:
         """The survey of stamps; the one that there is where they are all of the file's, in order as they were."""
@@ -122,12 +129,23 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions, repairs: Repair
         files, clock = clock_by_its_steps(table, files, wanted.sample_time)
         notes += [clock] if clock else []
     stamps = stamps_in_seconds(table, files)
+    hidden, masked = masks.hidden(
+        stamps,
+        [one.name for one in wanted.channels],
+        repairs,
+        case=wanted.name,
+        span=wanted.span(stamps),
+        sample_time=wanted.sample_time,
+        source=table.source,
+    )
+    notes += masked
     columns = []
     asked = {one.name: files.columns.get(one.name, ColumnOptions(column=one.name)) for one in wanted.channels}
     told = [(table.find(asked[one.name].column), one, asked[one.name]) for one in wanted.channels]
     check_units_said(told, files, table.source)
-    for told_by, channel, given in told:
-        column, mark = repair.marks(table, told_by, repairs)
+    for (told_by, channel, given), cells in zip(told, hidden.T, strict=True):
+        seen = replace(told_by, values=np.where(cells, np.nan, told_by.values)) if cells.any() else told_by
+        column, mark = repair.marks(table, seen, repairs)
         values, note = in_unit(column, channel, given, files, table.source)
         columns.append(values)
         notes += [one for one in (mark, note) if one]
@@ -136,7 +154,7 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions, repairs: Repair
         stamps=stamps,
         names=tuple(channel.name for channel in wanted.channels),
         values=np.column_stack(columns),
-        marked=_marked(table, names),
+        marked=_marked(table, names) | hidden,
         notes=tuple(notes),
     )
 
@@ -175,9 +193,7 @@ def _check_names(channels: Sequence[Channel], files: FileOptions, source: Path) 
 def _cut(record: Record, wanted: Wanted) -> Record:
     if wanted.start is None and wanted.stop is None:
         return record
-    fuzz = 1e-9 * wanted.sample_time + 4.0 * np.spacing(np.abs(record.stamps).max())
-    low = -np.inf if wanted.start is None else wanted.start - fuzz
-    high = np.inf if wanted.stop is None else wanted.stop + fuzz
+    low, high = wanted.span(record.stamps)
     keep = (record.stamps >= low) & (record.stamps <= high)
     if not keep.any():
         raise TraceError(

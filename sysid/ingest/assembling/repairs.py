@@ -51,10 +51,11 @@ def missing_values(record: Record, repairs: RepairOptions) -> Record:
     """Values that are empty, NaN or infinite.
 
     Args:
-        record: Samples whose stamps rise.
+        record: Samples whose stamps rise. What is missing and marked was masked: it needs no other repair.
         repairs: ``nan: interpolate`` puts them on the line between their neighbours in time; ``nan: hold`` takes the
             value before; ``nan: mask`` interpolates (or holds, at the ends) and marks the samples as not usable.
-            Before a first value there is none to hold: those samples take the first and are marked.
+            Before a first value there is none to hold: those samples take the first and are marked. What would come
+            from a masked value is marked too.
 
     Returns:
         Samples with finite values.
@@ -70,28 +71,47 @@ def missing_values(record: Record, repairs: RepairOptions) -> Record:
         return record
     values, marked = record.values.copy(), record.marked.copy()
     for column, name in enumerate(record.names):
-        missing = bad[:, column]
+        missing, masked = bad[:, column], record.marked[:, column]
         if not missing.any():
             continue
         repair = repairs.nan.get(name) if isinstance(repairs.nan, dict) else repairs.nan
         _check_missing(record, missing, name, repair)
-        known = np.flatnonzero(~missing)
+        known, rest = np.flatnonzero(~missing), missing & ~masked
         if repair == "hold":
             before = np.searchsorted(known, np.flatnonzero(missing), side="right") - 1
             values[missing, column] = values[known[np.maximum(before, 0)], column]
             marked[: known[0], column] = True
         else:
             values[missing, column] = np.interp(record.stamps[missing], record.stamps[known], values[known, column])
-        if repair == "mask":
-            marked[:, column] |= missing
-        first = int(np.flatnonzero(missing)[0])
-        done = {"interpolate": "interpolated", "hold": "as before", "mask": "filled and masked"}[repair or "mask"]
-        early = f", {known[0]} before the first value masked" if repair == "hold" and known[0] else ""
-        record = record.noted(
-            f"{name}: {int(missing.sum())} missing values {done}{early}, first at {record.at(first)}, "
-            f"longest run {_longest_run(missing)}"
-        )
+        marked[:, column] |= rest if repair == "mask" else _beside(rest, masked, both=repair != "hold")
+        if rest.any():
+            record = record.noted(f"{name}: {_told(record, rest, int(known[0]), repair)}")
     return replace(record, values=values, marked=marked)
+
+
+def _beside(missing: NDArray[np.bool_], masked: NDArray[np.bool_], *, both: bool) -> NDArray[np.bool_]:
+    """What is missing and would be filled from masked samples: those before it, or on both sides."""
+    if not masked.any():
+        return masked
+    given, at = np.flatnonzero(~missing), np.flatnonzero(missing)
+    after = np.searchsorted(given, at)
+    unsure = masked[given[np.maximum(after - 1, 0)]]
+    if both:
+        unsure |= masked[given[np.minimum(after, len(given) - 1)]]
+    out = np.zeros(len(missing), dtype=np.bool_)
+    out[at] = unsure
+    return out
+
+
+def _told(record: Record, missing: NDArray[np.bool_], known: int, repair: str | None) -> str:
+    """What was done about missing values, the first value that is known being that sample."""
+    done = {"interpolate": "interpolated", "hold": "as before", "mask": "filled and masked"}[repair or "mask"]
+    early = f", {known} before the first value masked" if repair == "hold" and known else ""
+    first = int(np.flatnonzero(missing)[0])
+    return (
+        f"{int(missing.sum())} missing values {done}{early}, first at {record.at(first)}, "
+        f"longest run {_longest_run(missing)}"
+    )
 
 
 def repeated_values(record: Record, repairs: RepairOptions) -> Record:
@@ -164,8 +184,16 @@ def _check_names(record: Record, repairs: RepairOptions) -> None:
 
 
 def _check_missing(record: Record, missing: NDArray[np.bool_], name: str, repair: str | None) -> None:
-    first = int(np.flatnonzero(missing)[0])
-    got = record.values[first, record.names.index(name)]
+    at = record.names.index(name)
+    masked = record.marked[:, at] & missing
+    if missing.all() and masked.any():
+        raise TraceError(
+            "a mask leaves a channel no value",
+            where=f"{record.table.source}, channel {name}",
+            expected="stretches of repairs.mask that leave samples",
+            got=f"{int(masked.sum())} of {len(missing)} samples masked, none left",
+            remedy="correct start and stop in repairs.mask, or leave the channel or the case out",
+        )
     if missing.all():
         raise TraceError(
             "a channel has no values at all",
@@ -174,21 +202,23 @@ def _check_missing(record: Record, missing: NDArray[np.bool_], name: str, repair
             got="only empty cells or NaN",
             remedy="choose another column, or leave the channel out",
         )
-    if repair is None:
+    missing = missing & ~masked
+    if repair is None and missing.any():
+        first = int(np.flatnonzero(missing)[0])
         raise TraceError(
             "a value is missing" if missing.sum() == 1 else f"{int(missing.sum())} values are missing",
             where=record.where(first, name),
             expected="a finite number in each sample",
-            got=got,
+            got=record.values[first, at],
             remedy="ask for repairs: {nan: interpolate}, {nan: hold} (a blank means: as before) or {nan: mask}",
         )
     if repair == "interpolate" and (missing[0] or missing[-1]):
-        at = 0 if missing[0] else len(missing) - 1
+        end = 0 if missing[0] else len(missing) - 1
         raise TraceError(
             "a value at the end of a record cannot be interpolated",
-            where=record.where(at, name),
+            where=record.where(end, name),
             expected="a finite number in the first and the last sample",
-            got=record.values[at, record.names.index(name)],
+            got=record.values[end, at],
             remedy="cut the record by start and stop, or ask for repairs: {nan: mask}",
         )
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from sysid.content import content_folders, nearest_name, unique_folders
 from sysid.errors import ConfigError, SysidError, near_words
 from sysid.ingest.assembling.assemble import Wanted, assemble, round_channels
+from sysid.ingest.assembling.masks import check_masks
 from sysid.ingest.datasets.cache import TraceCache, content_key, default_cache_folder
 from sysid.ingest.datasets.description import DatasetDescription, read_description
 from sysid.ingest.datasets.generators import Generator, find_generator
@@ -157,6 +158,10 @@ def load_described(
             traces.append(_generated(description, case, generator, store))
         else:
             traces.append(_read(description, case, path))
+    files = [case for case, said in description.cases.items() if said.recipe is None]
+    read = [trace for trace in traces if trace.name in files]
+    if read:
+        check_masks(source.repairs, read, cases=files, where=f"{path}, source", whole=cases is None)
     return TraceSet(
         name=description.name,
         traces=tuple(traces),

@@ -13,6 +13,7 @@ from sysid.errors import ChannelError, ConfigError, shortened
 from sysid.field_checks import check
 from sysid.ingest.assembling.assemble import Wanted, assemble
 from sysid.ingest.assembling.in_units import stamps_in_seconds
+from sysid.ingest.assembling.masks import check_masks
 from sysid.ingest.assembling.timing import survey
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.memory.experiments import columns_of, experiments_of
@@ -41,7 +42,7 @@ def data(
     sample_time: float | datetime.timedelta | None = None,
     units: Mapping[str, str] | Sequence[str] | str | None = None,
     split: Split = None,
-    repairs: Mapping[str, str] | None = None,
+    repairs: Mapping[str, Any] | None = None,
     grid: Mapping[str, Any] | None = None,
     name: str = "data",
 ) -> TraceSet:
@@ -64,7 +65,8 @@ def data(
             chosen by, only scored), spans of seconds or durations by role (``{"estimation": (0, 60), "validation":
             (60, None)}``), the name of a column that holds the role of each sample, or a role for each experiment, in
             their order or by name. All is for estimation where nothing is said.
-        repairs: As in a data set's ``source.repairs``: ``{"nan": "mask"}``, ``{"gaps": "linear"}`` ...
+        repairs: As in a data set's ``source.repairs``: ``{"nan": "mask"}``, ``{"gaps": "linear"}``, ``{"mask":
+            [{"channel": "y", "start": 12.5, "stop": 14.0}]}`` ...; the cases of a mask are names of experiments.
         grid: As in a data set's ``source.grid``: ``{"method": "linear"}`` ...
         name: Name of the data set.
 
@@ -118,6 +120,8 @@ def data(
             grid=gridded,
         )
         whole.append(trace)
+    if whole:
+        check_masks(repaired, whole, cases=[trace.name for trace in whole], where=name)
     return split_traces(tuple(whole), split, marks, name=name)
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
+from datetime import date
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from sysid.field_checks import FieldError
@@ -260,6 +262,84 @@ class GridOptions(Options):
 NanRepair = Literal["interpolate", "hold", "mask"]
 
 
+def _seconds_only(value: Any) -> Any:
+    if isinstance(value, date | str):
+        raise FieldError(
+            "the ends of a masked stretch are seconds",
+            expected="a number: seconds in the file's own time; calendar time counts from the first row",
+            got=str(value),
+            remedy="write how many seconds after the first row it is",
+        )
+    return value
+
+
+Seconds = Annotated[float, BeforeValidator(_seconds_only, json_schema_input_type=float)]
+
+
+class MaskOptions(Options):
+    """A stretch of time in which a sensor was stuck, saturated or disturbed: its samples do not count.
+
+    Args:
+        channel: The channel; all of them where none is named.
+        start: Seconds, in the file's time: its first sample; from the first one on where it is left out.
+        stop: Seconds, in the file's time: its last sample; up to the last one where it is left out.
+        cases: The cases it is for; all of them where none is named.
+    """
+
+    channel: str | None = None
+    start: Seconds | None = None
+    stop: Seconds | None = None
+    cases: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _stretch(self) -> MaskOptions:
+        if self.start is None and self.stop is None:
+            raise FieldError(
+                "a masked stretch has no ends",
+                expected="start, stop, or both",
+                got="neither",
+                remedy="write when it was, in seconds; a channel that is of no use at all is left out of channels",
+            )
+        if self.start is not None and self.stop is not None and self.stop < self.start:
+            raise FieldError(
+                "stop is before start",
+                expected=f"a stop from {self.start:g} s on",
+                got=f"{self.stop:g} s",
+                remedy="correct start or stop; both belong to the stretch",
+            )
+        return self
+
+    def span(self, fuzz: float) -> tuple[float, float]:
+        """Its ends, where a stamp may lie a little outside.
+
+        Args:
+            fuzz: Seconds.
+
+        Returns:
+            The first and the last second; infinite where it has no end.
+        """
+        ends = -np.inf if self.start is None else self.start, np.inf if self.stop is None else self.stop
+        low, high = (4.0 * float(np.spacing(abs(end))) if np.isfinite(end) else 0.0 for end in ends)
+        return ends[0] - fuzz - low, ends[1] + fuzz + high
+
+    @property
+    def told(self) -> str:
+        """Its ends in words."""
+        ends = (("from", self.start), ("to", self.stop))
+        return " ".join(f"{word} {end:.15g} s" for word, end in ends if end is not None)
+
+
+def _one_mask(value: Any) -> Any:
+    return [value] if isinstance(value, dict | MaskOptions) else value
+
+
+Masks = Annotated[
+    tuple[MaskOptions, ...],
+    BeforeValidator(_one_mask, json_schema_input_type=MaskOptions | tuple[MaskOptions, ...]),
+]
+"""Stretches of time; one alone needs no list."""
+
+
 class RepairOptions(Options):
     """The repairs that are asked for; each one that is made is recorded in the trace's provenance.
 
@@ -273,6 +353,8 @@ class RepairOptions(Options):
         nan: ``interpolate`` missing values, ``hold`` the value before (a blank means: as before), or ``mask`` their
             samples as not usable; one for all, or by channel.
         marks: Numbers such as -9999 far outside all else in a column are ``missing`` values, or values to ``accept``.
+        mask: Stretches of time whose cells are emptied and do not count, each with ``start``, ``stop``, or both, in
+            seconds of the file's time: of one ``channel``, of some ``cases``, or of all.
         repeats: ``mask`` the samples of a channel that repeat the value before, by channel: it is measured more slowly
             than it is recorded.
         drift: ``line`` takes the straight line through the samples of a channel off them, by channel; their mean stays.
@@ -287,6 +369,7 @@ class RepairOptions(Options):
     gaps: Literal["linear", "hold", "mask"] | None = None
     nan: NanRepair | dict[str, NanRepair] | None = None
     marks: Literal["missing", "accept"] | None = None
+    mask: Masks | None = None
     repeats: dict[str, Literal["mask"]] | None = None
     drift: dict[str, Literal["line"]] | None = None
     jitter: Literal["resample"] | None = None

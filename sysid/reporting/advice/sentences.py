@@ -59,21 +59,23 @@ SAID: Final[dict[str, Words]] = {
     ),
     "channel.clipped_above": Words(
         "{who} runs into {value:.4g} {unit} and stays there, for {share:.1%} of the samples: a limit above.",
-        "Mask these samples, declare the limit, or use a model that is not linear: a linear one is bent by them.",
+        "Mask these samples (repairs: mask), declare the limit, or use a model that is not linear: a linear one is bent"
+        " by them.",
     ),
     "channel.clipped_below": Words(
         "{who} runs into {value:.4g} {unit} and stays there, for {share:.1%} of the samples: a limit below.",
-        "Mask these samples, declare the limit, or use a model that is not linear: a linear one is bent by them.",
+        "Mask these samples (repairs: mask), declare the limit, or use a model that is not linear: a linear one is bent"
+        " by them.",
     ),
     "channel.spikes": Words(
         "Single samples of {who} jump away and back: {count:.0f}, by up to {largest:.3g} {unit}.",
-        "Mask them, or fit with a robust loss: repairs: {{nan: mask}} after they are emptied in the file.",
+        "Mask them (repairs: {{mask: [{{channel: {who}, start: ..., stop: ...}}]}}), or fit with a robust loss.",
     ),
     "channel.stuck": Words(
         "{who}: the output stands exactly still {stays:.0f} times while its inputs move on, longest at {value:.4g}"
         " {unit} from {seconds:.6g} s to {until:.6g} s ({samples:.0f} samples).",
-        "Where the sensor is stuck: empty these cells in the file, and repairs: {{nan: mask}}; or cut the record there"
-        " (start, stop). Where the plant is held (friction, a dead zone): leave them.",
+        "Where the sensor is stuck, write under source: {why}. Where the plant is held (friction, a dead zone): leave"
+        " it.",
     ),
     "channel.held": Words(
         "{who} changes only after {samples:.0f} samples ({seconds:.3g} s): it is measured more slowly than recorded.",

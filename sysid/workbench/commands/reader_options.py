@@ -253,10 +253,17 @@ def _add(given: dict[str, Any], option: ReaderOption, text: str) -> None:
     for part in option.place:
         before = before.get(part, {}) if isinstance(before, dict) else {}
     if isinstance(value, dict) and isinstance(before, dict):
-        value = {**before, **value}
+        value = {**before, **value, **(_more_masks(before, value) if option.place == ("repairs",) else {})}
     elif option.repeated:
         value = [*(before or []), *(value if isinstance(value, list) else [text])]
     _put(given, option.place, value)
+
+
+def _more_masks(before: dict[str, Any], value: dict[str, Any]) -> dict[str, Any]:
+    """The stretches of ``--repairs mask=...`` that is given again: none of them is forgotten."""
+    given = [one["mask"] for one in (before, value) if isinstance(one.get("mask"), list | dict)]
+    each = [part if isinstance(part, list) else [part] for part in given]
+    return {"mask": [*each[0], *each[1]]} if len(each) > 1 else {}
 
 
 def _plain(option: ReaderOption, text: str) -> Any:

@@ -171,6 +171,18 @@ REPAIRED: dict[str, Done] = {
         [0, 1, N - 1],
         "u: 3 missing values filled and masked, first at sample 0 (line 2), longest run 2",
     ),
+    "mask": (
+        {"values": [*range(5), 99, 99, *range(7, N)], "repairs": {"mask": {"channel": "u", "start": 0.5, "stop": 0.6}}},
+        ramp(),
+        [5, 6],
+        "u: 2 samples masked, from 0.5 s to 0.6 s",
+    ),
+    "mask, up to the end": (
+        {"values": [*range(N - 2), 99, -9999], "repairs": {"mask": [{"start": (N - 2) * 0.1}]}},
+        [*range(N - 2), N - 3, N - 3],
+        [N - 2, N - 1],
+        f"all channels: 2 samples masked, from {(N - 2) * 0.1:.15g} s",
+    ),
     "repeats: mask": (
         {"values": [x - x % 3 for x in range(N)], "repairs": {"repeats": {"u": "mask"}}},
         [x - x % 3 for x in range(N)],

@@ -1,0 +1,110 @@
+"""Stretches of time in which channels must not count: their cells are emptied before anything else looks at them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.ingest.tables.options import MaskOptions, RepairOptions
+from sysid.traces import Trace
+
+FUZZ = 1e-6
+"""How far outside of a stretch, in sample times, a stamp still counts as its end: ends are decimal numbers."""
+
+
+def hidden(
+    stamps: NDArray[np.float64],
+    names: Sequence[str],
+    repairs: RepairOptions,
+    *,
+    case: str,
+    span: tuple[float, float],
+    sample_time: float,
+    source: Path,
+) -> tuple[NDArray[np.bool_], list[str]]:
+    """Which cells of a file the stretches of ``repairs: {mask: ...}`` empty.
+
+    Args:
+        stamps: Shape ``(n_rows,)``, seconds; NaN where the file has none.
+        names: The channels.
+        repairs: What was asked for.
+        case: Name of the record.
+        span: What is left of it, in seconds: its ``start`` and ``stop``.
+        sample_time: Seconds.
+        source: The file, for errors.
+
+    Returns:
+        Shape ``(n_rows, n_channels)``, and one sentence for each stretch.
+
+    Raises:
+        ConfigError: If a channel is not there, or a stretch holds no sample of a record that it is for.
+    """
+    cells, notes = np.zeros((len(stamps), len(names)), dtype=np.bool_), []
+    for number, mask in enumerate(repairs.mask or ()):
+        if mask.channel is not None and mask.channel not in names:
+            raise ConfigError.unknown(
+                f"repairs.mask names {mask.channel}, which is not a channel",
+                mask.channel,
+                names,
+                "write the name of a channel, or leave channel out: all of them are masked",
+                where=f"the description of {source}, repairs.mask[{number}]",
+            )
+        if mask.cases and case not in mask.cases:
+            continue
+        low, high = mask.span(FUZZ * sample_time)
+        inside = (stamps >= max(low, span[0])) & (stamps <= min(high, span[1]))
+        left = stamps[(stamps >= span[0]) & (stamps <= span[1])]
+        if not inside.any():
+            if len(left) and (mask.cases or (low <= left.max() and high >= left.min())):
+                raise _empty(mask, number, f"{source}", [(case, float(left.min()), float(left.max()))])
+            continue
+        cells[inside] |= [mask.channel in {None, name} for name in names]
+        notes.append(f"{mask.channel or 'all channels'}: {int(inside.sum())} samples masked, {mask.told}")
+    return cells, notes
+
+
+def check_masks(
+    repairs: RepairOptions, traces: Sequence[Trace], *, cases: Sequence[str], where: str, whole: bool = True
+) -> None:
+    """Refuse a stretch that is for no record at all: of records that are parts of one file it is in one of them.
+
+    Args:
+        repairs: What was asked for.
+        traces: The records.
+        cases: The names that records may have.
+        where: Named in errors.
+        whole: Whether these are all records that there are.
+
+    Raises:
+        ConfigError: If a record is named that is not there, or a stretch lies outside of all of them.
+    """
+    for number, mask in enumerate(repairs.mask or ()):
+        strangers = [case for case in mask.cases if case not in cases]
+        if strangers:
+            raise ConfigError.unknown(
+                f"repairs.mask names the case {strangers[0]}, which is not there",
+                strangers[0],
+                cases,
+                "write names of cases that are read from files, or leave cases out: all of them are masked",
+                where=f"{where}, repairs.mask[{number}]",
+            )
+        low, high = mask.span(FUZZ * traces[0].sample_time)
+        ends = [(one.name, one.start_time, one.start_time + one.sample_time * (len(one) - 1)) for one in traces]
+        if whole and not mask.cases and not any(low <= last and high >= first for _, first, last in ends):
+            raise _empty(mask, number, where, ends)
+
+
+def _empty(mask: MaskOptions, number: int, where: str, ends: Sequence[tuple[str, float, float]]) -> ConfigError:
+    there = "; ".join(f"{name} from {first:.10g} s to {last:.10g} s" for name, first, last in ends[:5])
+    return ConfigError(
+        "a stretch to be masked holds no sample",
+        where=f"{where}, repairs.mask[{number}]",
+        expected=f"a stretch of {there}" + (" ..." if len(ends) > 5 else ""),
+        got=mask.told,
+        remedy="correct start and stop; they are seconds in the file's own time, and calendar time counts from its "
+        "first row" + (", or name the cases it is for" if not mask.cases else ""),
+    )
