@@ -63,14 +63,22 @@ def hidden(
                 raise _empty(mask, number, f"{source}", [(case, float(left.min()), float(left.max()))])
             continue
         cells[inside] |= [mask.channel in {None, name} for name in names]
-        notes.append(f"{mask.channel or 'all channels'}: {int(inside.sum())} samples masked, {mask.told}")
+        before, behind = _sentence(mask)
+        notes.append(f"{before}{int(inside.sum())}{behind}")
     return cells, notes
+
+
+def _sentence(mask: MaskOptions) -> tuple[str, str]:
+    """What is noted of a stretch, before the number of samples and behind it."""
+    return f"{mask.channel or 'all channels'}: ", f" samples masked, {mask.told}"
 
 
 def check_masks(
     repairs: RepairOptions, traces: Sequence[Trace], *, cases: Sequence[str], where: str, whole: bool = True
 ) -> None:
     """Refuse a stretch that is for no record at all: of records that are parts of one file it is in one of them.
+
+    Whether one held samples is read off what was noted: what is left of a record on its grid does not say it.
 
     Args:
         repairs: What was asked for.
@@ -92,9 +100,10 @@ def check_masks(
                 "write names of cases that are read from files, or leave cases out: all of them are masked",
                 where=f"{where}, repairs.mask[{number}]",
             )
-        low, high = mask.span(FUZZ * traces[0].sample_time)
-        ends = [(one.name, one.start_time, one.start_time + one.sample_time * (len(one) - 1)) for one in traces]
-        if whole and not mask.cases and not any(low <= last and high >= first for _, first, last in ends):
+        before, behind = _sentence(mask)
+        told = (note for one in traces for note in one.provenance)
+        if whole and not mask.cases and not any(note.startswith(before) and note.endswith(behind) for note in told):
+            ends = [(one.name, one.start_time, one.start_time + one.sample_time * (len(one) - 1)) for one in traces]
             raise _empty(mask, number, where, ends)
 
 
