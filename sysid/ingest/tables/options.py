@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection
 from datetime import date
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from sysid.field_checks import FieldError
 from sysid.ingest.cells.headers import parse_header
+from sysid.ingest.tables.frames import seconds
 from sysid.ingest.tables.time_columns import is_time_unit
 from sysid.units import Reference
 
@@ -263,14 +264,14 @@ NanRepair = Literal["interpolate", "hold", "mask"]
 
 
 def _seconds_only(value: Any) -> Any:
-    if isinstance(value, date | str):
+    if isinstance(value, date | str | bool):
         raise FieldError(
             "the ends of a masked stretch are seconds",
             expected="a number: seconds in the file's own time; calendar time counts from the first row",
             got=str(value),
-            remedy="write how many seconds after the first row it is",
+            remedy="write a number; of calendar time how many seconds after the first row it is",
         )
-    return value
+    return seconds(value)
 
 
 Seconds = Annotated[float, BeforeValidator(_seconds_only, json_schema_input_type=float)]
@@ -318,9 +319,8 @@ class MaskOptions(Options):
         Returns:
             The first and the last second; infinite where it has no end.
         """
-        ends = -np.inf if self.start is None else self.start, np.inf if self.stop is None else self.stop
-        low, high = (4.0 * float(np.spacing(abs(end))) if np.isfinite(end) else 0.0 for end in ends)
-        return ends[0] - fuzz - low, ends[1] + fuzz + high
+        low = -math.inf if self.start is None else self.start - fuzz - 4.0 * math.ulp(self.start)
+        return low, math.inf if self.stop is None else self.stop + fuzz + 4.0 * math.ulp(self.stop)
 
     @property
     def told(self) -> str:

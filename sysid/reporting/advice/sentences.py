@@ -73,7 +73,7 @@ SAID: Final[dict[str, Words]] = {
     ),
     "channel.stuck": Words(
         "{who}: the output stands exactly still {stays:.0f} times while its inputs move on, longest at {value:.4g}"
-        " {unit} from {seconds:.6g} s to {until:.6g} s ({samples:.0f} samples).",
+        " {unit} from {seconds:.12g} s to {until:.12g} s ({samples:.0f} samples).",
         "Where the sensor is stuck, write under source: {why}. Where the plant is held (friction, a dead zone): leave"
         " it.",
     ),
@@ -90,7 +90,7 @@ SAID: Final[dict[str, Words]] = {
         "The samples between were never measured, and intervals are too narrow: take every {samples:.0f}th sample.",
     ),
     "output.jump": Words(
-        "{who}: at {seconds:.4g} s the level shifts by {size:.3g} {unit}, and no input did it.",
+        "{who}: at {seconds:.10g} s the level shifts by {size:.3g} {unit}, and no input did it.",
         "Cut the record there into two experiments, or add what changed as an input.",
     ),
     "output.drift": Words(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -178,6 +179,7 @@ REFUSED: dict[str, tuple[Any, type[UserError], str]] = {
     "stop before start": ({"start": 2, "stop": 1}, ConfigError, "stop is before start"),
     "no ends": ({"channel": "u"}, ConfigError, "a masked stretch has no ends"),
     "a date": ({"start": "2024-03-05 10:00"}, ConfigError, "(?s)are seconds.*calendar time counts from the first row"),
+    "a truth value": ({"start": True}, ConfigError, "the ends of a masked stretch are seconds"),
     "another word": ({"from": 1}, ConfigError, "unknown field 'from'"),
 }
 
@@ -197,6 +199,13 @@ def test_what_cannot_be_masked_is_refused_by_every_door(
     with pytest.raises(kind, match=message):
         words = [f"--repairs=mask={{{shown}}}"]
         read_trace(tmp_path / "run.csv", name="A", **reading_options(take_options(words, whole=True)[0]))
+
+
+def test_an_end_may_be_a_duration_in_python_and_a_clock_may_count_from_1970() -> None:
+    columns = {"time": 1709632800.0 + 0.1 * np.arange(N), **signals()}
+    ends = {"start": timedelta(seconds=1709632801), "stop": 1709632801.2}
+    trace = sysid.data(columns, inputs="u", outputs="y", repairs={"mask": ends}).traces[0]
+    assert np.flatnonzero(~trace.usable_samples).tolist() == [10, 11, 12]
 
 
 def test_a_resampled_stretch_hides_every_sample_that_it_has_a_part_in() -> None:
