@@ -82,7 +82,7 @@ def test_every_problem_is_told_and_its_repair_proposed(write: Write) -> None:
     )
     assert found.needed.model_dump() == {
         "ragged": "drop", "stamps": "drop", "backward": "sort", "duplicates": "drop",
-        "gaps": "mask", "nan": "mask", "marks": None, "repeats": None, "drift": None, "jitter": "resample",
+        "gaps": "mask", "nan": "mask", "marks": None, "mask": None, "repeats": None, "drift": None, "jitter": "resample",
         "constant": "accept",
     }  # fmt: skip
     trace = proposed(path)["run"]
