@@ -82,8 +82,8 @@ def test_every_problem_is_told_and_its_repair_proposed(write: Write) -> None:
     )
     assert found.needed.model_dump() == {
         "ragged": "drop", "stamps": "drop", "backward": "sort", "duplicates": "drop",
-        "gaps": "mask", "nan": "mask", "marks": None, "mask": None, "repeats": None, "drift": None, "jitter": "resample",
-        "constant": "accept",
+        "gaps": "mask", "nan": "mask", "marks": None, "mask": None, "repeats": None, "drift": None,
+        "jitter": "resample", "constant": "accept",
     }  # fmt: skip
     trace = proposed(path)["run"]
     assert (trace.sample_time, len(trace)) == (1.0, 21)
