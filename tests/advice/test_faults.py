@@ -28,6 +28,8 @@ def test_limits_spikes_jumps_and_drifts() -> None:
     jumped = finding(look(trace(u, y + 1.0 * (np.arange(1500) >= 900))), "output.jump", "y").figures
     assert jumped["size"] == pytest.approx(1.0, abs=0.1)
     assert jumped["seconds"] == pytest.approx(450.0, abs=5.0)
+    late = replace(trace(u, y + 1.0 * (np.arange(1500) >= 900)), start_time=1000.0)
+    assert finding(look(late), "output.jump", "y").figures["seconds"] == 1000.0 + jumped["seconds"]
     drifted = finding(look(trace(u, y + np.linspace(0, 2, 1500))), "output.drift", "y").figures
     assert drifted["size"] == pytest.approx(2.0, abs=0.3)
     coarse = finding(look(trace(u, np.round(y / 0.08) * 0.08)), "channel.resolution", "y").figures
