@@ -13,7 +13,7 @@ from rich.table import Table
 from sysid.atomic import write_bytes
 from sysid.content import nearest_file
 from sysid.errors import ConfigError
-from sysid.ingest import READERS, FileFinding, find_dataset, inspect_file, load_dataset, propose_dataset
+from sysid.ingest import READERS, FileFinding, inspect_file, propose_dataset
 from sysid.ingest.assembling.in_units import stamps_in_seconds
 from sysid.ingest.inspecting.findings import ColumnFinding
 from sysid.ingest.readers.text_source import bare_stem
@@ -64,6 +64,8 @@ def ingest_command(
         )
     if not path.exists() and not _is_name(path):
         raise _no_such(path)
+    from sysid.ingest import find_dataset, load_dataset  # here: a file that is looked into needs none of it
+
     _show_dataset(load_dataset(source), find_dataset(source))
 
 
