@@ -175,7 +175,7 @@ def test_the_bundle_is_downloaded_from_the_fit_that_also_links_to_its_parent(
         page.get_by_role("link", name="bundle", exact=True).click()
     files = opened.value
     files.get_by_text("MODEL_CARD.md").wait_for()
-    files.get_by_text("pump-level-narx-2-2-5-closed.zip").first.click()
+    files.get_by_text("narx-2-2-5-closed-pump-level.zip").first.click()
     download = files.locator("button[data-component-id*=artifactview]").first
     download.wait_for()
     picture("bundle", of=files)
