@@ -11,8 +11,6 @@ import yaml
 
 from sysid.errors import ReaderError, UnitError, UserError
 from sysid.field_checks import check
-from sysid.ingest.datasets.dataset import load_described
-from sysid.ingest.datasets.description import DatasetDescription
 from sysid.ingest.inspecting.findings import FileFinding, listed
 from sysid.ingest.inspecting.inspection import inspect_file
 from sysid.ingest.inspecting.proposal import propose_dataset
@@ -62,6 +60,9 @@ def load_file(path: Path) -> TraceSet:
 
 def _as_proposed(path: Path, error: UserError) -> TraceSet:
     """The traces of the description that would be proposed, but for its repairs."""
+    from sysid.ingest.datasets.dataset import load_described  # here: most files say what they hold
+    from sysid.ingest.datasets.description import DatasetDescription
+
     try:
         found = inspect_file(path)
         # A channel that never changes is no fault of the samples: those that use it say what it is worth.

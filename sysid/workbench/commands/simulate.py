@@ -17,7 +17,7 @@ from sysid.export.flags import Flag
 from sysid.export.inputs import InputOptions, read_inputs
 from sysid.export.reading import read_bundle
 from sysid.export.simulation import Simulation, simulate_bundle
-from sysid.ingest import find_dataset, load_dataset, write_trace
+from sysid.ingest import write_trace
 from sysid.ingest.reading import is_file_of_traces
 from sysid.models import Start
 from sysid.names import distinct
@@ -136,6 +136,8 @@ def _of_cases(path: Path, cases: Sequence[str]) -> dict[str, Path]:
 
 def _of_dataset(wish: Wish, source: Path) -> list[tuple[Path, Trace]]:
     """The records of a data set, which says itself how they are read."""
+    from sysid.ingest import find_dataset, load_dataset  # here: a file of samples needs none of it
+
     try:
         found = find_dataset(source)
     except ConfigError as error:
