@@ -113,7 +113,7 @@ def fit_narx(
     )
     tasks = _started(multistart, task, seen)
     # A cautious fit is made anew, so that a fit that goes on ends where one in a single run would.
-    raced = [one for one in tasks if not one.cautious] or list(tasks)
+    raced = [one for one in tasks if not one.cautious]
     on_checkpoint(Checkpoint.of(choose(raced, training.choose_by).chosen.solution.state))
     tasks |= _with_ensemble(multistart, list(tasks), experiments, vet)
     choice, tasks = _chosen(multistart, windows, tasks, vet)
@@ -129,7 +129,7 @@ def fit_narx(
     fit = with_note(multistart_result(choice, list(tasks), training, status, seconds, left=left), windows)
     # All of them have the template's limits.
     held = (told(template.between, mapping.output, template.output_unit),) if template.limits else ()
-    twice = cautious.told(list(tasks), chosen, tasks[chosen].provider.n_samples)
+    twice = cautious.told(choice, list(tasks), tasks[chosen].provider.n_samples)
     return replace(fit, posterior=posterior, notes=(*fit.notes, *twice, *held))
 
 

@@ -62,7 +62,8 @@ def test_a_short_noisy_record_is_not_learnt_by_heart(seed: int, monkeypatch: pyt
     fit = fit_narx([record], MAPPING, LARGE, training)
     (chosen,) = (one for one in fit.attempts if one.chosen)
     assert chosen.cautious
-    assert any("The record is short: 500 samples for 109 parameters." in note for note in fit.notes)
+    (told,) = (note for note in fit.notes if "The record is short: 500 samples for 109 parameters." in note)
+    assert "it was taken, since the smaller error of the other does not pay for the parameters" in told
     assert off(fit, after) < 0.12
     monkeypatch.setattr(multistart, "SHORT", 0.0)
     once = fit_narx([record], MAPPING, LARGE, training)
@@ -70,15 +71,16 @@ def test_a_short_noisy_record_is_not_learnt_by_heart(seed: int, monkeypatch: pyt
     assert off(once, after) > 3.0 * off(fit, after)
 
 
-def test_it_is_not_taken_where_the_other_follows_a_record_without_noise():
+def test_a_record_without_noise_is_followed_whichever_of_both_is_taken():
     rng = np.random.default_rng(0)
     u, y = np.repeat(rng.uniform(-1.0, 1.0, 30), 10), np.zeros(300)
     for k in range(1, 300):
         y[k] = 0.9 * y[k - 1] + 0.2 * np.tanh(2.0 * u[k - 1])
     fit = fit_narx([trace_of({"u": u, "y": y})], MAPPING, LARGE, Training(max_iterations=60))
-    others = [one.estimation_mse for one in fit.attempts if not one.cautious]
     (chosen,) = (one for one in fit.attempts if one.chosen)
-    assert chosen.estimation_mse <= 4.0 * min(others)
+    assert {one.cautious for one in fit.attempts} == {False, True}
+    assert chosen.estimation_mse <= 4.0 * min(one.estimation_mse for one in fit.attempts)
+    assert chosen.estimation_mse < 1e-4 * np.var(y)
 
 
 @pytest.mark.parametrize(
@@ -110,6 +112,17 @@ def test_selection_traces_choose_between_both():
     (chosen,) = (one for one in fit.attempts if one.chosen)
     assert len({one.cautious for one in fit.attempts}) == 2
     assert chosen.selection_mse == min(one.selection_mse for one in fit.attempts)
+    (told,) = (note for note in fit.notes if "cautious" in note)
+    assert ("it was taken, by its error on the selection traces" in told) == chosen.cautious
+
+
+def test_starts_that_a_cautious_fit_outdid_are_ranked_by_the_evidence_and_it_is_not():
+    fit = fit_narx([recorded(6)[0]], MAPPING, LARGE, Training(max_iterations=100, starts=2))
+    (chosen,) = (one for one in fit.attempts if one.chosen)
+    assert chosen.cautious
+    assert chosen.log_evidence < max(one.log_evidence for one in fit.attempts)
+    looks = len(fit.attempts) - 1
+    assert f"Ranked by the largest evidence among 2 starts looked at {looks} times." in fit.notes
 
 
 @pytest.mark.parametrize(

@@ -26,8 +26,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sysid.estimation.networks.starts.choosing import rank
+from sysid.estimation.networks.starts.choosing import Choice, rank
 from sysid.estimation.networks.starts.multistart import Candidate, Multistart, Place
+
+TINY = 1e-300
+"""A loss in the place of none."""
 
 
 def begun(multistart: Multistart, seen: Sequence[Candidate]) -> tuple[Multistart, int] | None:
@@ -40,17 +43,11 @@ def begun(multistart: Multistart, seen: Sequence[Candidate]) -> tuple[Multistart
     Returns:
         Both; ``None`` where none is wanted: the record is long enough, or the fit goes on from a given one.
     """
-    best = min(seen, key=lambda one: rank(one, multistart.training.choose_by))
-    if not multistart.twice or best.seed is None or multistart.stop.is_set() or multistart.left("") <= 0.0:
+    if not multistart.twice or multistart.stop.is_set() or multistart.left("") <= 0.0:
         return None
-    done = float(sum(multistart.iterations.values()))
-    own = replace(
-        multistart,
-        cautious=True,
-        resume=None,
-        name=f"{multistart.name}cautious ",
-        iterations={-1: round(done)},
-    )
+    best = min(seen, key=lambda one: rank(one, multistart.training.choose_by))
+    done = {-1: sum(multistart.iterations.values())}
+    own = replace(multistart, cautious=True, resume=None, name=f"{multistart.name}cautious ", iterations=done)
     return own, best.number
 
 
@@ -70,25 +67,25 @@ def placed(cautious: Candidate, seen: Sequence[Candidate], n_samples: int) -> Ca
     if ours is None or others is None:
         return replace(cautious, place=Place.LAST)
     independent = max(n_samples / ours.correlation_time, math.e)
-    gained = independent * _log_ratio(cautious.loss, best.loss)
+    gained = independent * (math.log(max(cautious.loss, TINY)) - math.log(max(best.loss, TINY)))
     paid = (others.total_effective_parameters - ours.total_effective_parameters) * math.log(independent)
     return replace(cautious, place=Place.LAST if gained > paid else Place.FIRST)
 
 
-def _log_ratio(one: float, other: float) -> float:
-    """Of two losses, either of which may be zero or none."""
-    if not math.isfinite(one) or not math.isfinite(other):
-        return math.inf if not math.isfinite(one) else -math.inf
-    tiny = 1e-300
-    return math.log(max(one, tiny) / max(other, tiny))
+WHY = {
+    Place.FIRST: "since the smaller error of the other does not pay for the parameters that it has more (their "
+    "evidences count samples differently, and say nothing beside each other)",
+    Place.LAST: "since no other that was looked at has a stable free run",
+}
+"""Why a cautious fit was taken without selection traces, by its place."""
 
 
-def told(candidates: Sequence[Candidate], chosen: Candidate, n_samples: int) -> tuple[str, ...]:
+def told(choice: Choice, candidates: Sequence[Candidate], n_samples: int) -> tuple[str, ...]:
     """What a fit says of it.
 
     Args:
+        choice: The candidate that was chosen.
         candidates: All of them.
-        chosen: The one that was chosen.
         n_samples: Samples that count.
 
     Returns:
@@ -96,9 +93,11 @@ def told(candidates: Sequence[Candidate], chosen: Candidate, n_samples: int) -> 
     """
     if not any(one.cautious for one in candidates):
         return ()
-    taken = "it was taken" if chosen.cautious else "it was not taken"
-    parameters = len(chosen.solution.theta)
+    chosen, end = choice.chosen, "it was not taken"
+    if chosen.cautious:
+        why = "by its error on the selection traces" if choice.by_selection else WHY[chosen.place]
+        end = f"it was taken, {why}"
     return (
-        f"The record is short: {n_samples:,} samples for {parameters} parameters. So a second, cautious fit was made, "
-        f"which counts errors that persist as fewer samples; {taken}.",
+        f"The record is short: {n_samples:,} samples for {len(chosen.solution.theta)} parameters. So a second, "
+        f"cautious fit was made, which counts errors that persist as fewer samples; {end}.",
     )

@@ -68,6 +68,11 @@ class Choice:
     by: str
     refusal: str = NOT_STABLE
 
+    @property
+    def by_selection(self) -> bool:
+        """Whether selection traces chose."""
+        return self.by != "evidence" and bool(np.isfinite(self.chosen.score))
+
 
 def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Network], bool] | None = None) -> Choice:
     """Choose the best candidate, or the best stable one among the best.

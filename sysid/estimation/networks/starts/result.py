@@ -159,13 +159,14 @@ def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[A
 def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
     notes = []
     if training.n_starts > 1:
-        one = min((c for c in candidates if not c.members), key=lambda c: rank(c, choice.by))
-        by_selection = choice.by != "evidence" and np.isfinite(one.score)
+        raced = [c for c in candidates if choice.by_selection or not c.cautious]
+        one = min((c for c in raced if not c.members), key=lambda c: rank(c, choice.by))
         by_evidence = choice.by != "loss" and one.solution.evidence is not None
         how = "the largest evidence" if by_evidence else "the least error on the estimation traces"
-        how = "the least error on the selection traces (geometric mean)" if by_selection else how
+        how = "the least error on the selection traces (geometric mean)" if choice.by_selection else how
         begun = len({one.number for one in candidates if not one.members})
-        notes.append(f"Chosen by {how} among {begun} starts looked at {len(candidates)} times.")
+        taken = "Chosen" if choice.chosen in raced else "Ranked"
+        notes.append(f"{taken} by {how} among {begun} starts looked at {len(raced)} times.")
         if begun < training.n_starts and np.isfinite(training.max_time_s):
             notes.append(
                 f"Of {training.n_starts} starts {begun} had a place in {training.max_time_s:.3g} s, as iterations are "
