@@ -24,13 +24,16 @@ ABOVE = {
 
 
 def __getattr__(name: str) -> Any:
-    """A word of the short way, imported now: ``sysid --help`` loads none of it."""
+    """A word of the short way or a room, imported now: ``sysid --help`` loads none of it."""
     from importlib import import_module
+    from importlib.util import find_spec
 
     api = import_module("sysid.api")
-    if name not in (*api.__all__, *ABOVE):
+    if name in (*api.__all__, *ABOVE):
+        return getattr(import_module(ABOVE[name]) if name in ABOVE else api, name)
+    if name.startswith("_") or find_spec(f"sysid.{name}") is None:
         raise AttributeError(f"module 'sysid' has no attribute {name!r}")
-    return getattr(import_module(ABOVE[name]) if name in ABOVE else api, name)
+    return import_module(f"sysid.{name}")
 
 
 def __dir__() -> list[str]:

@@ -2,6 +2,8 @@
 
 import ast
 import importlib
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -41,3 +43,12 @@ def test_another_name_is_refused_with_those_that_there_are(room: str) -> None:
     package = importlib.import_module(room)
     with pytest.raises(AttributeError, match=f"no public name 'nothing' here; there are .*{package.__all__[0]}"):
         package.__getattr__("nothing")
+
+
+def test_every_room_is_there_once_the_package_is_imported() -> None:
+    """The pages say sysid.validation.figures; whoever typed it was told that there is no such attribute."""
+    asked = "import sysid; print(sysid.validation.figures.__name__, sysid.excitation.PRBS.__name__)"
+    told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert told.stdout.split() == ["figures", "PRBS"]
+    with pytest.raises(AttributeError, match="no attribute 'valdation'"):
+        _ = sysid.valdation

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,11 +13,11 @@ from numpy.typing import NDArray
 
 from sysid.api.abstract_fit import AbstractFit
 from sysid.api.given import TracesLike, traces_of
-from sysid.errors import ChannelError, TraceError, shortened
+from sysid.errors import TraceError, shortened
 from sysid.estimation import FitResult
 from sysid.estimation.records.experiment import Experiment
 from sysid.ingest.memory.run_inputs import inputs_of
-from sysid.ingest.memory.run_records import before_a_run, level_of, measured_of
+from sysid.ingest.memory.run_records import before_a_run, check_past, levels_of, measured_of
 from sysid.models import History, Start
 from sysid.models.blocks.curve_values import curve_values
 from sysid.models.contract.form import unheeded
@@ -115,6 +114,28 @@ class Fit(FitResult, AbstractFit):
                 remedy="give both over the same samples",
             )
         return self.model.predict(inputs, output, self._history(inputs, initial), steps=steps)
+
+    def forecast(self, u: Any, *, initial: tuple[Any, Any] | History) -> NDArray[np.float64]:
+        """What is to be expected after measured samples: the free run, with what is known of the noise carried on.
+
+        Args:
+            u: Inputs to come, as for :meth:`simulate`.
+            initial: The samples before: a pair ``(u, y)``, oldest first, or a history.
+
+        Returns:
+            As :meth:`simulate`. A model without a model of its noise (OE, TF, equations) runs freely from the state
+            that the samples show, and so do networks and ARX, which read their own past output.
+
+        Raises:
+            ChannelError: If an input or an output is missing.
+            ConfigError: If no samples are given.
+            TraceError: If both have not as many samples, or one is missing.
+        """
+        inputs = self._inputs(u)
+        check_past(initial)
+        history = self._history(inputs, initial)
+        assert history is not None  # noqa: S101 - asked before
+        return self.model.forecast(inputs, history)
 
     def for_case(self, name: str) -> Fit:
         """The same fit for one case, where parameters of equations differ by case: its model is a plain one.
@@ -235,18 +256,8 @@ class Fit(FitResult, AbstractFit):
             ends = model.mapping.inputs, model.mapping.outputs, model.ends.units
             before, output = before_a_run(initial, *ends, sample_time=model.sample_time)
             return History(inputs=before, output=output if model.structure.several_outputs else output[:, 0])
-        if not model.structure.several_outputs and not isinstance(initial, Dict):
-            return History.at_rest(inputs=inputs[0], output=level_of(initial))
         names = model.mapping.outputs
-        given = dict(initial) if isinstance(initial, Dict) else dict.fromkeys(names, initial)
-        check_outputs(given, names)
+        given = levels_of(initial, names)
         pairs = zip(names, model.ends.rest_outputs, strict=True)
-        rest = np.array([level_of(given.get(name, level)) for name, level in pairs])
+        rest = np.array([given.get(name, level) for name, level in pairs])
         return History.at_rest(inputs=inputs[0], output=rest if model.structure.several_outputs else float(rest[0]))
-
-
-def check_outputs(given: Iterable[str], names: tuple[str, ...]) -> None:
-    """Refuse names of initial values that are no outputs."""
-    strangers = [name for name in given if name not in names]
-    if strangers:
-        raise ChannelError(strangers, names, where="initial")

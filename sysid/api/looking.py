@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from sysid import advice as room
 from sysid.api.given import TracesLike, traces_of
 from sysid.api.notebook import html_of
+from sysid.api.several import Several, members
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.estimation.nonparametric import impulse, response
@@ -158,18 +159,18 @@ class FrequencyResponse(response.FrequencyResponse):
 
     __repr__ = __str__
 
-    def plot(self, *fits: FitResult) -> Figure:
+    def plot(self, *fits: FitResult | Several) -> Figure:
         """Gain, phase and coherence with 95 % bands, and the responses of linear models over them.
 
         Args:
-            fits: Of the same output; networks are left out, as they have none.
+            fits: Of this output, or of several among which it is; networks are left out, as they have no response.
 
         Returns:
             A figure of matplotlib's.
         """
         from sysid.reporting.figures.response_figure import response_figure
 
-        return response_figure(self, fits)
+        return response_figure(self, [part for one in fits for part in members(one)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

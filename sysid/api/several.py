@@ -23,3 +23,8 @@ class Several(Protocol):
     @property
     def model(self) -> Cascade:
         """All of them as one."""
+
+
+def members(fit: FitResult | Several) -> list[FitResult]:
+    """The fits of one output each, or of all at once, that a fit is made of: of one itself."""
+    return [fit] if isinstance(fit, FitResult) else list(fit.fits.values())

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.api.abstract_fit import AbstractFit
-from sysid.api.fits import Fit, check_outputs
+from sysid.api.fits import Fit
 from sysid.errors import ChannelError
 from sysid.estimation.results.result import Status
-from sysid.ingest.memory.run_records import before_a_run, measured_of
+from sysid.ingest.memory.run_records import before_a_run, check_past, levels_of, measured_of
 from sysid.models import Cascade, Start
 from sysid.traces import TraceSet
+
+if TYPE_CHECKING:
+    from sysid.api.given import TracesLike
+    from sysid.validation.residuals import ResidualAnalysis
+
+Initial = float | Dict[str, float] | tuple[Any, Any] | None
+"""What stands before a run; see :meth:`SystemFit.simulate`."""
 
 TRUSTED_LEAST = (
     Status.UNSTABLE,
@@ -79,13 +86,16 @@ class SystemFit(AbstractFit):
             raise ChannelError([output], self.outputs, where="the outputs of a fit")
         return self.fits[output]
 
-    def simulate(self, u: Any, *, initial: Dict[str, float] | tuple[Any, Any] | None = None) -> NDArray[np.float64]:
+    def simulate(
+        self, u: Any, *, initial: float | Dict[str, float] | tuple[Any, Any] | None = None
+    ) -> NDArray[np.float64]:
         """Free run of all outputs.
 
         Args:
             u: Inputs, as for :meth:`Fit.simulate`, in the order of the first output's mapping.
-            initial: The output that the system has stood at, by name; or a pair ``(u, y)`` of the samples before,
-                oldest first, with a column of ``y`` for each output. The rest values where nothing is said.
+            initial: The levels that the outputs have stood at, by name, or a number for every one; or a pair
+                ``(u, y)`` of the samples before, oldest first, with a column of ``y`` for each output. The rest values
+                where nothing is said.
 
         Returns:
             Shape ``(n_samples, n_outputs)``, in the outputs' units.
@@ -93,9 +103,7 @@ class SystemFit(AbstractFit):
         given = self._begun(initial)
         return np.column_stack([fit.simulate(u, initial=given.get(name)) for name, fit in self.fits.items()])
 
-    def predict(
-        self, y: Any, u: Any, *, steps: int = 1, initial: Dict[str, float] | tuple[Any, Any] | None = None
-    ) -> NDArray[np.float64]:
+    def predict(self, y: Any, u: Any, *, steps: int = 1, initial: Initial = None) -> NDArray[np.float64]:
         """Prediction of all outputs from measured ones; see :meth:`Fit.predict`.
 
         Args:
@@ -116,16 +124,50 @@ class SystemFit(AbstractFit):
         found = [fit.predict(column, u, steps=steps, initial=given.get(name)) for (name, fit), column in runs]
         return np.column_stack(found)
 
-    def _begun(self, initial: Dict[str, float] | tuple[Any, Any] | None) -> Dict[str, Any]:
+    def forecast(self, u: Any, *, initial: tuple[Any, Any]) -> NDArray[np.float64]:
+        """What is to be expected of all outputs after measured samples; see :meth:`Fit.forecast`.
+
+        Args:
+            u: Inputs to come, as for :meth:`Fit.simulate`.
+            initial: The samples before: a pair ``(u, y)``, oldest first, with a column of ``y`` for each output.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``, in the outputs' units.
+        """
+        check_past(initial)
+        given = self._begun(initial)
+        return np.column_stack([fit.forecast(u, initial=given[name]) for name, fit in self.fits.items()])
+
+    def _begun(self, initial: Initial) -> Dict[str, Any]:
         """What stands before the first sample, output by output."""
         if not isinstance(initial, tuple):
-            check_outputs(initial or {}, self.outputs)
-            return initial or {}
+            return levels_of(initial, self.outputs)
         inputs = self[self.outputs[0]].model.mapping.inputs
         before, output = before_a_run(
             initial, inputs, self.outputs, self.model.units, sample_time=self.model.sample_time
         )
         return {name: (before, column) for name, column in zip(self.outputs, output.T, strict=True)}
+
+    def residuals(
+        self, traces: TracesLike | None = None, *, free_run: bool = False, output: str | None = None
+    ) -> ResidualAnalysis:
+        """Are the residuals of an output white, and independent of the inputs? See :meth:`Fit.residuals`.
+
+        Args:
+            traces: The cases; those that the fit was made of by default.
+            free_run: Residuals of the free run in place of those one step ahead.
+            output: Which output.
+
+        Returns:
+            Correlations with their bounds, and the Ljung-Box test.
+
+        Raises:
+            ChannelError: If there is no such output.
+            ConfigError: If none is named.
+        """
+        from sysid.validation.residuals import of_output
+
+        return self[self.outputs[of_output(self.outputs, output)]].residuals(traces, free_run=free_run)
 
     def summary(self) -> str:
         """The summaries of its fits.

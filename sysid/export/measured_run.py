@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError
+from sysid.errors import ConfigError
 from sysid.export.surrogate import Surrogate
-from sysid.ingest.memory.run_records import before_a_run, level_of
+from sysid.ingest.memory.run_records import before_a_run, levels_of
 from sysid.models import AbstractModel, Cascade, History, Start, StartKind, beginning
 
 Initial = float | Dict[str, float] | tuple[Any, Any] | None
@@ -181,11 +181,7 @@ def run_with(surrogate: Surrogate, inputs: NDArray[np.float64], initial: Initial
     names = tuple(port.name for port in surrogate.outputs)
     if isinstance(initial, tuple):
         return _after(surrogate, inputs, initial, names)
-    given = dict(initial) if isinstance(initial, Dict) else {} if initial is None else dict.fromkeys(names, initial)
-    strangers = [name for name in given if name not in names]
-    if strangers:
-        raise ChannelError(strangers, names, where="initial")
-    return surrogate.run_from(inputs, {name: level_of(level) for name, level in given.items()})
+    return surrogate.run_from(inputs, levels_of(initial, names))
 
 
 def _after(

@@ -57,6 +57,52 @@ class LinearView:
         top, bottom = self.B @ powers[: self.B.shape[1]], self.F @ powers[: self.F.shape[1]]
         return np.asarray(dead * top / bottom, dtype=np.complex128)
 
+    def phase(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Phase of the model's own frequency response, with all the turns that it makes from zero frequency on.
+
+        A dead time turns it more than once between the points of any grid, so the turns are counted root by root.
+
+        Args:
+            frequency: In rad/s, shape ``(n_points,)``, in any order.
+
+        Returns:
+            In radians, shape ``(n_points,)``.
+        """
+        if not self.B[0].any():
+            return np.zeros(len(frequency))
+        lowest = 1e-6 * np.pi / self.sample_time
+        w = np.append(np.maximum(frequency, lowest), lowest)
+        with np.errstate(divide="ignore", invalid="ignore"):  # at a pole on the circle
+            wrapped = np.angle(self.responses(w)[0])
+        turned = self._turned(w)
+        quarters = sum(int(np.sum(_at_rest(self._roots(one), self.discrete))) * sign for one, sign in self._factors)
+        begun = 0.5 * np.pi * quarters
+        # Of a negative gain 180 degrees, from which a lag falls, or -180, from which a lead rises.
+        opposite = np.pi if turned[-1] <= begun or quarters else -np.pi
+        away = np.abs(np.angle(np.exp(1j * (wrapped - turned)))) > 0.5 * np.pi
+        turned += opposite if 2 * np.count_nonzero(away) > len(away) else 0.0
+        exact = wrapped + 2.0 * np.pi * np.round((turned - wrapped) / (2.0 * np.pi))
+        return np.where(np.isfinite(exact), exact, turned)[:-1]
+
+    def _turned(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The phase by roots and dead time, up to the sign of the gain; each root's part never leaves a half turn."""
+        w = frequency * self.sample_time
+        lead = int(np.flatnonzero(self.B[0])[0]) if self.discrete else 0
+        turned = -w * (self.delay + lead)
+        for polynomial, sign in self._factors:
+            for root in self._roots(polynomial):
+                turned = turned + sign * _turned_by(root, w, self.discrete)
+        return turned
+
+    @property
+    def _factors(self) -> tuple[tuple[NDArray[np.float64], int], ...]:
+        """Numerator and denominator, and whether their roots turn forward or back."""
+        return (self.B[0], 1), (self.F[0], -1)
+
+    def _roots(self, polynomial: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Roots in the z plane, or in the s plane times the sample time, so that a size says the same in any unit."""
+        return self.roots(polynomial) * (1.0 if self.discrete else self.sample_time)
+
     def roots(self, polynomial: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Roots of a row of ``B`` or ``F`` in the z or the s plane."""
         return np.asarray(np.roots(polynomial if self.discrete else polynomial[::-1]), dtype=np.complex128)
@@ -110,3 +156,18 @@ def _drawn(uncertainty: Uncertainty, ratio: Ratio, seed: int) -> tuple[NDArray[n
     B, rest = draws[:, : len(b)], draws[:, len(b) :]
     parts = (ones, -rest if ratio.past_outputs else rest) if ratio.discrete else (rest, ones)
     return B, np.concatenate(parts, axis=1)
+
+
+def _at_rest(roots: NDArray[np.complex128], discrete: bool) -> NDArray[np.bool_]:
+    """Which roots are those of a sum or of a difference, to within what roots of higher order are known to."""
+    return np.asarray(np.abs(roots - (1.0 if discrete else 0.0)) < 1e-6, dtype=np.bool_)
+
+
+def _turned_by(root: complex, w: NDArray[np.float64], discrete: bool) -> NDArray[np.float64]:
+    """How far a factor with one root has turned between zero frequency and others; of a pair, both together."""
+    root = root if not _at_rest(np.array([root]), discrete)[0] else 1.0 if discrete else 0.0
+    if not discrete:
+        return np.asarray(np.angle(1j * w - root if root.real <= 0.0 else root - 1j * w))
+    if abs(root) <= 1.0:
+        return np.asarray(np.angle(1.0 - root * np.exp(-1j * w)))
+    return np.asarray(np.angle(1.0 - np.exp(1j * w) / root) - w)

@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.errors import TraceError
+from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.models import AbstractModel, Start, beginning
 from sysid.models.contract import gaps
 from sysid.traces import Trace
@@ -154,6 +154,33 @@ class _Record:
     counted: NDArray[np.bool_]
 
 
+def of_output(outputs: tuple[str, ...], output: str | None) -> int:
+    """Which of a model's outputs is meant.
+
+    Args:
+        outputs: All of them.
+        output: Its name; nothing of one alone.
+
+    Returns:
+        Its place.
+
+    Raises:
+        ChannelError: If there is no such output.
+        ConfigError: If none is named, of several.
+    """
+    if output is None and len(outputs) > 1:
+        raise ConfigError(
+            "the residuals are of one output at a time",
+            where="output",
+            expected=f"one of {', '.join(outputs)}",
+            got="none",
+            remedy=f'name it, as in residuals(output="{outputs[0]}")',
+        )
+    if output is not None and output not in outputs:
+        raise ChannelError([output], outputs, where="output")
+    return 0 if output is None else outputs.index(output)
+
+
 def analyse_residuals(
     model: AbstractModel,
     traces: Sequence[Trace],
@@ -180,10 +207,11 @@ def analyse_residuals(
         The analysis.
 
     Raises:
-        ChannelError: If a trace lacks a channel of the mapping.
+        ChannelError: If a trace lacks a channel of the mapping, or the model has no such output.
+        ConfigError: If no output is named, of several.
         TraceError: If there are not more residuals than lags, or a residual is not finite.
     """
-    column = model.mapping.outputs.index(model.mapping.output if output is None else output)
+    column = of_output(model.mapping.outputs, output)
     records = [_record(model, trace, start or Start(), free_run, column) for trace in traces]
     n = sum(int(record.counted.sum()) for record in records)
     if n <= n_lags + 1 or not all(np.isfinite(record.residual).all() for record in records):

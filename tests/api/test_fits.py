@@ -151,6 +151,29 @@ def test_a_level_to_begin_at_is_one_finite_number(fit: sysid.Fit, initial: Any) 
         fit.simulate(U, initial=initial)
 
 
+@pytest.mark.parametrize("initial", [[1.0, 2.0], "a", float("nan")])
+def test_levels_of_several_outputs_are_by_name(system: sysid.SystemFit, initial: Any) -> None:
+    with pytest.raises(ConfigError, match="one finite number") as refused:
+        system.simulate(U, initial=initial)
+    assert "several outputs are a dict by name" in str(refused.value.remedy)
+    with pytest.raises(TraceError, match="no samples before a run") as refused_pair:
+        system.simulate(U, initial=(1.0, 2.0))
+    assert 'initial={"y": ..., "z": ...}' in str(refused_pair.value.remedy)
+    assert_allclose(system.simulate(U, initial=2.0), system.simulate(U, initial={"y": 2.0, "z": 2.0}))
+
+
+@pytest.mark.parametrize("whole", [True, False], ids=["one model", "a model an output"])
+def test_residuals_of_several_outputs_are_asked_for_by_name(system: sysid.SystemFit, whole: bool) -> None:
+    data = system.traces
+    found = sysid.fit(data, "u -> y+z", sysid.LinearStateSpace(states=1)) if whole else system
+    assert found.residuals(output="z").n_samples > 50
+    with pytest.raises(ConfigError, match="one output at a time") as refused:
+        found.residuals()
+    assert 'residuals(output="y")' in str(refused.value.remedy)
+    with pytest.raises(ChannelError, match="missing channel w"):
+        found.residuals(output="w")
+
+
 def test_what_does_not_match_the_model_is_refused(fit: sysid.Fit) -> None:
     with pytest.raises(ConfigError, match="do not match the model"):
         fit.simulate(np.zeros((10, 2)))

@@ -62,6 +62,29 @@ def test_responses_draw_themselves_and_models_over_them() -> None:
         sysid.impulse_response(data, kernel="SE")
 
 
+@pytest.mark.parametrize("whole", [True, False], ids=["one model", "a model an output"])
+def test_a_model_of_several_outputs_is_drawn_over_one_of_them(whole: bool) -> None:
+    """One model of all had been left out, and a fit an output was refused with a traceback."""
+    data = traces(2)
+    fit = sysid.fit(data, "u -> y1+y2", sysid.LinearStateSpace(states=4) if whole else sysid.ARX(na=1, nb=1, nk=2))
+    gain, phase = sysid.frequency_response(data, "u -> y2", resolution=2.0).plot(fit).axes[:2]
+    assert len(gain.lines) == 2 and gain.lines[1].get_ydata()[0] == pytest.approx(2.0, rel=0.1)
+    assert phase.lines[1].get_ydata()[0] == pytest.approx(phase.lines[0].get_ydata()[0], abs=10.0)
+
+
+def test_a_model_is_turned_as_the_response_of_its_own_input() -> None:
+    """By the first input's phase, of -165 degrees here, the second's model was drawn 360 below what was measured."""
+    u = np.random.default_rng(1).standard_normal((4000, 2))
+    leads = u[:, 0] - 0.5 * np.r_[0.0, u[:-1, 0]]
+    lags = np.convolve(u[:, 1], 0.3 * 0.7 ** np.arange(60))[:4000]
+    data = sysid.data((u, -leads - lags), sample_time=1.0)
+    fit = sysid.fit(data, "u1+u2 -> y", sysid.ARX(na=1, nb=3, nk=0))
+    figure = sysid.frequency_response(data, "u1+u2 -> y", frequency=np.linspace(0.3, 3.0, 50)).plot(fit)
+    begun = [[line.get_ydata()[0] for line in place.lines] for place in figure.axes[1:4:2]]
+    np.testing.assert_allclose([measured for measured, _ in begun], [-165.0, 150.0], atol=15.0)
+    np.testing.assert_allclose([drawn for _, drawn in begun], [measured for measured, _ in begun], atol=10.0)
+
+
 def test_an_excitation_is_saved_and_read_again(tmp_path: Path) -> None:
     found = sysid.excite("prbs", samples=63, sample_time=0.1, low=0.0, high=5.0, names=["a", "b"], units=["V", "mm"])
     again = sysid.load(found.save(tmp_path / "u.csv"))

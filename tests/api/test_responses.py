@@ -101,6 +101,35 @@ def test_several_outputs_have_a_column_for_each_pair(traces: sysid.api.TraceSet,
     assert len(fit.poles()) >= 2
 
 
+def test_several_outputs_say_which_pole_is_whose(traces: sysid.api.TraceSet) -> None:
+    """Two poles had both been called u's, and the picture showed the first output's alone."""
+    found = sysid.fit(traces, "u+v -> y1+y2", sysid.OE(nb=1, nf=1, nk=1)).poles()
+    assert [mode.of for mode in found] == ["y1 from u", "y1 from v", "y2 from u", "y2 from v"]
+    assert [place.get_title(loc="left") for place in found.plot().axes] == [mode.of for mode in found]
+    shared = sysid.fit(traces, "u+v -> y1+y2", sysid.ARX(na=1, nb=1, nk=1)).poles()
+    assert list(shared.to_frame()["of"]) == ["y1", "y2"]
+
+
+def test_a_phase_has_the_turns_of_a_dead_time_at_any_frequencies() -> None:
+    u = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, 100), 8)
+    y = signal.lfilter(np.r_[np.zeros(60), 0.1], [1.0, -0.9], u)
+    fit = sysid.fit(sysid.data((u, y), sample_time=1.0), "u -> y", sysid.OE(nb=1, nf=1, nk=60))
+    w = np.array([3.0, 0.1, 1.0])
+    truth = np.degrees(-60.0 * w - np.angle(1.0 - 0.9 * np.exp(-1j * w)))
+    found = fit.bode(frequency=w)
+    np.testing.assert_allclose(found.phase[:, 0], truth, atol=0.1)
+    assert (found.phase_low <= found.phase).all() and (found.phase <= found.phase_high).all()
+    assert fit.bode().phase[-1, 0] == pytest.approx(-180.0 * 60, abs=0.1)
+
+
+def test_a_gain_per_rate_keeps_what_is_divided_by_together() -> None:
+    u = np.repeat([0.0, 1.0, -1.0, 0.5, 0.0], 20)
+    units = {"u": "l/min", "y": "degC"}
+    traces = sysid.data((u, signal.lfilter([0.0, 0.2], [1.0, -0.8], u)), sample_time=T, units=units)
+    fit = sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=1, nk=1))
+    assert "1.00\u00a0degC/(l/min)" in str(fit.step()) and "degC/(l/min)" in str(fit.bode())
+
+
 def test_what_integrates_has_an_infinite_gain_and_does_not_settle() -> None:
     integrator = sysid.fit(
         sysid.data(
@@ -150,5 +179,7 @@ def test_a_time_series_has_poles_and_no_responses(structure: object) -> None:
     assert mode.intervals["time_constant"][0] < -T / math.log(0.8) < mode.intervals["time_constant"][1]
     with pytest.raises(ConfigError, match="no input"):
         series.step()
+    with pytest.raises(ConfigError, match="no input"):
+        series.poles().plot()
     if isinstance(structure, sysid.ARX):
         assert series.model.b == ()

@@ -20,6 +20,7 @@ from sysid.reporting.curves import read_curves
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.linear.computing import bode_of, step_of
+from sysid.reporting.linear_views import linear_views
 from sysid.reporting.parts import Picture
 from sysid.reporting.residuals import read_residuals
 from sysid.reporting.sections.evidence import evidence_sections
@@ -172,7 +173,7 @@ def test_pictures_of_an_arx_model_are_those_of_its_transfer_function() -> None:
         frequency, gain = bode.axes[j].lines[0].get_data()
         expected = np.abs(system[0, j](np.exp(1j * np.asarray(frequency) * fit.model.sample_time)))
         np.testing.assert_allclose(gain, expected, rtol=1e-9)
-    poles = pole_zero_figure(fit.model, fit.uncertainty).axes[0].lines[1].get_xdata()
+    poles = pole_zero_figure(linear_views(fit.model, fit.uncertainty)).axes[0].lines[1].get_xdata()
     np.testing.assert_allclose(np.sort(poles), np.sort(fit.model.poles.real))
     step = step_figure(step_of([(fit.model, fit.uncertainty)], samples=100)).axes[0]
     band = step.collections[0].get_paths()[0].vertices[:, 1]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError
+from sysid.errors import ChannelError, ConfigError, TraceError, shortened
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.memory.arrays import data
 from sysid.ingest.memory.run_inputs import inputs_of
@@ -70,7 +70,7 @@ def before_a_run(
         ConfigError: If columns are not as many as channels, or the rows of both have other labels.
         TraceError: If a sample is missing, or they are not as many.
     """
-    if len(pair) != 2:
+    if len(pair) != 2 or all(np.ndim(part) == 0 and not hasattr(part, "channels") for part in pair):
         raise _not_before(f"{len(pair)} values", outputs)
     before = inputs_of(pair[0], inputs, sample_time=sample_time, units=units, where=BEFORE)
     output = measured_of(pair[1], pair[0], outputs, units, sample_time=sample_time, where=BEFORE)
@@ -85,8 +85,43 @@ def _not_before(got: str, outputs: tuple[str, ...]) -> TraceError:
         where="initial",
         expected=f"a pair (u, y) of as many samples each, y with a column for each of {', '.join(outputs)}",
         got=got,
-        remedy="give both over the same samples: initial=(u_before, y_before)",
+        remedy="give both over the same samples: initial=(u_before, y_before); levels are by name: initial={"
+        + ", ".join(f'"{name}": ...' for name in outputs)
+        + "}",
     )
+
+
+def check_past(initial: Any) -> None:
+    """Refuse what is neither the samples before a run nor a history of them."""
+    if not isinstance(initial, tuple) and not hasattr(initial, "output"):
+        raise ConfigError(
+            "a forecast goes on from measured samples",
+            where="initial",
+            expected="a pair (u, y) of the samples before",
+            got=shortened(initial),
+            remedy="give them, as in initial=(u_before, y_before); simulate() begins at a level, or at rest",
+        )
+
+
+def levels_of(initial: Any, outputs: tuple[str, ...]) -> dict[str, float]:
+    """Levels that outputs have stood at before a run.
+
+    Args:
+        initial: Nothing; a number, which every output has stood at; or numbers by name.
+        outputs: Names of the outputs.
+
+    Returns:
+        The numbers by name, of those outputs of which something is said.
+
+    Raises:
+        ChannelError: If a name is no output's.
+        ConfigError: If a level is not one finite number.
+    """
+    if not isinstance(initial, Mapping):
+        return {} if initial is None else dict.fromkeys(outputs, level_of(initial))
+    if strangers := [name for name in initial if name not in outputs]:
+        raise ChannelError(strangers, outputs, where="initial")
+    return {name: level_of(level) for name, level in initial.items()}
 
 
 def level_of(initial: Any) -> float:

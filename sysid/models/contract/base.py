@@ -326,6 +326,21 @@ class AbstractModel(ABC):
         inputs = input_columns(inputs, self.mapping.inputs)
         return self.recursion.simulate(inputs, history or self._rest(inputs))
 
+    def forecast(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
+        """What is to be expected after measured samples: the free run, with what is known of the noise carried on.
+
+        Args:
+            inputs: As for :meth:`simulate`.
+            history: The samples before the first.
+
+        Returns:
+            As :meth:`simulate`; its sample ``k`` is what :meth:`predict` says ``k`` steps ahead of the last measured.
+
+        Raises:
+            TraceError: If the inputs are no numbers, or not as many as the mapping's.
+        """
+        return self.recursion.forecast(input_columns(inputs, self.mapping.inputs), history)
+
     def predict(
         self,
         inputs: NDArray[np.float64],

@@ -128,6 +128,22 @@ class AbstractForm(ABC):
             TraceError: If the number of inputs is not the model's.
         """
 
+    def forecast(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
+        """What is to be expected after measured samples: the free run, with what is known of the noise carried on.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+            history: The samples before.
+
+        Returns:
+            As :meth:`simulate`, which it is for a form whose noise leaves nothing behind, or stands in its past
+            outputs.
+
+        Raises:
+            TraceError: If the number of inputs is not the model's.
+        """
+        return self.simulate(inputs, history)
+
 
 def unheeded(initial: object, *, model: str) -> ConfigError:
     """Why a run does not begin at an output that was given.

@@ -236,6 +236,12 @@ class StateSpace(AbstractForm):
             X[0] = start
         return self._in_units(X @ self.C.T + scaled @ self.D.T + self.constant)
 
+    def forecast(self, inputs: NDArray[np.float64], history: History) -> NDArray[np.float64]:
+        """The free run from the state that the Kalman filter has after the history; see the base class."""
+        if self.K is None:
+            return self.simulate(inputs, history)
+        return self._in_units(self._run(self._checked(inputs), self._filtered(history)))
+
     def _filtered(self, history: History) -> NDArray[np.float64]:
         """The state after some samples by the Kalman filter, from the one that fits them best."""
         x = self._begun(history)

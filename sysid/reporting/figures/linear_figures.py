@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from sysid.estimation.results.uncertainty import Uncertainty
-from sysid.models import AbstractModel
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
-from sysid.reporting.linear_views import linear_views
+from sysid.reporting.linear_views import LinearView
 from sysid.units import in_unit, per
 
 if TYPE_CHECKING:
@@ -84,18 +83,15 @@ def step_figure(found: StepResponse) -> Figure:
         return figure
 
 
-def pole_zero_figure(model: AbstractModel, uncertainty: Uncertainty | None, *, seed: int = 0) -> Figure:
+def pole_zero_figure(views: Sequence[LinearView]) -> Figure:
     """Poles and zeros of every input, with the cloud of poles that the uncertainty allows.
 
     Args:
-        model: The model.
-        uncertainty: Of its parameters; without it there is no cloud.
-        seed: Of the draws.
+        views: From each input to each output, one or more; without draws there is no cloud.
 
     Returns:
-        One panel per input.
+        One panel a view.
     """
-    views = linear_views(model, uncertainty, seed)
     with styled():
         width, named = max(7.6, 2.2 * len(views)), set[tuple[str, ...]]()
         figure = new_figure(width, min(3.8, width / len(views) + 0.7))

@@ -61,7 +61,7 @@ def response_figure(found: FrequencyResponse, fits: Sequence[FitResult] = ()) ->
             below = figure.add_subplot(grid[1, j], sharex=above)
             _measured(above, below, found, j)
             for number, fit in enumerate(fits):
-                _model(above, below, found, fit, (name, number))
+                _model(above, below, found, fit, (j, number))
             above.set_ylabel(f"gain [{per(found.output_unit, found.input_units[j])}]")
             below.set_ylabel("phase [degrees]")
             above.set_title(name)
@@ -92,11 +92,12 @@ def _measured(above: Axes, below: Axes, found: FrequencyResponse, j: int) -> Non
     below.semilogx(w, phase[seen], color=TARGET)
 
 
-def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, which: tuple[str, int]) -> None:
-    name, number = which
-    if fit.model.mapping.outputs != found.mapping.outputs or not hasattr(fit.model, "ratio"):
-        return
-    views = [view for view in linear_views(fit.model, None) if view.name == name]
+def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, which: tuple[int, int]) -> None:
+    j, number = which
+    ends, pair = fit.model.ends, (found.mapping.inputs[j], found.mapping.output)
+    views = [
+        one for one in linear_views(fit.model, None) if (ends.inputs[one.source], ends.outputs[one.target]) == pair
+    ]
     w = found.frequency[found.frequency > 0.0]
     look = {"color": PALETTE[number % len(PALETTE)], "linestyle": DASHES[number % len(DASHES)]}
     for view in views:
@@ -104,7 +105,7 @@ def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, w
         if not response.any():  # an input that does nothing in the model
             continue
         above.loglog(w, np.abs(response), label=fit.model.label, **look)
-        phase = np.degrees(np.unwrap(np.angle(response)))
-        measured = np.degrees(found.phase[np.isfinite(found.phase[:, 0]), 0]) if len(found.phase) else phase
-        turns = 360.0 * np.round((measured[0] - phase[0]) / 360.0) if len(measured) else 0.0
+        phase, measured = np.degrees(view.phase(w)), np.degrees(found.phase[found.frequency > 0.0, j])
+        seen = np.flatnonzero(np.isfinite(measured))[:1]
+        turns = 360.0 * float(np.round((measured[seen] - phase[seen]) / 360.0).sum())
         below.semilogx(w, phase + turns, **look)

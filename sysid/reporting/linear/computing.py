@@ -10,7 +10,7 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.estimation.estimators import estimator_of
-from sysid.estimation.linear.modes import modes
+from sysid.estimation.linear.modes import Mode, modes
 from sysid.models import AbstractModel
 from sysid.models.converting.to_control import Linear
 from sysid.models.orders.intersample import HELD
@@ -41,7 +41,16 @@ def poles_of(known: Known) -> Poles:
         ConfigError: If a model is not linear.
     """
     check_linear(known)
-    return Poles(modes=tuple(mode for one in known for mode in modes(*one)), models=known)
+    found = [replace(mode, of=_whose(model, mode, known)) for model, sure in known for mode in modes(model, sure)]
+    pairs = [(model, view) for model, sure in known for view in linear_views(model, sure)]
+    views = [replace(view, name=name) for (_, view), name in zip(pairs, _names(pairs)["names"], strict=True)]
+    return Poles(modes=tuple(found), views=tuple(views))
+
+
+def _whose(model: AbstractModel, mode: Mode, known: Known) -> str:
+    """What a pole belongs to: of models side by side, their outputs too."""
+    outputs = ", ".join(model.mapping.outputs) if len(known) > 1 else ""
+    return " from ".join(filter(None, (outputs, mode.of)))
 
 
 def step_of(known: Known, *, samples: int | None = None, seed: int = 0) -> StepResponse:
@@ -103,7 +112,7 @@ def bode_of(known: Known, *, frequency: Any = None, points: int = 200, seed: int
     pairs = _views(known, seed)
     nyquist = np.pi / known[0][0].sample_time
     w = nyquist * np.logspace(-4.0, 0.0, points) if frequency is None else _frequencies(frequency)
-    columns, gains, phases = [], [], []
+    columns, unwrapped, gains, phases = [], [], [], []
     for _, view in pairs:
         with np.errstate(divide="ignore", invalid="ignore"):  # of an integrator at 0 rad/s
             responses = view.responses(w)
@@ -111,7 +120,7 @@ def bode_of(known: Known, *, frequency: Any = None, points: int = 200, seed: int
         columns.append(shown)
         none = np.full((2, len(w)), np.nan)
         gains.append(band(np.abs(drawn)) if len(drawn) else none)
-        phase = np.unwrap(np.angle(shown))
+        unwrapped.append(phase := view.phase(w))
         # By the angle between them: of what is 0 throughout no quotient is a number.
         turned = drawn * np.exp(-1j * np.angle(shown))
         phases.append(np.degrees(band(phase + np.angle(turned))) if len(drawn) else none)
@@ -121,7 +130,8 @@ def bode_of(known: Known, *, frequency: Any = None, points: int = 200, seed: int
         for name, found in bands.items()
         for side, end in enumerate(("low", "high"))
     }
-    return Bode(**_names(pairs), frequency=w, values=np.column_stack(columns), **ends)
+    phase = np.degrees(np.column_stack(unwrapped))
+    return Bode(**_names(pairs), frequency=w, values=np.column_stack(columns), phase=phase, **ends)
 
 
 def _frequencies(given: Any) -> Matrix:
@@ -161,7 +171,7 @@ def _views(known: Known, seed: int) -> list[tuple[AbstractModel, LinearView]]:
             "there is no input to respond to",
             where=", ".join(str(model.mapping) for model, _ in known),
             expected="a model with an input that moves it",
-            remedy="ask for its poles",
+            remedy="print its poles",
         )
     return pairs
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import ConfigError
 from sysid.estimation.linear.modes import Mode
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.extras import need
@@ -18,7 +19,9 @@ from sysid.reporting.linear.step_responses import (
     SETTLED,
     stepinfo,
 )
+from sysid.reporting.linear_views import LinearView
 from sysid.reporting.numbers import number, quantity
+from sysid.units import per
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,7 +128,7 @@ class StepResponse(_Response):
             if not response.any():
                 lines.append(f"{one['name']}: no effect in the model")
                 continue
-            gain = _with_interval(one["gain"], one["gain_low"], one["gain_high"], _over(y, u))
+            gain = _with_interval(one["gain"], one["gain_low"], one["gain_high"], per(y, u))
             said = f"{one['name']}: gain {gain}"
             if np.isfinite(one["settling_time"]):
                 said += (
@@ -147,6 +150,7 @@ class Bode(_Response):
     Args:
         frequency: In rad/s, shape ``(n,)``.
         values: Complex, shape ``(n, n_pairs)``, output unit over input unit.
+        phase: In degrees, with all turns from zero frequency on, those of a dead time too, shape ``(n, n_pairs)``.
         gain_low: Lower ends of 95 % intervals of the gain; NaN where the uncertainty is not known.
         gain_high: Upper ends.
         phase_low: Lower ends of 95 % intervals of the phase in degrees.
@@ -155,6 +159,7 @@ class Bode(_Response):
 
     frequency: Matrix
     values: NDArray[np.complex128]
+    phase: Matrix
     gain_low: Matrix
     gain_high: Matrix
     phase_low: Matrix
@@ -164,11 +169,6 @@ class Bode(_Response):
     def gain(self) -> Matrix:
         """Magnitudes, shape ``(n, n_pairs)``."""
         return np.abs(self.values)
-
-    @property
-    def phase(self) -> Matrix:
-        """Phases in degrees, without jumps, shape ``(n, n_pairs)``."""
-        return np.degrees(np.unwrap(np.angle(self.values), axis=0))
 
     def to_frame(self) -> pd.DataFrame:
         """A row for each pair and frequency.
@@ -198,7 +198,7 @@ class Bode(_Response):
                 lines.append(f"{name}: no effect in the model")
                 continue
             at = int(np.argmax(self.gain[:, k]))
-            peak = _with_interval(self.gain[at, k], self.gain_low[at, k], self.gain_high[at, k], _over(y, u))
+            peak = _with_interval(self.gain[at, k], self.gain_low[at, k], self.gain_high[at, k], per(y, u))
             lines.append(f"{name}: largest gain {peak} at {quantity(float(self.frequency[at]), 'rad/s')}")
         w = self.frequency
         return "\n".join([*lines, f"{len(w)} frequencies from {number(float(w[0]))} to {number(float(w[-1]))} rad/s"])
@@ -212,12 +212,12 @@ class Poles:
 
     Args:
         modes: The slowest first, model by model; each has ``pole``, ``time_constant``, ``natural_frequency``,
-            ``damping`` and their ``intervals``.
-        models: What they are of.
+            ``damping`` and their ``intervals``; ``of`` says which input, and of several models which output, it is of.
+        views: From each input to each output, with the poles that the uncertainty allows.
     """
 
     modes: tuple[Mode, ...]
-    models: Known
+    views: tuple[LinearView, ...]
 
     def __iter__(self) -> Any:
         return iter(self.modes)
@@ -249,14 +249,23 @@ class Poles:
         return pd.DataFrame(rows, columns=["of", "pole", *SAID, *ends])
 
     def plot(self) -> Figure:
-        """Poles and zeros of every input, with the cloud of poles that the uncertainty allows, of the first model.
+        """Poles and zeros of every input, with the cloud of poles that the uncertainty allows.
 
         Returns:
-            A figure of matplotlib's.
+            A figure of matplotlib's, one panel a pair.
+
+        Raises:
+            ConfigError: If there is no input, and so no zero and no panel.
         """
         from sysid.reporting.figures.linear_figures import pole_zero_figure
 
-        return pole_zero_figure(*self.models[0])
+        if not self.views:
+            raise ConfigError(
+                "there is no input, and so nothing to draw by input",
+                expected="a model with an input that moves it",
+                remedy="print the poles, or have them as numbers: to_frame()",
+            )
+        return pole_zero_figure(self.views)
 
     def __str__(self) -> str:
         return "\n".join(map(_said, self.modes)) or "no poles: the output is a sum of past inputs"
@@ -289,7 +298,3 @@ def _said(mode: Mode) -> str:
 def _with_interval(value: float, low: float, high: float, unit: str) -> str:
     ends = f" (95 %: {number(low)} to {number(high)})" if np.isfinite(low) and np.isfinite(high) else ""
     return f"{quantity(value, unit)}{ends}"
-
-
-def _over(y: str, u: str) -> str:
-    return y if u == "1" else f"{y}/{u}"

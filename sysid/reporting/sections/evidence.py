@@ -165,7 +165,7 @@ def _responses(folder: Path, fit: FitRecord) -> list[Part]:
             f"step-{name}",
         ),
         picture(
-            pole_zero_figure(model, uncertainty),
+            pole_zero_figure(linear_views(model, uncertainty)),
             f"Poles and zeros of {fit.name}",
             f"{fit.name}: poles (crosses) and zeros (circles) by input. Grey: poles of models drawn from the "
             "distribution of the parameters. What lies far outside the unit circle is counted in the legend.",

@@ -15,6 +15,7 @@ from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.linear.computing import bode_of, step_of
 from sysid.reporting.linear.step_responses import band, filter_step
+from sysid.reporting.linear_views import linear_views
 from sysid.reporting.sections.modes_table import modes_table
 from tests.estimation.linear_systems import steps, trace_of
 
@@ -49,7 +50,7 @@ def test_noise_widens_the_cloud_of_poles() -> None:
     spreads = []
     for noise in (0.01, 1.0):
         fit = fitted(noise, "discrete")
-        axes = pole_zero_figure(fit.model, fit.uncertainty).axes[0]
+        axes = pole_zero_figure(linear_views(fit.model, fit.uncertainty)).axes[0]
         cloud = axes.lines[0].get_xydata()
         spreads.append(np.std(np.abs(cloud[:, 0] + 1j * cloud[:, 1])))
         np.testing.assert_allclose(np.sort(axes.lines[1].get_xdata()), np.sort(fit.model.poles(0).real))
@@ -87,7 +88,7 @@ def test_a_zero_far_off_is_counted_and_does_not_shrink_the_circle() -> None:
     fit = fitted(0.01, "discrete")
     far = dataclasses.replace(fit.model, taps=tuple(np.array([0.01, 1.0]) for _ in fit.model.taps))
     assert np.abs(far.zeros(0)).max() > 1.5
-    axes = pole_zero_figure(far, None).axes[0]
+    axes = pole_zero_figure(linear_views(far, None)).axes[0]
     assert axes.get_xlim() == (-1.5, 1.5)
     assert "zeros (1 outside)" in [text.get_text() for text in axes.get_legend().get_texts()]
 
@@ -108,7 +109,7 @@ def test_poles_have_named_axes_and_narrow_panels_one_legend() -> None:
     u = steps(400, 3, rng)
     y = signal.lfilter([0.0, 0.3], [1.0, -0.7], u.sum(axis=1)) + 0.01 * rng.normal(size=400)
     fit = sysid.fit(sysid.data((u, y), sample_time=1.0), "u1+u2+u3 -> y", sysid.ARX(na=1, nb=1, nk=1))
-    figure = pole_zero_figure(fit.model, fit.uncertainty)
+    figure = pole_zero_figure(linear_views(fit.model, fit.uncertainty))
     assert {axes.get_xlabel() for axes in figure.axes} == {"real part"}
     assert figure.axes[0].get_ylabel() == "imaginary part"
     assert [axes.get_legend() is not None for axes in figure.axes] == [True, *[False] * (len(figure.axes) - 1)]
