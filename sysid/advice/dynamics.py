@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sysid.advice.finding import Finding, Topic, Verdict
 from sysid.advice.record import BARELY, Record, stacked
-from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
+from sysid.estimation.nonparametric.impulse_response import ImpulseResponse, settled
 
 INTEGRATES = "settling.integrates"
 """Of a plant whose output stays wherever it is left."""
@@ -112,8 +112,7 @@ def _dead_time(found: ImpulseResponse, j: int, name: str) -> Finding:
 
 def _settling(record: Record, whole: ImpulseResponse, j: int, name: str) -> Finding:
     step, deviation = whole.step()
-    settled = whole.settling()[j]
-    seconds = settled * whole.sample_time
+    seconds = whole.settling()[j] * whole.sample_time
     total = sum(map(len, record.segments)) * record.sample_time
     figures = {
         "samples": seconds / record.sample_time,
@@ -128,7 +127,7 @@ def _settling(record: Record, whole: ImpulseResponse, j: int, name: str) -> Find
         code, verdict = INTEGRATES, Verdict.NOTE
     elif whole.explained < BARELY:
         code, verdict = "settling.unknown", Verdict.UNKNOWN
-    elif not whole.settled or record.lasts:
+    elif not settled(whole.values[j]) or record.lasts:
         code, verdict = "settling.never", Verdict.LOOK
     elif figures["length"] < 10.0:
         code, verdict = "settling.short_record", Verdict.LOOK

@@ -40,6 +40,18 @@ def test_a_good_linear_record_has_nothing_to_look_at(seed: int) -> None:
     assert not any(isinstance(one.structure, NARX) for one in found.suggestions)
 
 
+def test_an_input_settles_beside_one_that_does_not() -> None:
+    """Beside a slow one every input had been said not to settle."""
+    slow, quick = np.cumsum(noise(1200, 3, 0.2)) + steps(1200, 4), (noise(1200, 5, 1.0) > 1.5).astype(float)
+    other = steps(1200, 6)
+    y = lfilter([0.0, 0.033], [1.0, -0.967], slow) + lfilter([0.0, -1.5], [1.0, -0.6], quick)
+    y += lfilter([0.0, 0.26], [1.0, -0.88], other) + noise(1200, 7, 0.05)
+    found = look(trace(np.column_stack([slow, quick, other]), y), mapping="u1+u2+u3 -> y")
+    assert finding(found, "settling.never", "u1").verdict is Verdict.LOOK
+    assert finding(found, "settling", "u2").figures["gain"] == pytest.approx(-3.75, rel=0.05)
+    assert finding(found, "settling", "u3").figures["gain"] == pytest.approx(0.26 / 0.12, rel=0.05)
+
+
 def test_it_is_the_same_every_time() -> None:
     u = steps(600, 1)
     a = trace(u, plant(u) + noise(600, 1, 0.05))

@@ -65,3 +65,11 @@ def test_one_stands_alone_and_not_at_the_end_of_a_number() -> None:
         topic=Topic.DYNAMICS, code="settling.short_record", verdict=Verdict.LOOK, subject=("u",), figures=figures
     )
     assert "only 5.1 times that" in said(one, {"u": "1"})[0]
+
+
+def test_powers_of_ten_are_written_as_people_read_them() -> None:
+    """A sample time of an hour was 3.6e+03 s, and one of a nanosecond 1e-09 s."""
+    for seconds, text in ((3600.0, "(3600 s)"), (1e-9, "(1\u00a0×\u00a010⁻⁹ s)"), (0.25, "(0.25 s)")):
+        figures = {"best": 1.0, "seconds": seconds, "visible": 1.0}
+        one = Finding(topic=Topic.DYNAMICS, code="dead_time", verdict=Verdict.FINE, subject=("u",), figures=figures)
+        assert text in said(one, {"u": "1"})[0]

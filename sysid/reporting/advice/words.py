@@ -10,6 +10,7 @@ from sysid.advice import Topic, Verdict
 from sysid.names import visible
 from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.advice.sentences import SAID, Words
+from sysid.reporting.numbers import number
 
 
 class Told(Protocol):
@@ -68,9 +69,17 @@ def said(finding: Told, units: Mapping[str, str]) -> tuple[str, str]:
         "why": finding.reason,
         "code": finding.code,
     }
-    figures = _Figures(dict(finding.figures) | others)
+    figures = _Figures({name: _Number(value) for name, value in finding.figures.items()} | others)
     says = re.sub(r"(?<![\d.])1 (sample|time)s\b", r"1 \1", words.says.format_map(figures))
-    return " ".join(says.split()).replace(" ,", ",").replace(" .", "."), words.do.format_map(figures)
+    return re.sub("[ \n]+", " ", says).strip().replace(" ,", ",").replace(" .", "."), words.do.format_map(figures)
+
+
+class _Number(float):
+    """A figure whose powers of ten are written as people read them: 3600 and 1.00 × 10⁻⁹, not 3.6e+03 and 1e-09."""
+
+    def __format__(self, spec: str) -> str:
+        text = super().__format__(spec)
+        return number(float(self), digits=len(text.split("e")[0].strip("-").replace(".", ""))) if "e" in text else text
 
 
 class _Figures(dict[str, object]):

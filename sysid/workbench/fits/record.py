@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -284,7 +284,7 @@ def _system(name: str, outputs: Sequence[FitReady]) -> dict[str, Any]:
     return {
         "name": name,
         "mapping": str(whole),
-        "label": outputs[0].fit.model.label,
+        "label": _labels(dict.fromkeys(fit.model.label for fit in models.values())),
         "fits": {ready.output: ready.config.name for ready in outputs},
         "models": len(models),
         "n_parameters": sum(fit.model.n_parameters for fit in models.values()),
@@ -300,6 +300,12 @@ def _system(name: str, outputs: Sequence[FitReady]) -> dict[str, Any]:
             for case in cases[0]
         },
     }
+
+
+def _labels(different: Iterable[str]) -> str:
+    """The structures of a whole: models of its outputs may have other dead times, or other orders."""
+    first, *others = different
+    return f"{first} and {others[0]}" if len(others) == 1 else f"{first} and {len(others)} others" if others else first
 
 
 def export_record(entry: Any, folder: str, unit: str, run_times: Sequence[Any] = ()) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from sysid.reporting.sections.training import RELATIVE, error_unit, trained_mode
 from sysid.workbench.cli import run_cli
 from sysid.workbench.fits import table
 from sysid.workbench.fits.config import Pipeline
-from sysid.workbench.fits.record import read_fit
+from sysid.workbench.fits.record import _labels, read_fit
 from sysid.workbench.fits.run import program_of
 from sysid.workbench.fits.table import table_of_fits
 from sysid.workbench.runner import events
@@ -131,6 +131,13 @@ def test_the_whole_is_told_beside_its_outputs(results: Results) -> None:
     assert arx.n_parameters == sum(fits[name].n_parameters or 0 for name in arx.fits.values())
     both = [fits[name].cases["run-3"].free_run.nrmse_fit for name in arx.fits.values()]
     assert arx.cases["run-3"].mean_fit == pytest.approx(np.mean(both))
+
+
+def test_the_structure_of_a_whole_is_that_of_all_its_models() -> None:
+    """Of two transfer functions with dead times of their own the first alone was said to be that of both."""
+    assert _labels(["ARX [1; 1; 1]"]) == "ARX [1; 1; 1]"
+    assert _labels(["TF [1; 0; 1]", "TF [1; 0; 7]"]) == "TF [1; 0; 1] and TF [1; 0; 7]"
+    assert _labels(["TF [1; 0; 1]", "TF [1; 0; 7]", "TF [1; 0; 3]"]) == "TF [1; 0; 1] and 2 others"
 
 
 def test_the_screen_has_the_whole_below_its_outputs(results: Results) -> None:
