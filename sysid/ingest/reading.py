@@ -92,19 +92,50 @@ def read_trace(
         TraceError: If something is wrong with the samples and its repair was not asked for.
         ConfigError: If the options do not fit.
     """
-    path, files = Path(path), files or FileOptions()
-    grid, repairs = grid or GridOptions(), repairs or RepairOptions()
-    table = read_table(path, files=files, repairs=repairs)
+    files, repairs = files or FileOptions(), repairs or RepairOptions()
+    held = [read_table(path, files=files, repairs=repairs)]
+    return trace_of(
+        held, name=name, channels=channels, sample_time=sample_time, files=files, grid=grid, repairs=repairs
+    )
+
+
+def trace_of(
+    held: list[RawTable],
+    *,
+    name: str | None = None,
+    channels: Sequence[Channel] | None = None,
+    sample_time: float | None = None,
+    files: FileOptions | None = None,
+    grid: GridOptions | None = None,
+    repairs: RepairOptions | None = None,
+) -> Trace:
+    """What was read of a file as a trace.
+
+    Args:
+        held: The table alone; it is taken out, as what assembles it lets go of columns that may be large.
+        name: As for :func:`read_trace`, and so on.
+        channels: The same.
+        sample_time: The same.
+        files: The same.
+        grid: The same.
+        repairs: The same.
+
+    Returns:
+        The trace.
+
+    Raises:
+        UserError: As :func:`read_trace`.
+    """
+    files, grid, repairs = files or FileOptions(), grid or GridOptions(), repairs or RepairOptions()
+    path = held[0].source
     changed = repairs.mask or repairs.repeats or repairs.drift
     if name is None and channels is None and sample_time is None and not changed:
-        own = _as_written(table)
+        own = _as_written(held[0])
         if own is not None:
             return own
-    chosen = tuple(channels) if channels is not None else _all_channels(table, files)
-    step, timing = (sample_time, None) if sample_time is not None else _step(table, files, grid)
+    chosen = tuple(channels) if channels is not None else _all_channels(held[0], files)
+    step, timing = (sample_time, None) if sample_time is not None else _step(held[0], files, grid)
     wanted = Wanted(name=name or bare_stem(path), channels=chosen, sample_time=step, timing=timing)
-    held = [table]
-    del table  # given away: what assembles it lets go of columns that it no longer needs, and they may be large
     trace = assemble(held.pop(), wanted, files=files, grid=grid, repairs=repairs)
     check_masks(repairs, [trace], cases=[trace.name], where=str(path))
     return trace

@@ -17,7 +17,7 @@ from sysid.ingest.inspecting.proposal import propose_dataset
 from sysid.ingest.inspecting.second_clocks import without_clocks
 from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file
 from sysid.ingest.readers.text_source import bare_stem
-from sysid.ingest.reading import read_trace
+from sysid.ingest.reading import read_table, trace_of
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
 from sysid.ingest.tables.table import RawTable
 from sysid.traces import Role, TraceSet
@@ -49,17 +49,22 @@ def load_file(path: Path) -> TraceSet:
     """
     with remedies_of_a_file(path):
         try:
-            trace = read_trace(path)
+            held = [read_table(path)]
+            several = bool(held[0].records)
+            others = [f"{column.name} ({len(column.values)} samples)" for column in held[0].others]
+            trace = trace_of(held)
         except UserError as error:
             return _as_proposed(path, error)
+        if several:  # of which the trace is the first, or all of them side by side
+            return _as_proposed(path)
     trace, clocks = without_clocks(trace)
-    if clocks:
-        warnings.warn(f"{path}: left out: {listed(clocks)}", GuessedWarning, stacklevel=3)
+    if left := [*clocks, *others]:
+        warnings.warn(f"{path}: left out: {listed(left)}", GuessedWarning, stacklevel=3)
     return TraceSet(name=bare_stem(path), traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
 
 
-def _as_proposed(path: Path, error: UserError) -> TraceSet:
-    """The traces of the description that would be proposed, but for its repairs."""
+def _as_proposed(path: Path, error: UserError | None = None) -> TraceSet:
+    """The traces of the description that would be proposed, but for its repairs; where that fails, the error."""
     from sysid.ingest.datasets.dataset import load_described  # here: most files say what they hold
     from sysid.ingest.datasets.description import DatasetDescription
 
@@ -68,8 +73,8 @@ def _as_proposed(path: Path, error: UserError) -> TraceSet:
         # A channel that never changes is no fault of the samples: those that use it say what it is worth.
         left = replace(found, needed=RepairOptions(constant=found.needed.constant))
         proposed = yaml.safe_load(propose_dataset(left))
-    except UserError:
-        raise error from None
+    except UserError as also:
+        raise error or also from None
     # What was measured is not lost: a column in which words stand is said to be one, or to be left out, by a person.
     lost = any(column.problem and not column.unit_guessed for column in found.columns)
     if isinstance(error, ReaderError) and (lost or {"states", "missing"} & found.guessed):
@@ -80,7 +85,7 @@ def _as_proposed(path: Path, error: UserError) -> TraceSet:
     try:
         traces = load_described(described, path, cache=False)
     except UserError as also:
-        raise also if isinstance(error, UnitError) else error from None
+        raise also if error is None or isinstance(error, UnitError) else error from None
     if guesses:
         told = f"{_told(path, guesses)}. {proposal_of(path)} writes this down, to be corrected"
         warnings.warn(told, GuessedWarning, stacklevel=4)

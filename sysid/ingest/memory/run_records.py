@@ -70,7 +70,7 @@ def before_a_run(
         ConfigError: If columns are not as many as channels, or the rows of both have other labels.
         TraceError: If a sample is missing, or they are not as many.
     """
-    if len(pair) != 2 or all(np.ndim(part) == 0 and not hasattr(part, "channels") for part in pair):
+    if len(pair) != 2 or all(isinstance(part, int | float | np.number) for part in pair):
         raise _not_before(f"{len(pair)} values", outputs)
     before = inputs_of(pair[0], inputs, sample_time=sample_time, units=units, where=BEFORE)
     output = measured_of(pair[1], pair[0], outputs, units, sample_time=sample_time, where=BEFORE)

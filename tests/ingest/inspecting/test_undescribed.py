@@ -6,13 +6,14 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 import sysid
 from sysid.errors import TraceError
 from sysid.ingest import inspect_file, load_dataset, propose_dataset
-from sysid.ingest.inspecting.undescribed import GuessedWarning
+from sysid.ingest.inspecting.undescribed import GuessedWarning, load_file
 from sysid.traces import Role
 
 Write = Callable[[str, str | bytes], Path]
@@ -116,3 +117,26 @@ def test_simulate_guesses_the_time_of_a_file_and_has_the_models_where_there_is_n
         assert guessed_time(read_table(bare), FileOptions(), sample_time=0.5).time.step == 0.5
     said = write("said.csv", lines("t [s],u", lambda k: f"{k},{k % 7}"))
     assert guessed_time(read_table(said), FileOptions(), sample_time=0.5) == FileOptions()
+
+
+@pytest.mark.parametrize("lengths", [(60, 50, 40), (60, 60, 60)], ids=["of several lengths", "of one length"])
+def test_records_of_a_file_that_says_all_else_are_records_too(tmp_path: Path, lengths: tuple[int, ...]) -> None:
+    """The first had been read alone, in silence, or all of them as channels of one record."""
+    file, rng = tmp_path / "rig.h5", np.random.default_rng(0)
+    with h5py.File(file, "w") as written:
+        for name, n in zip(("run1", "run2", "val"), lengths, strict=True):
+            for column, unit in (("time", "s"), ("u", "V"), ("y", "cm")):
+                values = 0.5 * np.arange(n) if column == "time" else rng.random(n)
+                written.create_dataset(f"{name}/{column}", data=values).attrs["units"] = unit
+    with pytest.warns(GuessedWarning, match=r"3 records: run1 \(60 samples\).*val: validation"):
+        found = load_file(file)
+    assert [(one.name, len(one)) for one in found] == list(zip(("run1", "run2", "val"), lengths, strict=True))
+    assert [channel.label for channel in found.channels] == ["u [V]", "y [cm]"]
+
+
+def test_columns_of_another_length_are_told(tmp_path: Path) -> None:
+    file = tmp_path / "rig.npz"
+    np.savez(file, **{"t [s]": 0.5 * np.arange(60), "u [V]": np.arange(60.0), "y [cm]": np.arange(60.0)}, w=np.ones(7))
+    with pytest.warns(GuessedWarning, match=r"left out: w \(7 samples\)"):
+        found = load_file(file)
+    assert [channel.label for channel in found.channels] == ["u [V]", "y [cm]"]
