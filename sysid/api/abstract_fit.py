@@ -7,6 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import datetime
     from pathlib import Path
 
     from matplotlib.figure import Figure
@@ -35,11 +36,11 @@ class AbstractFit(ABC):
     def summary(self) -> str:
         """What was fitted, as lines of text."""
 
-    def step(self, *, seconds: float | None = None) -> StepResponse:
+    def step(self, *, seconds: float | datetime.timedelta | None = None) -> StepResponse:
         """Its step responses with their intervals; see :func:`sysid.step`.
 
         Args:
-            seconds: Length in s; by default until the slowest pole has settled.
+            seconds: Length in s, or a duration; by default until the slowest pole has settled.
 
         Returns:
             The change of each output after a step of one unit in each input, in its unit, and 95 % intervals.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from sysid.estimation.nonparametric.impulse_response import ImpulseResponse as E
 from sysid.estimation.nonparametric.kernels import Kernel
 from sysid.estimation.nonparametric.spectra import SpectralMethod
 from sysid.excitation import AbstractExcitation, excitation
+from sysid.ingest.tables.frames import length_of_time
 from sysid.ingest.writers import write_trace
 from sysid.models import Mapping
 from sysid.models.orders.typed_fields import plain_values
@@ -358,9 +360,9 @@ def _choice(value: Any, choices: type[Any], what: str) -> Any:
 def excite(
     kind: str | AbstractExcitation,
     *,
-    sample_time: float,
+    sample_time: float | datetime.timedelta,
     samples: int | None = None,
-    duration: float | None = None,
+    duration: float | datetime.timedelta | None = None,
     low: float | Sequence[float] = -1.0,
     high: float | Sequence[float] = 1.0,
     names: str | Sequence[str] = "u",
@@ -373,9 +375,9 @@ def excite(
     Args:
         kind: ``prbs``, ``multisine``, ``noise``, ``chirp``, ``staircase``, ``aprbs``, ``ramps``, ``sine`` or
             ``pulses``; or one with its options, as ``PRBS(clock=4)``.
-        sample_time: Seconds between samples.
+        sample_time: Seconds between samples, or a duration.
         samples: Length, or
-        duration: in seconds.
+        duration: in seconds, or as a duration.
         low: Lower end of the range, one for all channels or one each.
         high: Upper end.
         names: Of the channels.
@@ -394,7 +396,9 @@ def excite(
         >>> found.values.shape, bool(0.0 <= found.values.min() and found.values.max() <= 10.0)
         ((1000, 1), True)
     """
-    numbers = {"sample_time": sample_time, "samples": samples, "duration": duration, "low": low, "high": high}
+    times = {"sample_time": sample_time, "duration": duration}
+    times = {name: length_of_time(value, where=name) for name, value in times.items()}
+    numbers = {**times, "samples": samples, "low": low, "high": high}
     plain = plain_values({**numbers, "seed": seed, **options})
     found = excitation.excite(kind, names=names, units=units, **plain)
     return Excitation(**{field.name: getattr(found, field.name) for field in dataclasses.fields(excitation.Excitation)})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from typing import Any
 
 import numpy as np
@@ -9,18 +10,19 @@ import numpy as np
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.export.own_figures import side_by_side
+from sysid.ingest.tables.frames import length_of_time
 from sysid.models import AbstractModel, Cascade
 from sysid.models.orders.typed_fields import plain_values
 from sysid.reporting.linear.computing import bode_of, check_linear, poles_of, step_of
 from sysid.reporting.linear.responses import Bode, Known, Poles, StepResponse
 
 
-def step(fit: Any, *, seconds: float | None = None) -> StepResponse:
+def step(fit: Any, *, seconds: float | datetime.timedelta | None = None) -> StepResponse:
     """Change of the outputs after a step of one unit in each input, with 95 % intervals.
 
     Args:
         fit: A linear fit, of one output or of several; a bundle or a model, which have no intervals.
-        seconds: Length; by default until the slowest pole has settled.
+        seconds: Length, a number or a duration; by default until the slowest pole has settled.
 
     Returns:
         The responses: printed they say gain, rise time, settling time and overshoot, ``plot()`` draws them,
@@ -34,8 +36,8 @@ def step(fit: Any, *, seconds: float | None = None) -> StepResponse:
     if seconds is None:
         return step_of(known)
     T = known[0][0].sample_time
-    seconds = plain_values(seconds)
-    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not T <= seconds <= LONGEST * T:
+    seconds = float(plain_values(length_of_time(seconds, where="seconds")))
+    if not T <= seconds <= LONGEST * T:
         raise ConfigError(
             "not a length of a step response",
             where="seconds",

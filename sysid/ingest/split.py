@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, shortened
 from sysid.ingest.tables.frames import seconds
 from sysid.traces import Role, Trace, TraceSet
 
@@ -58,6 +58,15 @@ def split_traces(
         parts = _by_name(traces, split) or [part for trace in traces for part in _by_time(trace, split)]
     elif isinstance(split, float | int | np.number):
         parts = _by_share(traces, [float(split)])
+    elif not isinstance(split, Iterable):
+        raise ConfigError(
+            "not a split",
+            where="split",
+            expected="a share, shares, roles, or spans of time by role",
+            got=shortened(split),
+            remedy='write for example split={"estimation": (0, 60), "validation": (60, None)}, in seconds from the '
+            "first sample, or in durations",
+        )
     elif all(isinstance(entry, str | Role) for entry in split):
         parts = _by_experiment(traces, [_word(entry) for entry in split])
     else:

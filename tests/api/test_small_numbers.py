@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import scipy
 from numpy.testing import assert_array_equal
 
 import sysid
+from sysid.errors import ConfigError
 from sysid.sklearn import DynamicRegressor
 
 U = np.repeat(np.random.default_rng(0).integers(0, 120, 30), 10)
@@ -65,3 +67,22 @@ def test_options_are_read_whatever_their_type_and_depth() -> None:
     assert_array_equal(drawn.values, sysid.excite("prbs", samples=60, sample_time=1, low=0, high=200, clock=4).values)
     fit = _fit(U, Y)
     assert repr(sysid.step(fit, seconds=np.int8(20))) == repr(sysid.step(fit, seconds=20))
+
+
+def test_lengths_of_time_may_be_durations_and_are_no_text() -> None:
+    """An experiment of two days was refused with a traceback, and a sample time of "1h" was to be corrected to what?"""
+    hour, day = datetime.timedelta(hours=1), pd.Timedelta(days=1)
+    u = sysid.excite("prbs", duration=2 * day, sample_time=hour)
+    assert (len(u.values), u.plan.sample_time) == (48, 3600.0)
+    traces = sysid.data((np.arange(48.0) % 5, np.arange(48.0) % 7), sample_time=hour)
+    fit = sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=1, nk=1))
+    assert fit.step(seconds=day).time[-1] == 86400.0
+    hours: Any = "1h"
+    for call in (
+        lambda: sysid.excite("prbs", samples=10, sample_time=hours),
+        lambda: sysid.data((np.arange(9.0), np.arange(9.0)), sample_time=hours),
+        lambda: fit.step(seconds=hours),
+    ):
+        with pytest.raises(ConfigError, match="not a length of time") as refused:
+            call()
+        assert "datetime.timedelta(hours=1)" in str(refused.value.remedy)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -99,3 +99,11 @@ def test_a_split_that_cannot_be_meant_is_refused(split: Any) -> None:
 def test_a_column_that_is_not_there_is_refused_by_name() -> None:
     with pytest.raises(ChannelError):
         data({"y": Y}, sample_time=0.1, split="set")
+
+
+@pytest.mark.parametrize("split", [timedelta(hours=50), datetime(2024, 1, 3)])
+def test_one_time_is_no_split(split: Any) -> None:
+    """It had been refused with a traceback."""
+    with pytest.raises(ConfigError, match="not a split") as refused:
+        data((Y, Y), sample_time=60.0, split=split)
+    assert "in durations" in str(refused.value.remedy)

@@ -23,7 +23,7 @@ from sysid.ingest.split import Split, split_traces
 from sysid.ingest.tables.frames import (
     check_distinct,
     check_rows,
-    seconds,
+    length_of_time,
 )
 from sysid.ingest.tables.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.tables.table import RawTable
@@ -97,7 +97,7 @@ def data(
     check_distinct([*(wanted_inputs or ()), *(wanted_outputs or ())], where="inputs and outputs")
     repaired = check(RepairOptions, {"constant": "accept", **_options(repairs, "repairs")}, where="repairs")
     gridded = check(GridOptions, {"fewest_samples": 2, **_options(grid, "grid")}, where="grid")
-    given = seconds(sample_time)
+    given = length_of_time(sample_time, where="sample_time")
     step = None if given is None else check(TimeOptions, {"step": given}, where="sample_time").step
     experiments = experiments_of(values, wanted_inputs if wanted_outputs is None else wanted_outputs)
     whole: list[Trace] = []

@@ -237,6 +237,35 @@ def seconds(value: Any) -> Any:
     return value.total_seconds() if isinstance(value, timedelta) else value
 
 
+def length_of_time(value: Any, *, where: str) -> Any:
+    """Seconds of what somebody gives as a length of time.
+
+    Args:
+        value: As for :func:`seconds`, or nothing.
+        where: What it is, for the error.
+
+    Returns:
+        Seconds, or nothing.
+
+    Raises:
+        ConfigError: If it is neither a number nor a duration.
+
+    Example:
+        >>> length_of_time(timedelta(hours=1), where="sample_time")
+        3600.0
+    """
+    found = seconds(value)
+    if found is None or (isinstance(found, int | float | np.number) and not isinstance(found, bool)):
+        return found
+    raise ConfigError(
+        "not a length of time",
+        where=where,
+        expected="a number of seconds, or a duration",
+        got=shortened(value),
+        remedy=f"write for example {where}=3600, or {where}=datetime.timedelta(hours=1)",
+    )
+
+
 def not_numbers(name: str, array: NDArray[Any], *, where: str) -> ReaderError | None:
     """Why a column that is no number cannot be a channel, and what its owner can do about it in Python.
 
