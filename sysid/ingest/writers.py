@@ -17,7 +17,7 @@ from sysid.extras import need
 from sysid.ingest.cells.headers import parse_header
 from sysid.names import csv_cell
 from sysid.traces import Channel, Trace
-from sysid.units import Reference
+from sysid.units import Reference, plain_unit
 
 
 def write_trace(trace: Trace, path: str | Path) -> Path:
@@ -157,7 +157,8 @@ def _head(trace: Trace) -> str:
 def _check_name(channel: Channel, path: Path) -> None:
     header = parse_header(channel.label)
     reference = header.reference or Reference.NONE
-    readable = (header.name, header.unit, reference) == (channel.name, channel.unit, channel.reference)
+    unit = plain_unit(channel.unit) or channel.unit  # what a header says as people do is read as pint writes it
+    readable = (header.name, header.unit, reference) == (channel.name, unit, channel.reference)
     if not readable or "\r" in channel.name or channel.name in {"time", "usable"}:
         raise UserError(
             "a CSV header cannot hold this channel",

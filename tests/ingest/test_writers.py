@@ -155,3 +155,12 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
         write_csv(TRACE, path)
     assert path.read_bytes() == old
     assert [file.name for file in tmp_path.iterdir()] == ["run.csv"]
+
+
+@pytest.mark.parametrize(("unit", "plain"), [("%", "percent"), ("m3/h", "m^3/h"), ("Deg C", "degC"), ("Volts", "V")])
+def test_a_unit_as_people_write_it_is_written_and_read(tmp_path: Path, unit: str, plain: str) -> None:
+    """A channel in % was refused, with the advice to rename it."""
+    channels = (Channel(name="u", unit=unit),)
+    trace = Trace(name="a", sample_time=1.0, channels=channels, values=np.arange(20.0)[:, None])
+    assert read_trace(write_csv(trace, tmp_path / "a.csv")).channels == channels
+    assert read_trace(write_csv(trace, tmp_path / "b.csv", plain=True)).channels[0].unit == plain

@@ -55,10 +55,18 @@ def test_signals_are_written(words: list[str], record: str, capsys: pytest.Captu
     assert len(sysid.load("u.csv").traces[0]) in {100, 200}
 
 
+def test_each_channel_may_have_a_range_and_a_unit_of_its_own(record: str) -> None:
+    words = ["--range", "0:100,800:3000", "--names", "valve,speed", "--units", "%,rpm", "--sample-time", "3600"]
+    assert run_cli(["excite", "prbs", *words, "--samples", "48", "--out", "u.csv"]) == 0
+    (drawn,) = sysid.load("u.csv").traces
+    assert [(drawn[name].min(), drawn[name].max()) for name in ("valve", "speed")] == [(0.0, 100.0), (800.0, 3000.0)]
+
+
 @pytest.mark.parametrize(
     "words",
     [
         ["prbs", "--range", "5"],
+        ["prbs", "--range", "0:1,2:3"],
         ["prbs", "--hold", "3"],
         ["sawtooth"],
         ["noise", "--band", "1:x"],

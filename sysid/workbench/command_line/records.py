@@ -120,7 +120,7 @@ def excite(
     sample_time: Annotated[float, typer.Option(help="Seconds between samples.")],
     samples: Annotated[int | None, typer.Option(help="Length in samples; or --duration.")] = None,
     duration: Annotated[float | None, typer.Option(help="Length in seconds; or --samples.")] = None,
-    span: Annotated[str, typer.Option("--range", help="Levels, never left: low:high.")] = "-1:1",
+    span: Annotated[str, typer.Option("--range", help="Levels, never left: low:high, for all or by commas.")] = "-1:1",
     band: Annotated[str | None, typer.Option(help="Frequencies in Hz, low:high (multisine, noise, chirp).")] = None,
     names: Annotated[str, typer.Option(help="Of the channels, by commas; each has a signal of its own.")] = "u",
     units: Annotated[str, typer.Option(help="Of the channels: one for all, or by commas.")] = "1",

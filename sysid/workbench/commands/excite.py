@@ -16,7 +16,9 @@ def excite_command(
     kind: str, out: Path, *, given: Mapping[str, Any], span: str, band: str | None, names: str, units: str
 ) -> None:
     """Draw an excitation and write it; what was not typed is ``None`` among the options given."""
-    low, high = _pair(span, "--range", "two numbers, as 0:10")
+    pairs = "two numbers, as 0:10, or a pair for each channel, as 0:10,2:8"
+    spans = [_pair(one, "--range", pairs) for one in span.split(",")]
+    low, high = spans[0] if len(spans) == 1 else zip(*spans, strict=True)
     options = {key: value for key, value in given.items() if value is not None}
     if band is not None:
         options["band"] = _pair(band, "--band", "two frequencies in Hz, as 0.01:2")
