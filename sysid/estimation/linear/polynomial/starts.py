@@ -20,7 +20,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.errors import TraceError, UserError
+from sysid.errors import FitDivergedError, TraceError, UserError
 from sysid.estimation.linear.polynomial.contained import has_common
 from sysid.estimation.linear.segments import Segment, delayed_inputs
 from sysid.estimation.linear.state_space.search import search
@@ -124,7 +124,7 @@ class LongARX:
         asked = LinearStateSpace(states=states, feedthrough=direct, noise=False)
         try:
             system = search(late, asked, StateSpaceTraining(max_iterations=STEPS)).system
-        except (UserError, linalg.LinAlgError, ValueError):  # too short for it: the other starts do
+        except (UserError, FitDivergedError, linalg.LinAlgError, ValueError):  # too short for it: the other starts do
             return None
         A = np.real(np.poly(system.A))
         B = []

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.errors import TraceError, UserError
+from sysid.errors import FitDivergedError, TraceError, UserError
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.delay_search import check_max_delay, searched_delays
 from sysid.estimation.linear.segments import Segment
@@ -52,7 +52,12 @@ def behind_dead_times(
             tried = replace(orders, nk=delays)
             try:
                 return quick_size(late(looked, tried, unknown=unknown - orders.shortest), tried, training)
-            except (UserError, np.linalg.LinAlgError, ValueError):  # nothing that can be fitted, or run
+            except (
+                UserError,
+                FitDivergedError,
+                np.linalg.LinAlgError,
+                ValueError,
+            ):  # nothing that can be fitted, or run
                 return np.inf
 
         delays, told = searched_delays(_places(looked, orders.states, most, least), least, most, loss)

@@ -90,8 +90,10 @@ def quick_size(segments: Sequence[Segment], orders: LinearStateSpace, training: 
     )
     stable = not orders.noise if training.stable is None else training.stable
     problem = Problem(segments=_whole(segments, orders), orders=orders, stable=stable)
-    weighting = Weighting.SSARX.value if training.weighting == BEST else training.weighting
-    system, _ = problem.start(subspace, weighting)
+    try:
+        system, _ = problem.start(subspace, Weighting.SSARX.value if training.weighting == BEST else training.weighting)
+    except FitDivergedError:  # of next to no noise a long ARX model is not determined, and others may be
+        system, _ = problem.start(subspace, training.weighting)
     return size_of(problem.refined(system, QUICK, np.inf).covariance)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from sysid.errors import UserError
+from sysid.errors import FitDivergedError, UserError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
@@ -96,7 +96,7 @@ def _by_subspace(provider: NeuralProvider, until: float) -> list[NDArray[np.floa
         seconds = max(0.5 * (until - now()), 1e-3)
         training = StateSpaceTraining(max_iterations=LINEAR_ITERATIONS, max_time_s=seconds)
         found = search(provider.segments, orders, training).system
-    except (UserError, np.linalg.LinAlgError):
+    except (UserError, FitDivergedError, np.linalg.LinAlgError):
         return []
     return [_parameters(provider, (found.A, found.B, found.C, found.D, found.constant))]
 

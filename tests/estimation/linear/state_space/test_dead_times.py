@@ -35,6 +35,19 @@ def record(seed: int, n: int = 400, *, noise: float = 0.0, dead: tuple[int, int]
     return trace_of(u[lead:], 3.0 + y[lead:])
 
 
+@pytest.mark.parametrize("states", [2, 3])
+@pytest.mark.parametrize("size", [0.0, 0.002])
+def test_a_dead_time_is_found_where_hardly_anything_is_noise(states: int, size: float) -> None:
+    """It ended in "no subspace estimate gives a finite prediction": a long ARX model is not determined there."""
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.choice([-1.0, 1.0], 100), 15)
+    y = lfilter([0.0] * 4 + [0.05, 0.05], [1.0, -0.9], u) + size * rng.standard_normal(1500)
+    fit = sysid.fit(sysid.data((u, y), sample_time=1.0), "u -> y", LinearStateSpace(states=states, nk="auto"))
+    assert fit.model.structure.nk[0] in {3, 4}  # with a state that the plant does not have one sample is free
+    found = fit.model.ratio(0)
+    assert sum(found.B) / sum(found.F) == pytest.approx(1.0, abs=0.01)
+
+
 @pytest.mark.parametrize("noise", [True, False], ids=["K", "no K"])
 @pytest.mark.parametrize(("start", "lead"), [(FREE, 50), (REST, 0)], ids=["free", "rest"])
 def test_the_coefficients_behind_a_given_dead_time_are_exact(start: Start, lead: int, noise: bool) -> None:
