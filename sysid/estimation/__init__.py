@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from sysid.estimation.networks.together.training import fit_cascade as fit_cascade
     from sysid.estimation.networks.training import FitProgress as FitProgress
     from sysid.estimation.networks.training import Training as Training
-    from sysid.estimation.networks.vector_narx import fit_vector_narx as fit_vector_narx
     from sysid.estimation.records.operating_point import OperatingPoint as OperatingPoint
     from sysid.estimation.results.attempts import Attempt as Attempt
     from sysid.estimation.results.result import Evidence as Evidence

@@ -16,7 +16,6 @@ from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.linear_posteriors import LinearPosterior, linear_posterior
 from sysid.estimation.networks.posterior import calibrate
-from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.training import Training
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.remarks.equilibrium import equilibrium_notes
@@ -43,7 +42,7 @@ from sysid.models import (
 )
 from sysid.traces import Trace
 
-Options = Training | JointTraining | TransferFunctionTraining | StateSpaceTraining | PolynomialTraining
+Options = Training | TransferFunctionTraining | StateSpaceTraining | PolynomialTraining
 """What some estimator takes."""
 
 

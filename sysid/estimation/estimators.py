@@ -44,9 +44,7 @@ from sysid.estimation.networks.neural.state_space import (
     check_training,
     fit_neural_state_space,
 )
-from sysid.estimation.networks.together.options import JointTraining
 from sysid.estimation.networks.training import FitProgress, Training, check_lagged
-from sysid.estimation.networks.vector_narx import check_vector_initial, fit_vector_narx
 from sysid.estimation.networks.warm_start import check_initial
 from sysid.estimation.results.result import FitResult
 from sysid.estimation.stability.check import (
@@ -90,13 +88,16 @@ ESTIMATORS: dict[str, Estimator] = {
     row.kind: row
     for row in (
         _linear(structure=ARX, name="an ARX model", fit=fit_arx, posterior=arx_posterior, no_posterior=GROWING),
-        _trained(
-            structure=NARX,
-            name="a NARX network",
-            fit=fit_narx,
-            check_training=partial(check_lagged, "a NARX network"),
-            initial=check_initial,
-            joins=True,
+        *(
+            _trained(
+                structure=structure,
+                name=name,
+                fit=fit_narx,
+                check_training=partial(check_lagged, name),
+                initial=check_initial,
+                joins=structure is NARX,
+            )
+            for structure, name in ((NARX, "a NARX network"), (VectorNARX, "a NARX network of several outputs"))
         ),
         *(
             _trained(
@@ -184,13 +185,6 @@ ESTIMATORS: dict[str, Estimator] = {
                 no_posterior=OF_POLYNOMIALS,
             )
             for structure, name in ((OE, "an OE model"), (BJ, "a Box-Jenkins model"), (ARMAX, "an ARMAX model"))
-        ),
-        _trained(
-            structure=VectorNARX,
-            name="a NARX network of several outputs",
-            fit=fit_vector_narx,
-            training=JointTraining,
-            initial=check_vector_initial,
         ),
     )
 }

@@ -22,14 +22,14 @@ from sysid.models.linear.linear_state_space import (
 from sysid.models.linear.polynomial import PolynomialModel
 from sysid.models.linear.polynomial_orders import POLYNOMIALS
 from sysid.models.linear.transfer_function import TransferFunction, TransferFunctionModel
-from sysid.models.networks.narx import NARX, NARXModel
+from sysid.models.networks.narx import NARXModel, VectorNARXModel
+from sysid.models.networks.narx_structures import NARX, VectorNARX
 from sysid.models.networks.neural_state_space import (
     NeuralStateSpace,
     NeuralStateSpaceModel,
     VectorNeuralStateSpace,
     VectorNeuralStateSpaceModel,
 )
-from sysid.models.networks.vector_narx import VectorNARX, VectorNARXModel
 from sysid.models.orders.structure import AbstractStructure
 
 _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (

@@ -310,7 +310,7 @@ else:
     PolynomialConfig = create_model("PolynomialConfig", __config__=STRICT, **_fields_of(PolynomialTraining))
     JointConfig = create_model("JointConfig", __base__=_JointWords, **_fields_of(JointTraining))
 
-OptionsConfig = TrainingConfig | TransferFunctionConfig | StateSpaceConfig | PolynomialConfig | JointConfig
+OptionsConfig = TrainingConfig | TransferFunctionConfig | StateSpaceConfig | PolynomialConfig
 """Options that some structure takes, as the YAML has them."""
 
 _OPTIONS: dict[type, type[BaseModel]] = {
@@ -318,7 +318,6 @@ _OPTIONS: dict[type, type[BaseModel]] = {
     TransferFunctionTraining: TransferFunctionConfig,
     StateSpaceTraining: StateSpaceConfig,
     PolynomialTraining: PolynomialConfig,
-    JointTraining: JointConfig,
 }
 
 

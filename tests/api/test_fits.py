@@ -248,7 +248,7 @@ def whole() -> sysid.Fit:
     frame = pd.DataFrame({"u": U, "y": Y, "z": 2.0 * Y + 1.0})
     traces = sysid.data(frame, inputs="u", outputs=["y", "z"], sample_time=0.1)
     network = sysid.VectorNARX(input_delays=1, output_delays=1, neurons=1)
-    training = sysid.JointTraining(max_iterations=15, checkpoints=1)
+    training = sysid.Training(max_iterations=15)
     found = sysid.fit(traces, "u -> y+z", network, training, stability=sysid.StabilityOptions(count=5))
     assert isinstance(found, sysid.Fit)
     return found

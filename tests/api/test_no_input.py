@@ -61,7 +61,7 @@ MODELS = {
     "AR of two outputs": ("-> y+z", sysid.ARX(na=1, nb=(), nk=())),
     "one network of two outputs": ("-> y+z", sysid.VectorNARX(input_delays=[], output_delays=1, neurons=1)),
 }
-TRAININGS = {"NSS": sysid.Training(max_iterations=5), "VectorNARX": sysid.JointTraining(max_iterations=2)}
+TRAININGS = {"NSS": sysid.Training(max_iterations=5), "VectorNARX": sysid.Training(max_iterations=2)}
 
 
 @pytest.mark.parametrize("name", MODELS)

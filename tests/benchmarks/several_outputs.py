@@ -1,9 +1,9 @@
-"""One neural state space of two outputs beside one an output, at as many states: a nonlinear plant, and a linear one.
+"""One network of two outputs beside one an output: neural state spaces at as many states, NARX at as many neurons.
 
-    python -m tests.benchmarks several_outputs [--seeds=5]
+    python -m tests.benchmarks several_outputs [--seeds=5] [--samples=1200] [--only=states,narx]
 
-Fit on an unseen record without noise, in free run from an estimated state, of the worse output; medians over the seeds.
-One thread.
+Fit on an unseen record without noise, in free run from an estimated state, of the worse output; medians over the seeds,
+and over five plants for NARX. One thread.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sysid.estimation import StabilityOptions, Training
 from sysid.estimation.estimators import fit
-from sysid.models import AbstractModel, Mapping, NeuralStateSpace, Start, beginning
+from sysid.models import NARX, AbstractModel, Mapping, NeuralStateSpace, Start, beginning
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 from tests.benchmarks._linear_systems import NAMES, SAMPLES, systems
@@ -64,7 +64,9 @@ def percent(model: AbstractModel, unseen: Trace) -> Array:
     return np.asarray(100.0 * (1.0 - away))
 
 
-def compared(estimation: Trace, unseen: Trace, network: NeuralStateSpace, training: Training) -> dict[str, Array]:
+def compared(
+    estimation: Trace, unseen: Trace, network: NARX | NeuralStateSpace, training: Training
+) -> dict[str, Array]:
     """Fit of both outputs and processor time, of one model and of one an output."""
     began = time.process_time()
     whole = fit([estimation], BOTH, network.for_outputs(2), training, start=FREE, stability=UNCHECKED).model
@@ -76,10 +78,90 @@ def compared(estimation: Trace, unseen: Trace, network: NeuralStateSpace, traini
     return {"one model": one, "a model an output": np.append([percent(m, unseen)[0] for m in each], seconds)}
 
 
-def main() -> None:
-    """Both plants, every noise."""
-    given = dict(argument.removeprefix("--").split("=") for argument in sys.argv[1:] if "=" in argument)
-    seeds = range(int(given.get("seeds", 5)))
+def steps(rng: np.random.Generator, n: int, holds: tuple[int, int], size: float) -> Array:
+    """Two inputs that each hold random levels for as long as told."""
+    return np.column_stack([np.repeat(rng.uniform(-size, size, n // hold + 1), hold)[:n] for hold in holds])
+
+
+def four_tanks(seed: int, n: int) -> tuple[Array, Array]:
+    """Two pumps, each of which fills a lower tank and, crosswise, an upper one; the lower levels are measured."""
+    u = 0.65 + steps(np.random.default_rng(seed), n, (25, 40), 0.35)
+    h, y = np.array([0.5, 0.5, 0.3, 0.3]), np.empty((n, 2))
+    for t in range(n):
+        y[t] = h[:2]
+        out = 0.1 * np.sqrt(h)
+        fed = 0.07 * np.array([0.7 * u[t, 0], 0.6 * u[t, 1], 0.36 * u[t, 1], 0.27 * u[t, 0]])
+        h = np.maximum(h + fed - out + [out[2], out[3], 0.0, 0.0], 0.0)
+    return u, y
+
+
+def reactor(seed: int, n: int) -> tuple[Array, Array]:
+    """A stirred tank: concentration and temperature, of which each drives the other."""
+    u, y, c, heat = steps(np.random.default_rng(seed), n, (20, 30), 1.0), np.empty((n, 2)), 0.5, 0.0
+    for t in range(n):
+        y[t] = c, heat
+        rate = 0.08 * c * np.exp(1.2 * heat / (1.0 + 0.2 * abs(heat)))
+        c += 0.06 * (1.0 + 0.4 * u[t, 0] - c) - rate
+        heat += 0.6 * rate - 0.05 * heat - 0.03 - 0.06 * u[t, 1]
+    return u, y
+
+
+def restricted(seed: int, n: int) -> tuple[Array, Array]:
+    """Two reservoirs that fill each other through a restriction that bends."""
+    u, y, x = steps(np.random.default_rng(seed), n, (15, 22), 8.0), np.empty((n, 2)), np.zeros(2)
+    for t in range(n):
+        y[t] = x
+        apart = x[0] - x[1]
+        flow = 0.15 * apart / (1.0 + 0.1 * abs(apart))
+        x = x + np.array([0.2 * (u[t, 0] - x[0]) - flow, flow + 0.05 * (u[t, 1] - x[1])])
+    return u, y
+
+
+def pendulums(seed: int, n: int) -> tuple[Array, Array]:
+    """Two pendulums that a spring couples, each with its torque."""
+    u, y, x = steps(np.random.default_rng(seed), n, (10, 14), 1.0), np.empty((n, 2)), np.zeros(4)
+    for t in range(n):
+        y[t] = x[:2]
+        for _ in range(4):
+            pull = 0.6 * (x[0] - x[1])
+            x = x + 0.05 * np.array(
+                [x[2], x[3], u[t, 0] - np.sin(x[0]) - 0.5 * x[2] - pull, u[t, 1] - 1.5 * x[1] - 0.4 * x[3] + pull]
+            )
+    return u, y
+
+
+PLANTS = {
+    "three states": plant,
+    "four tanks": four_tanks,
+    "reactor": reactor,
+    "reservoirs": restricted,
+    "pendulums": pendulums,
+}
+LEVELS = {"no noise": (0.0, 0.0), "2 % noise": (0.02, 0.02), "10 and 1 % noise": (0.1, 0.01)}
+
+
+def narx(seeds: range, samples: int) -> None:
+    """NARX 3/3/8 of the five plants."""
+    network = NARX(input_delays=3, output_delays=3, neurons=8)
+    for name, sizes in LEVELS.items():
+        rows: dict[str, list[Array]] = defaultdict(list)
+        for make in PLANTS.values():
+            for seed in seeds:
+                (u, y), rng = make(seed, samples), np.random.default_rng(seed)
+                noisy = y + rng.standard_normal(y.shape) * np.array(sizes) * y.std(axis=0)
+                training = Training(max_iterations=300, workers=1, seed=seed)
+                both = compared(trace_of(u, noisy), trace_of(*make(1_000 + seed, samples)), network, training)
+                for which, figures in both.items():
+                    rows[which].append(figures)
+        for which, figures in rows.items():
+            worse = [min(row[:2]) for row in figures]
+            note = f"lower quartile {np.quantile(worse, 0.25):.1f}, {len(PLANTS)} plants, {len(seeds)} seeds"
+            found(f"NARX 3/3/8, {name}, {which}, worse output", float(np.median(worse)), "%", note=note)
+            found(f"NARX 3/3/8, {name}, {which}, processor time", float(np.median([row[2] for row in figures])), "s")
+
+
+def states(seeds: range) -> None:
+    """Neural state spaces of both plants, every noise."""
     values: dict[tuple[str, str], list[Array]] = defaultdict(list)
     network = NeuralStateSpace(states=3, neurons=8)
     for seed in seeds:
@@ -100,6 +182,16 @@ def main() -> None:
         worse = np.median([min(row[:2]) for row in rows])
         found(f"{plant_name}, {which}, worse output", float(worse), "%", note=f"median of {len(seeds)} seeds")
         found(f"{plant_name}, {which}, processor time", float(np.median([row[2] for row in rows])), "s")
+
+
+def main() -> None:
+    """What was asked for."""
+    given = dict(argument.removeprefix("--").split("=") for argument in sys.argv[1:] if "=" in argument)
+    seeds, only = range(int(given.get("seeds", 5))), given.get("only", "states,narx").split(",")
+    if "states" in only:
+        states(seeds)
+    if "narx" in only:
+        narx(seeds, int(given.get("samples", 1_200)))
 
 
 if __name__ == "__main__":

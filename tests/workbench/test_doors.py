@@ -380,5 +380,5 @@ def test_options_of_another_structure_are_refused(place: Path) -> None:
     with pytest.raises(ConfigError, match="a transfer function takes other options"):
         sysid.fit(traces, MAPPING, structure_from_dict(TF), sysid.Training())
     lags = sysid.VectorNARX(input_delays=1, output_delays=1, neurons=1)
-    with pytest.raises(ConfigError, match=r"JointTraining\(max_iterations=7, starts=2\), which has no ensemble,"):
-        sysid.fit(traces, MAPPING, lags, sysid.Training(starts=2, max_iterations=7, ensemble=2))
+    with pytest.raises(ConfigError, match=r"Training\(max_iterations=7\), which has no robust_scale"):
+        sysid.fit(traces, MAPPING, lags, sysid.JointTraining(max_iterations=7, robust_scale=2.0))

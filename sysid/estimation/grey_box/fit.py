@@ -32,7 +32,7 @@ from sysid.estimation.grey_box.shot import (
 )
 from sysid.estimation.grey_box.telling import told
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
-from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.arx import rests_of
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.choosing import Choice, choose
 from sysid.estimation.networks.starts.race import run_race
@@ -93,10 +93,7 @@ def fit_grey_box(
         ConfigError: If the equations do not know a channel of the mapping, or an option does not apply.
         TraceError: If no sample counts, or the equations have no free run at their declared start.
     """
-    given = (
-        rest_output if isinstance(rest_output, Dict) else {} if rest_output is None else {mapping.output: rest_output}
-    )
-    rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
+    rests = rests_of(traces, mapping, rest_output)
     several, begun = grey.several_outputs, start or Start()
     experiments = experiments_of(traces, mapping, begun, np.array(rests) if several else rests[0])
     grey.check_mapping(mapping)

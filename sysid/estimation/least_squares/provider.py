@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,4 +90,33 @@ class AbstractProvider(ABC):
 
         Returns:
             All three, and that time where it was asked for.
+        """
+
+
+class AbstractWeighing(AbstractProvider):
+    """Residuals of one output or several, each of which may weigh something else."""
+
+    output_weights: tuple[float, ...] | None
+    """What a squared residual of each output counts, in scaled numbers; ``None`` for all alike."""
+
+    @abstractmethod
+    def variances(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mean squared residual of each output over the samples that count, in scaled numbers, without the weights.
+
+        Args:
+            theta: Flat parameters.
+
+        Returns:
+            Shape ``(n_outputs,)``.
+        """
+
+    @abstractmethod
+    def with_output_weights(self, weights: tuple[float, ...]) -> Self:
+        """The same residuals with other weights.
+
+        Args:
+            weights: One an output.
+
+        Returns:
+            The provider.
         """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 
 import numpy as np
@@ -81,6 +82,21 @@ def first_output(traces: Sequence[Trace], mapping: Mapping) -> float:
         A value in the output's unit.
     """
     return float(np.mean([trace[mapping.output][int(np.argmax(trace.usable_samples))] for trace in traces]))
+
+
+def rests_of(traces: Sequence[Trace], mapping: Mapping, given: float | Dict[str, float] | None) -> tuple[float, ...]:
+    """Each output at rest.
+
+    Args:
+        traces: Estimation traces.
+        mapping: Names the outputs.
+        given: The value of the only output, or values by name; :func:`first_output` where there is none.
+
+    Returns:
+        Values in the outputs' units.
+    """
+    told = given if isinstance(given, Dict) else {} if given is None else {mapping.output: given}
+    return tuple(told[one.output] if one.output in told else first_output(traces, one) for one in mapping.each)
 
 
 def arx_experiments(

@@ -48,7 +48,7 @@ from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.advancing import first_prior, judged
 from sysid.estimation.networks.training import FitProgress, Training
-from sysid.models import NARXModel
+from sysid.models import NARXModel, VectorNARXModel
 from sysid.traces import Trace
 
 ELIGIBLE = 40
@@ -78,6 +78,7 @@ def check(training: Training, selection: Sequence[Trace]) -> None:
         )
 
 
+Lagged = TypeVar("Lagged", NARXModel, VectorNARXModel)
 Whole = TypeVar("Whole")
 """What a ballot is about: networks, or their runs, of which the mean is taken as well."""
 
@@ -313,7 +314,7 @@ def _of(
     return unite([models[i] for i in picks], list(picks.values()))
 
 
-def united(members: Sequence[NARXModel], picks: Sequence[int]) -> NARXModel:
+def united(members: Sequence[Lagged], picks: Sequence[int]) -> Lagged:
     """The network whose one-step map is the mean of the members'.
 
     Args:
@@ -326,14 +327,15 @@ def united(members: Sequence[NARXModel], picks: Sequence[int]) -> NARXModel:
     first = members[0]
     if len(members) == 1:
         return first
-    layout = Layout.of(first.network, len(first.mapping.inputs))
-    hidden = layout.neurons * layout.lags.n_regressors
+    layout = Layout.of(first.network, len(first.mapping.inputs), len(first.mapping.outputs))
+    hidden, outputs = layout.neurons * layout.lags.n_regressors, len(layout.outputs)
     shares = np.array(picks) / sum(picks)
     thetas = [member.theta for member in members]
     parts = [theta[:hidden] for theta in thetas]
     parts += [theta[hidden : layout.hidden.stop] for theta in thetas]
-    parts += [share * theta[layout.readout] for share, theta in zip(shares, thetas, strict=True)]
+    readouts = [share * theta[layout.readout].reshape(outputs, -1) for share, theta in zip(shares, thetas, strict=True)]
+    parts += [np.concatenate(readouts, axis=1).ravel()]
     parts += [shares @ np.array([theta[layout.affine] for theta in thetas])]
     parts += [share * theta[layout.gates] for share, theta in zip(shares, thetas, strict=True)]
-    network = replace(first.network, neurons=len(members) * layout.neurons)
+    network = first.network.resized(len(members) * layout.neurons)
     return replace(first, network=network, theta=np.concatenate(parts))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.models import NARX, Ends, Lags, Member
+from sysid.models import NARX, Ends, Lags, Member, VectorNARX
 from sysid.models.contract.column_recursion import ColumnRecursion
 
 READOUT_SPREAD = 1e-3
@@ -109,22 +109,27 @@ class Layout(AbstractLayout):
     name: str = ""
 
     @classmethod
-    def of(cls, network: NARX, n_inputs: int) -> Layout:
-        """The layout of a network with one output.
+    def of(cls, network: NARX | VectorNARX, n_inputs: int, n_outputs: int = 1) -> Layout:
+        """The layout of a network that is fitted alone.
 
         Args:
             network: The structure.
             n_inputs: Inputs of the mapping.
+            n_outputs: Outputs of the mapping.
 
         Returns:
             The layout.
         """
+        if isinstance(network, VectorNARX):
+            channels, gated = network.lags(n_inputs, n_outputs).inputs, False
+        else:
+            channels, gated = (*network.lags(n_inputs).inputs, network.output_delays), network.gated
         return cls(
-            inputs=network.lags(n_inputs).inputs,
-            outputs=(network.output_delays,),
+            inputs=channels[:n_inputs],
+            outputs=channels[n_inputs:],
             neurons=network.neurons,
             linear=network.feedthrough,
-            gated=network.gated,
+            gated=gated,
         )
 
     @classmethod
@@ -138,11 +143,23 @@ class Layout(AbstractLayout):
         Returns:
             The layout.
         """
-        ends, lags = Ends.of(model), columns.lags.inputs
+        ends = Ends.of(model)
+        return replace(cls.of_columns(columns, len(ends.inputs)), name="+".join(ends.outputs))
+
+    @classmethod
+    def of_columns(cls, columns: ColumnRecursion, n_inputs: int) -> Layout:
+        """The layout of what runs.
+
+        Args:
+            columns: It.
+            n_inputs: How many of its columns it does not write.
+
+        Returns:
+            The layout.
+        """
         return cls(
-            name="+".join(ends.outputs),
-            inputs=lags[: len(ends.inputs)],
-            outputs=lags[len(ends.inputs) :],
+            inputs=columns.lags.inputs[:n_inputs],
+            outputs=columns.lags.inputs[n_inputs:],
             neurons=columns.neurons,
             linear=columns.linear,
             gated=columns.gated,
@@ -152,6 +169,11 @@ class Layout(AbstractLayout):
     def lags(self) -> Lags:
         """The regressors in order; the lags of all outputs, one output after the other, stand as those of one."""
         return Lags(inputs=self.inputs, output=tuple(lag for lags in self.outputs for lag in lags))
+
+    @cached_property
+    def columns(self) -> Lags:
+        """The same regressors, each output as a channel of its own."""
+        return Lags(inputs=(*self.inputs, *self.outputs), output=())
 
     @property
     def n_parameters(self) -> int:

@@ -155,14 +155,14 @@ def embedding(part: Layout, whole: Layout) -> NDArray[np.float64]:
     Returns:
         Zeros and ones, shape ``(n_whole, n_part)``.
     """
-    k, kept = part.neurons, np.array(places(whole.lags, part.lags), dtype=np.int64)
+    k, m, kept = part.neurons, len(part.outputs), np.array(places(whole.columns, part.columns), dtype=np.int64)
     rows = (whole.lags.n_regressors * np.arange(k)[:, None] + kept).ravel()
     where = [
         rows,
         whole.lags.n_regressors * k + np.arange(k),
-        whole.readout.start + np.arange(k),
-        [whole.affine.start],
-        whole.affine.start + 1 + kept if part.linear else [],
+        whole.readout.start + np.arange(m * k),
+        whole.affine.start + np.arange(m),
+        *([whole.linear_part(j).start + kept for j in range(m)] if part.linear else []),
         whole.gates.start + rows if part.gated else [],
     ]
     E = np.zeros((whole.n_parameters, part.n_parameters))

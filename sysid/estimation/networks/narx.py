@@ -1,9 +1,10 @@
-"""NARX networks: open loop, closed loop, several starts, and an honest choice between them."""
+"""NARX networks of one output or several: open loop, closed loop, several starts, and an honest choice between them."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -14,40 +15,41 @@ from sysid.errors import ChannelError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
-from sysid.estimation.linear.arx import first_output
-from sysid.estimation.linear.regression import lagged
+from sysid.estimation.linear.arx import rests_of
 from sysid.estimation.networks import ensemble
-from sysid.estimation.networks.basis import RebasedProvider, RegressorBasis
+from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
-from sysid.estimation.networks.pretraining import StepSamples, WhileUsed
-from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.networks.pretraining import StepSamples, WhileUsed, regressors_of
+from sysid.estimation.networks.provider import RebasedRecursion, RecursionProvider
 from sysid.estimation.networks.regressed import regressed
 from sysid.estimation.networks.starts import cautious
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.advancing import with_evidence
 from sysid.estimation.networks.starts.choosing import Choice, choose
+from sysid.estimation.networks.starts.output_weights import reweighted
 from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
+from sysid.estimation.networks.template import held_told, layout_of, template_of
 from sysid.estimation.networks.training import FitProgress, Training
 from sysid.estimation.networks.warm_start import check_initial, grown
 from sysid.estimation.networks.windows import Windows, in_place, with_note
-from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range
-from sysid.estimation.records.output_ends import ends_of, told
+from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.results.result import FitResult, Loop
-from sysid.models import NARX, History, Mapping, NARXModel, Recursion, Start
+from sysid.models import NARX, History, Mapping, NARXModel, Start, VectorNARX, VectorNARXModel
+from sysid.models.lagged.lagged_form import AbstractLaggedForm
 from sysid.traces import Trace
 
 
 def fit_narx(
     traces: Sequence[Trace],
     mapping: Mapping,
-    network: NARX,
+    network: NARX | VectorNARX,
     training: Training | None = None,
     *,
     start: Start | None = None,
-    rest_output: float | None = None,
+    rest_output: float | Dict[str, float] | None = None,
     selection: Sequence[Trace] = (),
     initial: FitResult | None = None,
     resume: Checkpoint | None = None,
@@ -55,17 +57,19 @@ def fit_narx(
     vet: Callable[[starts.Network], bool] | None = None,
     on_progress: Callable[[FitProgress], None] = lambda _: None,
 ) -> FitResult:
-    """Fit a NARX network by Levenberg-Marquardt with Bayesian regularisation.
+    """Fit a NARX network of one output or several by Levenberg-Marquardt with Bayesian regularisation.
 
-    An interruption from the keyboard keeps the best model so far (status ``INTERRUPTED``).
+    Of several outputs each counts over its range at first, and the best candidate is trained on with each over what is
+    left of it, so that a noisy output does not blur what a clean one shows. An interruption from the keyboard keeps the
+    best model so far (status ``INTERRUPTED``).
 
     Args:
         traces: Estimation traces.
-        mapping: Which channels go in, which comes out.
+        mapping: Which channels go in, which come out.
         network: The structure.
         training: How to train.
         start: What stands before each trace; at rest by default.
-        rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
+        rest_output: Output at rest in its unit, or by name; the mean of the traces' first samples where not given.
         selection: Traces that choose between starts; without them the evidence chooses.
         initial: A fit whose parameters are the first start: of the same structure, of a smaller network over some of
             its lags, or of a linear model over them.
@@ -76,7 +80,8 @@ def fit_narx(
             :class:`~sysid.estimation.least_squares.checkpoints.Watch` keeps where the fit stands, too.
 
     Returns:
-        The best start's model, with the spread over starts in its attempts.
+        The best start's model, with the spread over starts in its attempts. Of several outputs its errors are mean
+        squares over them, in scaled numbers and so weighed.
 
     Raises:
         ChannelError: If a trace lacks a channel of the mapping.
@@ -86,11 +91,12 @@ def fit_narx(
     began = now()
     training, start = training or Training(), start or Start()
     ensemble.check(training, selection)
-    rest = first_output(traces, mapping) if rest_output is None else rest_output
-    lags = network.lags(len(mapping.inputs))
+    lags = Layout.of(network, len(mapping.inputs), len(mapping.outputs)).columns
+    rests = rests_of(traces, mapping, rest_output)
+    rest = np.array(rests) if network.several_outputs else rests[0]
     experiments = tuple(e.from_measured(lags) for e in experiments_of(traces, mapping, start, rest))
     experiments = (*experiments, *_offset(experiments, mapping, training))
-    template = _template(traces[0], mapping, network, experiments, rest)
+    template = template_of(traces[0], mapping, network, experiments, rests=rests)
     windows = Windows.of(experiments, training)
     seen = tuple(e.from_measured(lags) for e in windows.experiments)
     task = _Task.of(template, seen, training)
@@ -115,6 +121,9 @@ def fit_narx(
     # A cautious fit is made anew, so that a fit that goes on ends where one in a single run would.
     raced = [one for one in tasks if not one.cautious]
     on_checkpoint(Checkpoint.of(choose(raced, training.choose_by).chosen.solution.state))
+    best = choose(list(tasks), training.choose_by).chosen
+    for one, provider in reweighted(replace(multistart, to_plain=tasks[best].to_plain), tasks[best].provider, best):
+        tasks[one] = replace(tasks[best], provider=provider)
     tasks |= _with_ensemble(multistart, list(tasks), experiments, vet)
     choice, tasks = _chosen(multistart, windows, tasks, vet)
     chosen = choice.chosen
@@ -127,8 +136,7 @@ def fit_narx(
     posterior = _posterior(multistart, chosen, tasks[chosen], experiments)
     seconds = multistart.checkpoints.earlier_s + now() - began
     fit = with_note(multistart_result(choice, list(tasks), training, status, seconds, left=left), windows)
-    # All of them have the template's limits.
-    held = (told(template.between, mapping.output, template.output_unit),) if template.limits else ()
+    held = held_told(template)
     twice = cautious.told(choice, list(tasks), tasks[chosen].provider.n_samples)
     return replace(fit, posterior=posterior, notes=(*fit.notes, *twice, *held))
 
@@ -140,18 +148,22 @@ class _Task(ensemble.Task):
     Args:
         template: The model but for its parameters.
         basis: The regressors' basis in training.
-        inner: Residuals over plain parameters.
+        provider: Residuals.
     """
 
-    template: NARXModel
+    template: NARXModel | VectorNARXModel
     basis: RegressorBasis
-    inner: RecursionProvider
+    provider: RebasedRecursion
 
     @classmethod
     def of(
-        cls, template: NARXModel, experiments: Sequence[Experiment], training: Training, without: tuple[str, ...] = ()
+        cls,
+        template: NARXModel | VectorNARXModel,
+        experiments: Sequence[Experiment],
+        training: Training,
+        without: tuple[str, ...] = (),
     ) -> _Task:
-        whole = Layout.of(template.network, len(template.mapping.inputs))
+        whole = layout_of(template)
         layout = part_of(whole, template.mapping, without)
         basis = _basis(training, template, experiments, layout)
         inner = RecursionProvider(
@@ -161,8 +173,8 @@ class _Task(ensemble.Task):
             stride=training.stride,
         )
         to_plain = embedding(layout, whole) @ basis.to_plain(layout)
-        provider = RebasedProvider(inner=inner, to_plain=to_plain)
-        return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider, inner=inner)
+        provider = RebasedRecursion(inner=inner, to_plain=to_plain)
+        return cls(template=template, layout=layout, basis=basis, to_plain=to_plain, provider=provider)
 
 
 def _chosen(
@@ -198,13 +210,13 @@ def _posterior(
 
 def _over_all(multistart: starts.Multistart, windows: Windows, choice: Choice, task: _Task) -> Choice:
     """The choice, trained on over all samples of the records."""
-    inner = replace(task.inner, experiments=windows.records)
+    inner = replace(task.provider.inner, experiments=windows.records)
     own = replace(multistart, to_plain=task.to_plain)
     if choice.chosen.without:
-        whole = Layout.of(task.template.network, len(task.template.mapping.inputs))
+        whole = layout_of(task.template)
         own = replace(own, layout=PartLayout(part=task.layout, whole=whole))
     state = choice.chosen.solution.state
-    provider = RebasedProvider(inner=inner, to_plain=task.to_plain)
+    provider = RebasedRecursion(inner=inner, to_plain=task.to_plain)
     return windows.finished(own, choice, provider, state.theta, state.prior.centre)
 
 
@@ -266,12 +278,16 @@ def _pretraining(training: Training, task: _Task, experiments: Sequence[Experime
 
 
 def _prepared(training: Training, task: _Task, experiments: Sequence[Experiment]) -> starts.Prepared:
-    """What is linear in a random start by least squares; a start that was given or pretrained stays as it is."""
+    """What is linear in a random start by least squares; a start that was given or pretrained stays as it is.
+
+    So does one of several outputs: over five plants of two (``several_outputs``) their fits came out worse from there.
+    """
     kept = WhileUsed(lambda: _step_samples(training, task, experiments, sys.maxsize))
 
     def prepared(multistart: starts.Multistart, number: int, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         given = number == 0 and multistart.initial is not None
-        samples = None if training.pretraining or given else kept.made()
+        several = len(task.template.mapping.outputs) > 1
+        samples = None if training.pretraining or given or several else kept.made()
         return theta if samples is None else regressed(theta, samples, multistart.provider)
 
     return prepared
@@ -288,52 +304,37 @@ def _step_samples(
 def _offset(experiments: Sequence[Experiment], mapping: Mapping, training: Training) -> list[Experiment]:
     """The experiments once more with each offset of their channels."""
     copies = []
-    channels = (*mapping.inputs, mapping.output)
+    channels = (*mapping.inputs, *mapping.outputs)
     for offset in training.offsets:
         strangers = sorted(set(offset) - set(channels))
         if strangers:
             raise ChannelError(strangers, channels, where="offsets")
-        *by, up = (float(offset.get(name, 0.0)) for name in channels)
+        by, up = (
+            np.array([float(offset.get(name, 0.0)) for name in some]) for some in (mapping.inputs, mapping.outputs)
+        )
         for e in experiments:
-            history = History(inputs=e.history.inputs + np.array(by), output=e.history.output + up)
-            copies.append(replace(e, inputs=e.inputs + np.array(by), output=e.output + up, history=history))
+            up = up.reshape(e.output.shape[1:])
+            history = History(inputs=e.history.inputs + by, output=e.history.output + up)
+            copies.append(replace(e, inputs=e.inputs + by, output=e.output + up, history=history))
     return copies
 
 
-def _template(
-    first: Trace, mapping: Mapping, network: NARX, experiments: Sequence[Experiment], rest: float
-) -> NARXModel:
-    """The model but for its parameters."""
-    layout = Layout.of(network, len(mapping.inputs))
-    return NARXModel(
-        network=network,
-        theta=layout.centre(),
-        scaling=unit_range(experiments),
-        mapping=mapping,
-        sample_time=first.sample_time,
-        input_units=tuple(first.channel(name).unit for name in mapping.inputs),
-        output_unit=first.channel(mapping.output).unit,
-        rest_output=rest,
-        between=ends_of(network.limits, experiments, mapping.output),
-    )
-
-
 def _basis(
-    training: Training, template: NARXModel, experiments: Sequence[Experiment], layout: Layout
+    training: Training, template: NARXModel | VectorNARXModel, experiments: Sequence[Experiment], layout: Layout
 ) -> RegressorBasis:
     if training.basis == "plain" or not layout.linear:
         # The constant and linear part absorb the shift of the basis; without them the plain regressors remain.
         return RegressorBasis.identity(layout.lags)
-    records = []
-    for experiment in experiments:
-        u, y = template.recursion.extended(experiment.inputs, experiment.history)
-        y[-len(experiment.output) :] = template.scaling.scale_output(experiment.output)
-        records.append(lagged(u, y, layout.lags, len(experiment.output)))
+    records = [regressors_of(template, experiment, layout)[0] for experiment in experiments]
     return RegressorBasis.incremental(layout.lags, np.concatenate(records))
 
 
 def _initial_parameters(
-    initial: FitResult | None, template: NARXModel, layout: Layout, to_plain: NDArray[np.float64], seed: int
+    initial: FitResult | None,
+    template: NARXModel | VectorNARXModel,
+    layout: Layout,
+    to_plain: NDArray[np.float64],
+    seed: int,
 ) -> NDArray[np.float64] | None:
     """Plain parameters of the first start; what the initial fit lacks is drawn as a random start draws it."""
     if initial is None:
@@ -344,4 +345,4 @@ def _initial_parameters(
         return form.numbers
     centre = np.linalg.solve(to_plain, layout.centre())
     fresh = to_plain @ layout.draw(np.random.default_rng(seed), np.asarray(centre, dtype=np.float64))
-    return grown(cast("Recursion", form), template.recursion, fresh)
+    return grown(cast("AbstractLaggedForm", form), template.recursion, fresh)

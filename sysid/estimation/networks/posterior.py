@@ -59,6 +59,7 @@ from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import Evidence, Loop
 from sysid.models import AbstractModel, Recursion
 from sysid.models.contract import gaps
+from sysid.models.lagged.vector_recursion import VectorRecursion
 from sysid.models.linear.innovation_moves import prediction_moves
 
 CALIBRATED_AT = 0.95
@@ -136,9 +137,10 @@ class Posterior:
             if moves is not None:
                 variance = np.einsum("...j,...j->...", moves, moves)
                 return np.where(np.isfinite(variance), variance, np.inf)
-        assert isinstance(form, Recursion)  # noqa: S101 - the forms without moves of their own
+        assert isinstance(form, Recursion | VectorRecursion)  # noqa: S101 - the forms without moves of their own
         provider = RecursionProvider(template=form, experiments=(experiment,), closed=loop is Loop.CLOSED)
-        return provider.output_variance(form.theta, self.factor) * form.scaling.output_scale**2
+        found = provider.output_variance(form.theta, self.factor).reshape(experiment.output.shape)
+        return found * np.square(form.scaling.output_scale)
 
     def to_arrays(self) -> dict[str, NDArray[np.float64]]:
         """The fields as arrays, to be stored."""

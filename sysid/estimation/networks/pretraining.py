@@ -37,7 +37,7 @@ from sysid.estimation.networks.initialise import READOUT_SPREAD, Layout
 from sysid.estimation.networks.program_provider import BLOCK
 from sysid.estimation.records.experiment import Experiment
 from sysid.kernels.neurons import NEURONS, Neuron
-from sysid.models import NARXModel
+from sysid.models import NARXModel, VectorNARXModel
 
 SMOOTHEST, SHARPEST = 0.7, 100.0
 """Least and greatest length of a neuron's weights at the start, over regressors of size 1. At 100 a neuron switches
@@ -56,8 +56,8 @@ class StepSamples(AbstractProvider):
 
     Args:
         layout: Where the parameters stand.
-        regressors: In the basis, shape ``(n_samples, n_regressors)``.
-        target: Scaled output, shape ``(n_samples,)``.
+        regressors: In the basis, shape ``(n_rows, n_regressors)``.
+        target: Scaled outputs, shape ``(n_rows, n_outputs)``; not a number where one does not count.
         neuron: The kind of the neurons.
     """
 
@@ -68,12 +68,12 @@ class StepSamples(AbstractProvider):
     n_samples: int = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "n_samples", len(self.target))
+        object.__setattr__(self, "n_samples", int(np.count_nonzero(np.isfinite(self.target))))
 
     @classmethod
     def of(
         cls,
-        template: NARXModel,
+        template: NARXModel | VectorNARXModel,
         experiments: Sequence[Experiment],
         layout: Layout,
         basis: RegressorBasis,
@@ -96,16 +96,15 @@ class StepSamples(AbstractProvider):
         """
         rows, targets = [], []
         for experiment in experiments:
-            u, y = template.recursion.extended(experiment.inputs, experiment.history)
-            target = template.scaling.scale_output(experiment.output)
-            y[-len(target) :] = target
-            low, high = template.recursion.bounds  # at a limit a step says only that it would go on
-            weights = experiment.one_step(layout.lags).weights
-            counted = np.ones(len(target), dtype=bool) if weights is None else weights > 0.0
-            counted = counted & (target > low) & (target < high)
-            whole = lagged(u, y, layout.lags, len(target))
-            rows.append(whole if counted.all() else whole[counted])
-            targets.append(target[counted])
+            whole, target = regressors_of(template, experiment, layout)
+            low, high = template.recursion.bounds.T  # at a limit a step says only that it would go on
+            seen = experiment.one_step(layout.columns)
+            weights = np.ones(1) if seen.weights is None else seen.weights[:, np.newaxis]
+            each = (weights if seen.each is None else seen.each) > 0.0
+            counted = each & (target > low) & (target < high)
+            some = counted.any(axis=1)
+            rows.append(whole if some.all() else whole[some])
+            targets.append(np.where(counted, target, np.nan)[some])
             del whole  # of long records each copy is the largest thing that there is
         plain = rows[0] if len(rows) == 1 else np.concatenate(rows)
         rows.clear()
@@ -140,7 +139,9 @@ class StepSamples(AbstractProvider):
         weights = sharpness[:, None] * directions
         through = self.regressors[rng.integers(len(self.regressors), size=k)]
         theta[self.layout.hidden] = np.concatenate([weights.ravel(), -np.sum(weights * through, axis=1)])
-        theta[self.layout.readout] = READOUT_SPREAD * rng.standard_normal(k) / sharpness
+        theta[self.layout.readout] = (
+            READOUT_SPREAD * rng.standard_normal((len(self.layout.outputs), k)) / sharpness
+        ).ravel()
         if self.layout.gated:
             theta[self.layout.gates] = (READOUT_SPREAD * rng.standard_normal((k, r)) / sharpness[:, None]).ravel()
         return theta
@@ -149,7 +150,7 @@ class StepSamples(AbstractProvider):
         """Half the sum of squared residuals; see the base class."""
         total = 0.0
         for rows in self._blocks():
-            residual = self._pass(theta, rows).residual
+            residual = self._pass(theta, rows).residual.ravel()
             total += 0.5 * float(residual @ residual)
         return total if np.isfinite(total) else np.inf
 
@@ -161,40 +162,48 @@ class StepSamples(AbstractProvider):
         loss, gradient, matrix = 0.0, np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
         for rows in self._blocks():
             passed = self._pass(theta, rows)
-            J = self._jacobian(passed, len(theta))
-            loss += 0.5 * float(passed.residual @ passed.residual)
-            gradient += J.T @ passed.residual
-            matrix += J.T @ J
+            for output, residual in enumerate(passed.residual.T):
+                J = self._jacobian(passed, output, len(theta))
+                loss += 0.5 * float(residual @ residual)
+                gradient += J.T @ residual
+                matrix += J.T @ J
         return Linearisation(loss=loss, gradient=gradient, gauss_newton=matrix)
 
     def _blocks(self) -> list[slice]:
-        return [slice(first, first + BLOCK) for first in range(0, self.n_samples, BLOCK)]
+        return [slice(first, first + BLOCK) for first in range(0, len(self.target), BLOCK)]
 
     def _pass(self, theta: NDArray[np.float64], rows: slice) -> _Pass:
-        layout, x = self.layout, self.regressors[rows]
-        k, r = layout.neurons, x.shape[1]
+        layout, x, target = self.layout, self.regressors[rows], self.target[rows]
+        k, r, m = layout.neurons, x.shape[1], len(layout.outputs)
         affine = theta[layout.affine]
-        straight = affine[0] + (x @ affine[1:] if layout.linear else 0.0)
         sums = x @ theta[: k * r].reshape(k, r).T + theta[k * r : k * (r + 1)]
         h = self.neuron.value(sums)
-        g = np.broadcast_to(theta[layout.readout], h.shape)
-        if layout.gated:
-            g = g + x @ theta[layout.gates].reshape(k, r).T
-        return _Pass(x, sums, h, g, np.sum(g * h, axis=1) + straight - self.target[rows])
+        readout = theta[layout.readout].reshape(m, k)
+        gates = x @ theta[layout.gates].reshape(k, r).T if layout.gated else np.zeros(1)
+        linear = affine[m:].reshape(m, -1)
+        found, counts = np.empty(target.shape), np.isfinite(target)
+        for j in range(m):
+            straight = affine[j] + (x @ linear[j] if layout.linear else 0.0)
+            found[:, j] = np.sum((readout[j] + gates) * h, axis=1) + straight - target[:, j]
+        return _Pass(x, sums, h, gates, readout, np.where(counts, found, 0.0), counts)
 
-    def _jacobian(self, passed: _Pass, n_parameters: int) -> NDArray[np.float64]:
+    def _jacobian(self, passed: _Pass, output: int, n_parameters: int) -> NDArray[np.float64]:
+        """Of an output; zeros where it does not count."""
         layout, x, h = self.layout, passed.x, passed.h
         k, r = layout.neurons, x.shape[1]
-        slopes = self.neuron.slope(passed.sums) * passed.g
-        J = np.empty((len(x), n_parameters))
+        slopes = self.neuron.slope(passed.sums) * (passed.readout[output] + passed.gates)
+        J = np.zeros((len(x), n_parameters))
         J[:, : k * r] = (slopes[:, :, None] * x[:, None, :]).reshape(len(x), -1)
         J[:, k * r : k * (r + 1)] = slopes
-        J[:, layout.readout] = h
-        J[:, layout.affine.start] = 1.0
+        J[:, layout.readout.start + output * k : layout.readout.start + (output + 1) * k] = h
+        J[:, layout.affine.start + output] = 1.0
         if layout.linear:
-            J[:, layout.affine.start + 1 : layout.affine.stop] = x
+            J[:, layout.linear_part(output)] = x
         if layout.gated:
             J[:, layout.gates] = (h[:, :, None] * x[:, None, :]).reshape(len(x), -1)
+        own = passed.counts[:, output]
+        if not own.all():
+            J[~own] = 0.0
         return J
 
 
@@ -221,13 +230,34 @@ class WhileUsed:
 
 @dataclass(frozen=True, eq=False)
 class _Pass:
-    """Some samples: regressors, their sums, activations, what stands before each activation, residuals."""
+    """Some samples: regressors, their sums, activations, gates, readouts, residuals, and which of these count."""
 
     x: NDArray[np.float64]
     sums: NDArray[np.float64]
     h: NDArray[np.float64]
-    g: NDArray[np.float64]
+    gates: NDArray[np.float64]
+    readout: NDArray[np.float64]
     residual: NDArray[np.float64]
+    counts: NDArray[np.bool_]
+
+
+def regressors_of(
+    model: NARXModel | VectorNARXModel, experiment: Experiment, layout: Layout
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What a network reads of a record one step ahead, and what it should put out, in scaled numbers.
+
+    Args:
+        model: The network, for its scaling.
+        experiment: The record.
+        layout: What of it reads which lags.
+
+    Returns:
+        Shape ``(n_samples, n_regressors)``, and the outputs, shape ``(n_samples, n_outputs)``.
+    """
+    form, n = model.recursion, len(experiment.output)
+    u, y = form.extended(experiment.inputs, experiment.history)
+    y[-n:] = target = model.scaling.scale_output(experiment.output).reshape(n, -1)
+    return lagged(np.concatenate([u, y], axis=1), y, layout.columns, n), target
 
 
 def space_filling(regressors: NDArray[np.float64], samples: int, rng: np.random.Generator) -> NDArray[np.int64]:

@@ -30,65 +30,79 @@ the mask as they stand in the record.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.correlation import correlation_time
+from sysid.estimation.least_squares.provider import AbstractWeighing
+from sysid.estimation.networks.basis import RebasedProvider
 from sysid.estimation.networks.joint_record import Record
 from sysid.estimation.networks.program_provider import ProgramProvider
 from sysid.estimation.networks.trained_members import TrainedMembers
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import Recursion
 from sysid.models.lagged.lagged_form import opened, side_by_side
+from sysid.models.lagged.vector_recursion import VectorRecursion
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RecursionProvider(ProgramProvider):
-    """Residuals of a :class:`Recursion`, in open loop (one step ahead) or closed loop (free run).
+class RecursionProvider(ProgramProvider, AbstractWeighing):
+    """Residuals of a recursion of one output or several, in open loop (one step ahead) or closed loop (free run).
 
     Args:
         template: Lags, neurons, scaling and bounds; its parameters are ignored.
         experiments: The records; each starts from its own history.
         closed: Free run if true, one step ahead otherwise.
         stride: Every so-manieth sample of a record counts.
+        output_weights: What a squared residual of each output counts, in scaled numbers; ``None`` for all alike.
     """
 
-    template: Recursion
+    template: Recursion | VectorRecursion
     experiments: tuple[Experiment, ...]
     closed: bool
     stride: int = 1
+    output_weights: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "experiments", tuple(self.experiments))
         trained = self._network()
         records = [self._record(one, trained.depth) for one in self.experiments]
-        self._fill(trained, records, trained.program.output_channel.tolist(), np.ones(1))
+        weights = np.array(self.output_weights or (1.0,) * self._n_outputs)
+        self._fill(trained, records, trained.program.output_channel.tolist(), 1.0 / np.sqrt(weights))
+
+    @property
+    def _n_outputs(self) -> int:
+        return len(self.template.columns.lags.inputs) - self.template.n_inputs
 
     def _network(self) -> TrainedMembers:
         """The network as a cascade of one in scaled numbers."""
-        template, n = self.template, self.template.lags.n_inputs
+        template, n = self.template, self.template.n_inputs
         columns = template.columns if self.closed else opened(template.columns, n)
         read = len(columns.lags.inputs)
-        low, high = template.bounds
+        bounds = template.bounds
+        alike = bool((bounds == bounds[0]).all())
+        low, high = bounds[0].tolist() if alike else (-np.inf, np.inf)
         columns = replace(columns, offset=(0.0,) * read, scale=(1.0,) * read, low=low, high=high)
-        return TrainedMembers.of_program(side_by_side([columns], read - 1), [columns], [True])
+        limits = () if alike else tuple((low, high) for low, high in bounds.tolist())
+        return TrainedMembers.of_program(side_by_side([columns], read - self._n_outputs, limits), [columns], [True])
 
     def _record(self, experiment: Experiment, depth: int) -> Record:
-        """An experiment in scaled numbers: inputs, in the open loop each past output that is read, and the output."""
-        experiment = experiment.from_measured(self.template.lags)
+        """An experiment in scaled numbers: inputs, in the open loop each past output that is read, and the outputs."""
+        lags, n = self.template.columns.lags, self.template.n_inputs
+        experiment = experiment.from_measured(lags)
         if not self.closed:
-            experiment = experiment.one_step(self.template.lags)
+            experiment = experiment.one_step(lags)
         u, measured = self.template.extended(experiment.inputs, experiment.history)
-        target = self.template.scaling.scale_output(experiment.output)
+        target = self.template.scaling.scale_output(experiment.output).reshape(len(experiment.output), -1)
         measured[depth:] = target
-        read = 1 if self.closed else 1 + len(self.template.lags.output)
+        read = [] if self.closed else [j for j, some in enumerate(lags.inputs[n:]) for _ in some]
         whole = Record(
-            values=np.column_stack([u, *[measured] * read]),
+            values=np.concatenate([u, measured[:, read], measured], axis=1),
             rows=np.arange(len(target)),
-            target=target[:, np.newaxis],
-            root_weights=None if experiment.weights is None else np.sqrt(experiment.weights)[:, np.newaxis],
+            target=np.asfortranarray(target),
+            root_weights=_roots(experiment, target.shape[1]),
         )
         if self.stride == 1:
             return whole
@@ -96,43 +110,76 @@ class RecursionProvider(ProgramProvider):
         return replace(
             whole,
             rows=whole.rows[every],
-            target=np.ascontiguousarray(whole.target[every]),
-            root_weights=None if roots is None else np.ascontiguousarray(roots[every]),
+            target=np.asfortranarray(whole.target[every]),
+            root_weights=None if roots is None else np.asfortranarray(roots[every]),
             whole=whole,
         )
 
     def _news(self, residuals: Sequence[NDArray[np.float64]]) -> float:
         """Of all samples, in those that count; see the base class."""
-        times = [len(one) * max(1.0, correlation_time(one[:, 0]) / self.stride) for one in residuals]
+        each = [[max(1.0, correlation_time(own) / self.stride) for own in one.T] for one in residuals]
+        times = [len(one) * float(np.mean(found)) for one, found in zip(residuals, each, strict=True)]
         return sum(times) / sum(map(len, residuals))
 
+    def variances(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mean squared residual of each output; see the base class."""
+        total, counted = np.zeros(self._n_outputs), np.zeros(self._n_outputs)
+        for record, away in zip(self._records, self._all_away(theta), strict=True):
+            weights = np.ones_like(away) if record.root_weights is None else record.root_weights**2
+            total += np.sum(weights * (away * self._errors) ** 2, axis=0)
+            counted += weights.sum(axis=0)
+        return total / np.maximum(counted, 1.0)
+
+    def with_output_weights(self, weights: tuple[float, ...]) -> RecursionProvider:
+        """The same residuals with other weights; see the base class."""
+        return replace(self, output_weights=weights)
+
     def output_variance(self, theta: NDArray[np.float64], factor: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Variance of the scaled output that is due to the parameters, to first order.
+        """Variance of the scaled outputs that is due to the parameters, to first order.
 
         Args:
             theta: Flat parameters.
             factor: ``F`` with covariance ``F F^T`` of the parameters, shape ``(n_parameters, n_directions)``.
 
         Returns:
-            Shape ``(n_counted_samples_of_all_records,)``, records one after the other. Memory does not grow with the
-            Jacobian.
+            Shape ``(n_counted_samples_of_all_records, n_outputs)``, records one after the other. Memory does not grow
+            with the Jacobian.
         """
         program, parts = self._trained.program_at(theta), []
         for record in self._records:
-            passed, found = self._pass(program.numbers, record, keep=True), np.zeros(len(record.rows))
-            for rows, [(moving, block)] in self._blocks(program, record, passed, len(theta)):
-                moved = block @ factor
-                found[rows][moving] = np.einsum("ij,ij->i", moved, moved)
+            passed, found = self._pass(program.numbers, record, keep=True), np.zeros(record.target.shape)
+            for rows, blocks in self._blocks(program, record, passed, len(theta)):
+                for j, (moving, block) in enumerate(blocks):
+                    moved = block @ factor[: block.shape[1]]
+                    found[rows, j][moving] = np.einsum("ij,ij->i", moved, moved)
             parts.append(found)
         return np.concatenate(parts)
 
-    def at(self, theta: NDArray[np.float64]) -> Recursion:
-        """The recursion with these parameters.
 
-        Args:
-            theta: Flat parameters.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RebasedRecursion(RebasedProvider, AbstractWeighing):
+    """The same, whose parameters stand in another basis."""
 
-        Returns:
-            The recursion.
-        """
-        return replace(self.template, theta=theta)
+    inner: RecursionProvider
+    output_weights: tuple[float, ...] | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "output_weights", self.inner.output_weights)
+
+    def variances(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mean squared residual of each output; see the base class."""
+        return self.inner.variances(self.to_plain @ theta)
+
+    def with_output_weights(self, weights: tuple[float, ...]) -> RebasedRecursion:
+        """The same residuals with other weights; see the base class."""
+        return replace(self, inner=self.inner.with_output_weights(weights))
+
+
+def _roots(experiment: Experiment, n_outputs: int) -> NDArray[np.float64] | None:
+    """Roots of what each sample of each output weighs; ``None`` where all count alike."""
+    if experiment.each is not None:
+        return np.asfortranarray(np.sqrt(experiment.each))
+    if experiment.weights is None:
+        return None
+    return np.asfortranarray(np.repeat(np.sqrt(experiment.weights)[:, np.newaxis], n_outputs, axis=1))

@@ -15,34 +15,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.networks.initialise import Layout
-from sysid.models import AbstractStructure, Lags, NARXModel, Recursion, Scaling
-
-
-def contains(larger: Lags, smaller: Lags) -> bool:
-    """Whether every regressor of one set is in the other.
-
-    Args:
-        larger: The set that is to contain.
-        smaller: The set that is to be contained.
-
-    Returns:
-        Whether it does.
-
-    Example:
-        >>> contains(Lags(inputs=((1, 2),), output=(1,)), Lags(inputs=((1,),), output=(1,)))
-        True
-    """
-    return (
-        larger.n_inputs == smaller.n_inputs
-        and all(set(few) <= set(many) for many, few in zip(larger.inputs, smaller.inputs, strict=True))
-        and set(smaller.output) <= set(larger.output)
-    )
+from sysid.models import AbstractStructure, Lags, NARXModel, Scaling, VectorScaling
+from sysid.models.contract.column_recursion import ColumnRecursion
+from sysid.models.lagged.lagged_form import AbstractLaggedForm
+from sysid.models.orders.lags import Lagged
 
 
 def check_initial(network: AbstractStructure, initial: AbstractStructure, n_inputs: int) -> None:
@@ -57,7 +40,7 @@ def check_initial(network: AbstractStructure, initial: AbstractStructure, n_inpu
         ConfigError: If it has hidden states, other lags, or more neurons.
     """
     ours, theirs = network.lagged(n_inputs), initial.lagged(n_inputs)
-    if ours is not None and theirs is not None and ours.contains(theirs):
+    if network == initial or (ours is not None and theirs is not None and ours.contains(theirs)):
         return
     raise ConfigError(
         "the initial fit is not contained in the network that is to start from it",
@@ -68,13 +51,12 @@ def check_initial(network: AbstractStructure, initial: AbstractStructure, n_inpu
     )
 
 
-def grown(source: Recursion, template: Recursion, fresh: NDArray[np.float64]) -> NDArray[np.float64]:
+def grown(source: AbstractLaggedForm, template: AbstractLaggedForm, fresh: NDArray[np.float64]) -> NDArray[np.float64]:
     """The parameters of a smaller network inside a larger one.
 
     Args:
         source: The smaller network, or a linear model.
-        template: Lags, neurons and scaling of the larger one; its parameters say only whether it has a linear part
-            and gates.
+        template: Lags, neurons and scaling of the larger one; its parameters are not read.
         fresh: A random start of the larger one, from which it takes the neurons that the smaller one lacks; shape
             ``(n_parameters,)``, over plain regressors.
 
@@ -84,42 +66,43 @@ def grown(source: Recursion, template: Recursion, fresh: NDArray[np.float64]) ->
     Raises:
         ConfigError: If the larger one does not contain the smaller.
     """
-    linear = len(template.theta) > template.neurons * (template.lags.n_regressors + 2) + 1
-    if (
-        not contains(template.lags, source.lags)
-        or source.neurons > template.neurons
-        or (not linear and bool(np.any(source.linear)))
-        or (template.gates is None and source.gates is not None)
-        or (source.neurons > 0 and source.activation != template.activation)
-    ):
+    ours, theirs = _lagged(template.columns), _lagged(source.columns)
+    few, many = (Layout.of_columns(one.columns, one.n_inputs) for one in (source, template))
+    parts = _parts(few, source.numbers)
+    # A linear part of zeros is none: an ARX model of a network without one may have it.
+    if not ours.contains(replace(theirs, linear=theirs.linear and bool(np.any(parts.w)))):
         raise ConfigError(
             "the initial fit is not contained in the network that is to start from it",
             where="initial",
-            expected=f"lags among {template.lags.inputs} and {template.lags.output}, up to {template.neurons} neurons "
-            f"({template.activation})",
-            got=f"lags {source.lags.inputs} and {source.lags.output}, {source.neurons} neurons ({source.activation})",
+            expected=str(ours),
+            got=str(theirs),
             remedy="start from a smaller network over the same lags or some of them, or leave initial out",
         )
-    small = _in_scaling(source, template.scaling)
-    kept = places(template.lags, source.lags)
-    r, k = template.lags.n_regressors, template.neurons
+    small = _in_scaling(parts, few, source, template.scaling)
+    kept, n = places(many.columns, few.columns), few.neurons
     theta = np.array(fresh, dtype=np.float64)
-    W, b, v = theta[: k * r].reshape(k, r), theta[k * r : k * (r + 1)], theta[k * (r + 1) : k * (r + 2)]
-    W[: source.neurons] = 0.0
-    W[: source.neurons, kept] = small.W
-    b[: source.neurons] = small.b
-    v[: source.neurons] = small.v
-    theta[k * (r + 2)] = small.constant
-    if linear:
-        w = theta[k * (r + 2) + 1 : k * (r + 2) + 1 + r]
-        w[:] = 0.0
-        w[kept] = small.w
-    if template.gates is not None:
-        V = theta[k * (r + 2) + 1 + r :].reshape(k, r)
-        V[: source.neurons] = 0.0
-        if small.V is not None:
-            V[: source.neurons, kept] = small.V
+    large = _parts(many, theta)  # views: what is put into them is in the parameters
+    large.W[:n] = 0.0
+    large.W[:n, kept] = small.W
+    large.b[:n] = small.b
+    large.v[:, :n] = small.v
+    large.constant[:] = small.constant
+    if many.linear:
+        large.w[:] = 0.0
+        large.w[:, kept] = small.w
+    if many.gated:
+        large.V[:n] = 0.0
+        if few.gated:
+            large.V[:n, kept] = small.V
     return theta
+
+
+def _lagged(columns: ColumnRecursion) -> Lagged:
+    """What a map is made of, each output a channel like the others."""
+    return Lagged(
+        lags=columns.lags, neurons=columns.neurons, linear=columns.linear, gated=columns.gated,
+        activation=columns.activation,
+    )  # fmt: skip
 
 
 def widened(model: NARXModel, reads: Dict[str, tuple[int, ...]], sources: Dict[str, NARXModel]) -> NARXModel:
@@ -169,36 +152,56 @@ def widened(model: NARXModel, reads: Dict[str, tuple[int, ...]], sources: Dict[s
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Parts:
-    """A network's parameters by what they do; the letters are those of the module's docstring."""
+    """A network's parameters by what they do; the letters are those of the module's docstring.
+
+    Shapes: ``W`` and ``V`` ``(neurons, regressors)``, ``v`` ``(outputs, neurons)``, ``w`` ``(outputs, regressors)``;
+    ``V`` is empty without gates, ``w`` zero without a linear part.
+    """
 
     W: NDArray[np.float64]
     b: NDArray[np.float64]
     v: NDArray[np.float64]
-    V: NDArray[np.float64] | None
+    V: NDArray[np.float64]
     w: NDArray[np.float64]
-    constant: float
+    constant: NDArray[np.float64]
 
 
-def _in_scaling(source: Recursion, to: Scaling) -> _Parts:
-    """The same function in other scaled numbers."""
-    ours = source.scaling
-    channel = source.lags.input_channel
-    n_outputs = len(source.lags.output)
-    slope_u = np.array(to.input_scale) / np.array(ours.input_scale)
-    shift_u = (np.array(to.input_offset) - np.array(ours.input_offset)) / np.array(ours.input_scale)
-    slope_y = to.output_scale / ours.output_scale
-    shift_y = (to.output_offset - ours.output_offset) / ours.output_scale
-    A = np.concatenate([slope_u[channel], np.full(n_outputs, slope_y)])
-    c = np.concatenate([shift_u[channel], np.full(n_outputs, shift_y)])
-    r, d = 1.0 / slope_y, -shift_y / slope_y
+def _parts(layout: Layout, theta: NDArray[np.float64]) -> _Parts:
+    """Views of flat parameters."""
+    r, k, m = layout.lags.n_regressors, layout.neurons, len(layout.outputs)
+    affine = theta[layout.affine]
     return _Parts(
-        W=source.hidden_weights * A,
-        b=source.hidden_bias + source.hidden_weights @ c,
-        v=r * (source.readout if source.gates is None else source.readout + source.gates @ c),
-        V=None if source.gates is None else r * source.gates * A,
-        w=r * source.linear * A,
-        constant=r * (source.constant + float(source.linear @ c)) + d,
+        W=theta[: k * r].reshape(k, r),
+        b=theta[k * r : k * (r + 1)],
+        v=theta[layout.readout].reshape(m, k),
+        V=theta[layout.gates].reshape(-1, r),
+        w=affine[m:].reshape(m, r) if layout.linear else np.zeros((m, r)),
+        constant=affine[:m],
     )
+
+
+def _in_scaling(parts: _Parts, layout: Layout, source: AbstractLaggedForm, to: Scaling | VectorScaling) -> _Parts:
+    """The same function in other scaled numbers."""
+    theirs, channel = source.columns, layout.columns.input_channel
+    offset, scale = (np.concatenate([np.atleast_1d(one) for one in both]) for both in _numbers(to))
+    slopes, shifts = scale / np.array(theirs.scale), (offset - np.array(theirs.offset)) / np.array(theirs.scale)
+    A, c = slopes[channel], shifts[channel]
+    out = slice(len(slopes) - len(layout.outputs), None)
+    r, d = 1.0 / slopes[out], -shifts[out] / slopes[out]
+    gated = len(parts.V) > 0
+    return _Parts(
+        W=parts.W * A,
+        b=parts.b + parts.W @ c,
+        v=r[:, np.newaxis] * (parts.v + parts.V @ c if gated else parts.v),
+        V=r[0] * parts.V * A,
+        w=r[:, np.newaxis] * parts.w * A,
+        constant=r * (parts.constant + parts.w @ c) + d,
+    )
+
+
+def _numbers(scaling: Scaling | VectorScaling) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    """Offsets and scales of inputs and outputs."""
+    return (scaling.input_offset, scaling.output_offset), (scaling.input_scale, scaling.output_scale)
 
 
 def places(larger: Lags, smaller: Lags) -> list[int]:

@@ -179,6 +179,7 @@ class Experiment:
             weights=None if self.weights is None else self.weights[n:],
             usable=None if self.usable is None else self.usable[n:],
             past=usable[:n],
+            each=None if self.each is None else self.each[n:],
         )
 
     def one_step(self, lags: Lags) -> Experiment:
@@ -196,7 +197,8 @@ class Experiment:
         known = self._known_rows(lags.depth, {*lags.output, *(lag for of in lags.inputs for lag in of)})
         if known.all():
             return self
-        return replace(self, weights=self._weighted(known))
+        each = None if self.each is None else self.each * known[:, np.newaxis]
+        return replace(self, weights=self._weighted(known), each=each)
 
     def _weighted(self, known: NDArray[np.bool_]) -> NDArray[np.float64]:
         weights = np.ones(len(known)) if self.weights is None else self.weights

@@ -95,11 +95,15 @@ def ends_of(limits: str | Between | None, experiments: Sequence[Experiment], out
         return None, None
     if not isinstance(limits, str):
         return limits
-    kept = [(e.inputs, e.output) if e.usable is None else (e.inputs[e.usable], e.output[e.usable]) for e in experiments]
-    found = found_ends(kept)
+    found = found_ends(_counting(experiments))
     if found == (None, None):
         raise _no_end(output)
     return found
+
+
+def _counting(experiments: Sequence[Experiment]) -> list[tuple[Array, Array]]:
+    """Inputs and outputs where these count."""
+    return [(e.inputs, e.output) if e.usable is None else (e.inputs[e.usable], e.output[e.usable]) for e in experiments]
 
 
 def _no_end(output: str) -> ConfigError:
@@ -114,13 +118,13 @@ def _no_end(output: str) -> ConfigError:
 
 
 def ends_of_several(
-    limits: str | Named | None, records: Sequence[tuple[Array, Array]], outputs: Sequence[str]
+    limits: str | Named | None, experiments: Sequence[Experiment], outputs: Sequence[str]
 ) -> tuple[Between, ...]:
     """The limits of several outputs: none, given ones, or those that the records show.
 
     Args:
         limits: As a structure has them.
-        records: Of each record the inputs, and the outputs, shape ``(n_samples, n_outputs)``; samples that count.
+        experiments: The records.
         outputs: Their names.
 
     Returns:
@@ -140,6 +144,7 @@ def ends_of_several(
             )  # fmt: skip
         given = dict(limits)
         return tuple(given.get(name, (None, None)) for name in outputs)
+    records = _counting(experiments)
     found = tuple(found_ends([(u, y[:, j]) for u, y in records]) for j in range(len(outputs)))
     if all(one == (None, None) for one in found):
         raise _no_end(" and ".join(outputs))

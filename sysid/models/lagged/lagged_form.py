@@ -191,6 +191,39 @@ class AbstractLaggedForm(AbstractForm):
         room[depth:, : self.n_inputs] = inputs
         return room
 
+    def extended(self, inputs: Array, history: History) -> tuple[Array, Array]:
+        """Scaled inputs with their past, and room for the outputs after their past.
+
+        Args:
+            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
+            history: The samples before.
+
+        Returns:
+            Inputs of shape ``(depth + n_samples, n_inputs)`` and outputs of shape ``(depth + n_samples, n_outputs)``,
+            both scaled; the outputs' last ``n_samples`` are zero.
+
+        Raises:
+            TraceError: If the number of inputs is not the model's.
+        """
+        inputs = self._checked(inputs, history)
+        past_inputs, past_output = history.padded(self.columns.lags.depth)
+        past = self.scaling.scale_output(past_output).reshape(len(past_inputs), -1)
+        u = self.scaling.scale_inputs(np.concatenate([past_inputs, inputs]))
+        return u, np.concatenate([past, np.zeros((len(inputs), past.shape[1]))])
+
+    @property
+    def bounds(self) -> Array:
+        """Between what the kernels hold each output, in scaled numbers: bounds within the limits.
+
+        Returns:
+            Shape ``(n_outputs, 2)``, infinite for none.
+        """
+        n = len(self.columns.lags.inputs) - self.n_inputs
+        given = self.output_limits or ((None, None),) * n
+        sides = np.array([[-np.inf if low is None else low, np.inf if high is None else high] for low, high in given])
+        low, high = self.scaling.scale_output(sides.T)
+        return np.clip([[self.low], [self.high]], low, high).T
+
     def _checked(self, inputs: Array, history: History) -> Array:
         """Inputs of the right shape, or an error."""
         fitting_columns(history.inputs, self.n_inputs)

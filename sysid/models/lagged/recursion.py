@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.models.channels.ends import read_now
-from sysid.models.channels.history import History
 from sysid.models.channels.scaling import Scaling
 from sysid.models.contract.column_recursion import ColumnRecursion
 from sysid.models.lagged.lagged_form import AbstractLaggedForm
@@ -76,21 +75,6 @@ class Recursion(AbstractLaggedForm):
                 got=f"shape {theta.shape}",
                 remedy="use parameters that were fitted with this structure",
             )
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Between what the kernels hold the output, in scaled numbers: bounds within the limits."""
-        low, high = self._limits
-        return min(max(self.low, low), high), min(max(self.high, low), high)
-
-    @property
-    def _limits(self) -> tuple[float, float]:
-        """The limits in scaled numbers, infinite for none."""
-        low, high = (
-            far if one is None else float(self.scaling.scale_output(np.array(one)))
-            for one, far in zip(self.between, (-np.inf, np.inf), strict=True)
-        )
-        return low, high
 
     @property
     def n_inputs(self) -> int:
@@ -160,28 +144,6 @@ class Recursion(AbstractLaggedForm):
             high=self.high,
             activation=self.activation,
         )
-
-    def extended(
-        self, inputs: NDArray[np.float64], history: History
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Scaled inputs with their past, and room for the output after its past.
-
-        Args:
-            inputs: Shape ``(n_samples, n_inputs)``, in the channels' units.
-            history: The samples before.
-
-        Returns:
-            Inputs of shape ``(depth + n_samples, n_inputs)`` and output of shape ``(depth + n_samples,)``,
-            both scaled; the output's last ``n_samples`` are zero.
-
-        Raises:
-            TraceError: If the number of inputs is not the model's.
-        """
-        inputs = self._checked(inputs, history)
-        past_inputs, past_output = history.padded(self.lags.depth)
-        u = self.scaling.scale_inputs(np.concatenate([past_inputs, inputs]))
-        y = np.concatenate([self.scaling.scale_output(past_output), np.zeros(len(inputs))])
-        return u, y
 
     def reads_now(self, inputs: tuple[str, ...]) -> frozenset[str]:
         """Inputs that it reads with a lag of 0."""

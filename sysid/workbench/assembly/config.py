@@ -163,12 +163,12 @@ class AssemblyConfig(Words):
     @property
     def plan(self) -> TrainingPlan:
         """The stages of its training."""
-        learning = [one.plan(self.seed) for one in self.learning_rounds]
+        learning = [one.plan() for one in self.learning_rounds]
         return TrainingPlan(
             outputs=self.choose_on or self.outputs,
             one_step=None if self.one_step is None else self.one_step.options(),
             retrain=None if self.retrain is None else self.retrain.options(),
-            rounds=tuple(one.plan(self.seed) for one in self.joint),
+            rounds=tuple(one.plan() for one in self.joint),
             active_learning=None if self.active_learning is None else self.active_learning.options(learning),
         )
 

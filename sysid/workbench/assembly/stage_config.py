@@ -188,11 +188,8 @@ class TogetherConfig(Words):
             found.append(found[-1].model_copy(update={**given, "training": training}))
         return tuple(found[1:])
 
-    def plan(self, seed: int) -> RoundPlan:
+    def plan(self) -> RoundPlan:
         """The first round, as it is trained.
-
-        Args:
-            seed: Of its training, where that names none.
 
         Returns:
             The round.
@@ -207,7 +204,7 @@ class TogetherConfig(Words):
             measured=self.measured,
             share_weights=self.share_weights,
             reads=self.reads,
-            training=JointTraining(**{"seed": seed, **given}),
+            training=JointTraining(**given),
             traces=self.traces,
             also=self.also,
         )
@@ -224,7 +221,7 @@ def check_rounds(rounds: Sequence[TogetherConfig]) -> None:
     """
     try:
         for one in rounds:
-            one.plan(seed=0)
+            one.plan()
     except ConfigError as error:
         raise as_field_error(error) from error
 

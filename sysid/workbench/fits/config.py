@@ -21,6 +21,7 @@ from sysid.estimation.estimator import Options
 from sysid.estimation.estimators import check as check_request
 from sysid.estimation.estimators import estimator_of
 from sysid.field_checks import FieldError
+from sysid.models import AbstractStructure
 from sysid.names import slug
 from sysid.workbench.annotation import AnnotateConfig
 from sysid.workbench.fields import (
@@ -150,15 +151,31 @@ class PipelineConfig(SharedConfig):
 
     @model_validator(mode="after")
     def _check_inputs(self) -> PipelineConfig:
-        structures = {fit.name: fit.structure for fit in self.fits}
         for fit in self.fits:
-            initial = None if fit.initial is None else structures[fit.initial]
             try:
-                structure = fit.structure.for_outputs(len(self.mapping.outputs))
-                check_request(structure, self.mapping, initial=initial)
+                initial = None if fit.initial is None else self.fitted_as(self._named(fit.initial))
+                check_request(self.fitted_as(fit), self.mapping, initial=initial)
             except ConfigError as error:
                 raise as_field_error(error, f"the fit {fit.name!r}") from error
         return self
+
+    def fitted_as(self, fit: FitConfig) -> AbstractStructure:
+        """The structure that is fitted: of several outputs the one that all share, where there is one.
+
+        What begins with a fit that has a model an output is a model an output itself.
+
+        Args:
+            fit: One of the fits.
+
+        Returns:
+            The structure.
+        """
+        n = len(self.mapping.outputs)
+        alone = fit.initial is not None and n > 1 and not self.fitted_as(self._named(fit.initial)).several_outputs
+        return fit.structure if alone else fit.structure.for_outputs(n)
+
+    def _named(self, name: str) -> FitConfig:
+        return next(one for one in self.fits if one.name == name)
 
     @property
     def rest_output(self) -> float | dict[str, float] | None:

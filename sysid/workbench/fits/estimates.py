@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from sysid.errors import ConfigError
-from sysid.estimation import FitProgress, FitResult, JointTraining, Training
+from sysid.estimation import FitProgress, FitResult, Training
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.estimation.stability.check import LEAST_S
@@ -58,8 +58,6 @@ def how_long(fit: FitConfig, config: PipelineConfig, data: Data) -> Estimate:
         At most so long.
     """
     training = fit.training_options(config.seed)
-    if isinstance(training, JointTraining):
-        return _joint(training, lambda few: _fitted(fit, config, data, few, lambda _: None))
     if not isinstance(training, Training):
         return Estimate(seconds=_linear(fit, config, data), basis=f"measured now on 1/{SHARE} of the samples")
     fits: list[FitResult] = []
@@ -84,22 +82,6 @@ def _checked(found: FitResult, fit: FitConfig, config: PipelineConfig, data: Dat
         estimator_of(fit.structure).stability.of(options, found.model.mapping, data.estimation).applied(found)
         seconds = time.perf_counter() - began
     return seconds * asked.count / max(count, 1)
-
-
-def _joint(training: JointTraining, fit: Callable[[JointTraining], object]) -> Estimate:
-    """How long the training of a network of several outputs takes."""
-    few = dataclasses.replace(
-        training, max_iterations=CALIBRATION_ITERATIONS, starts=1, checkpoints=1, max_time_s=CALIBRATION_LIMIT_S
-    )
-    fit(dataclasses.replace(few, max_iterations=1))  # compiles
-    began = time.perf_counter()
-    fit(few)
-    iteration = (time.perf_counter() - began) / CALIBRATION_ITERATIONS
-    # Half of the starts are dropped at each look, the first of which comes after a share of the iterations.
-    share = 1.0 + sum(2.0**-look * (training.starts - 1) for look in range(1, training.checkpoints + 1)) / 2.0
-    iterations = training.max_iterations * min(share, training.starts)
-    seconds = min(iterations * iteration, training.max_time_s)
-    return Estimate(seconds=seconds, basis=f"at most: {iterations:.0f} iterations of {1e3 * iteration:.1f} ms")
 
 
 def network_time(
@@ -154,7 +136,7 @@ def _fitted(
     fit: FitConfig,
     config: PipelineConfig,
     data: Data,
-    training: Training | JointTraining,
+    training: Training,
     note: Callable[[FitProgress], None],
 ) -> FitResult:
     few = {name: getattr(training, name) for name in FEW if hasattr(training, name)}

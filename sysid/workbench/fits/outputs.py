@@ -52,7 +52,7 @@ def models_of(fit: FitConfig, config: PipelineConfig) -> tuple[FitModel, ...]:
     if len(mapping.outputs) == 1:
         return (FitModel(fit=fit, config=config, outputs=(FitOutput(fit=fit, config=config),)),)
     outputs = tuple(FitOutput(fit=_named(fit, one.output, config), config=_of(config, one)) for one in mapping.each)
-    structure = fit.structure.for_outputs(len(mapping.outputs))
+    structure = config.fitted_as(fit)
     if structure.several_outputs:
         fit = fit.model_copy(update={"structure": structure})
         outputs = tuple(replace(one, fit=one.fit.model_copy(update={"structure": structure})) for one in outputs)

@@ -202,7 +202,6 @@ def test_windows_never_take_a_better_start_away() -> None:
 @pytest.mark.parametrize(
     "fields",
     [
-        {"starts": 0},
         {"stride": 0},
         {"moves": 0.0},
         {"windows": (1,)},

@@ -9,10 +9,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sysid.errors import ConfigError
-from sysid.estimation import JointTraining, Loop, fit_vector_narx
+from sysid.estimation import Loop, Training, fit_narx
+from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import Layout
+from sysid.estimation.networks.pretraining import StepSamples
+from sysid.estimation.networks.provider import RecursionProvider
+from sysid.estimation.networks.warm_start import grown
 from sysid.estimation.records.experiment import Experiment
-from sysid.models import Cascade, History, Mapping, Start, StartKind, VectorNARX, beginning
+from sysid.models import NARX, History, Mapping, Start, StartKind, VectorNARX, beginning
 from sysid.models.contract.column_recursion import ColumnRecursion
 from sysid.models.store import model_from_dict
 from sysid.testing import finite_difference_jacobian
@@ -53,15 +57,15 @@ def between_stops(n: int = 600, seed: int = 0) -> Trace:
 
 def test_outputs_are_held_at_their_ends_inside_the_recursion_the_others_are_free():
     held, free = (replace(NETWORK, limits=limits) for limits in ("found", None))
-    rest, options = {"x": 2.0, "y": 0.0}, JointTraining(max_iterations=60)
+    rest, options = {"x": 2.0, "y": 0.0}, Training(max_iterations=60)
     records = [between_stops(), between_stops(seed=1)]
-    fits = [fit_vector_narx(records, MAPPING, one, options, rest_output=rest) for one in (held, free)]
+    fits = [fit_narx(records, MAPPING, one, options, rest_output=rest) for one in (held, free)]
     assert {name: (one.low, one.high) for name, one in fits[0].model.limits.items()} == {"x": (0.0, 4.0)}
     assert "The free run of x is held at 0 mm from below and at 4 mm from above." in fits[0].notes
     unseen = between_stops(seed=5)
     runs = [fit.model.run_from(unseen.columns(["u"]), np.array([2.0, 0.0])) for fit in fits]
     off = [np.sqrt(np.mean((run[:, 0] - unseen["x"]) ** 2)) / 4.0 for run in runs]
-    assert off[0] < 0.01 < off[1]
+    assert off[0] < 0.2 * off[1]
     assert (runs[0][:, 0].min(), runs[0][:, 0].max()) == (0.0, 4.0)  # to the last bit
     again = model_from_dict(fits[0].model.to_dict())
     assert_array_equal(again.run_from(unseen.columns(["u"]), np.array([2.0, 0.0])), runs[0])
@@ -71,31 +75,31 @@ def test_outputs_are_held_at_their_ends_inside_the_recursion_the_others_are_free
     named = replace(NETWORK, limits={"x": [0, None]})
     assert VectorNARX(**{k: v for k, v in named.to_dict().items() if k != "kind"}) == named
     with pytest.raises(ConfigError, match="which is no output"):
-        fit_vector_narx([between_stops()], MAPPING, replace(NETWORK, limits={"z": [0, 1]}), options)
+        fit_narx([between_stops()], MAPPING, replace(NETWORK, limits={"z": [0, 1]}), options)
     with pytest.raises(ConfigError, match="stands at no end"):
-        fit_vector_narx([coupled()], MAPPING, held, options)
+        fit_narx([coupled()], MAPPING, held, options)
     with pytest.raises(ConfigError, match="not limits of several outputs"):
         replace(NETWORK, limits=[0, 1])
 
 
 def test_a_coupled_system_is_found_in_free_run():
-    training = JointTraining(max_iterations=60, starts=2)
-    fit = fit_vector_narx([coupled(), coupled(seed=1)], MAPPING, NETWORK, training, selection=[coupled(seed=2)])
+    training = Training(max_iterations=60, starts=2)
+    fit = fit_narx([coupled(), coupled(seed=1)], MAPPING, NETWORK, training, selection=[coupled(seed=2)])
     unseen = coupled(seed=3)
     run = fit.model.simulate(unseen.columns(["u"]))
     for column, name in enumerate(("x", "y")):
         assert np.mean((run[:, column] - unseen[name]) ** 2) < 1e-3 * np.var(unseen[name])
     assert fit.seed in {0, 1}
-    assert len(fit.notes) >= 3
-    again = fit_vector_narx([coupled()], MAPPING, NETWORK, JointTraining(max_iterations=2, checkpoints=1), initial=fit)
+    assert len(fit.attempts) >= 2
+    again = fit_narx([coupled()], MAPPING, NETWORK, Training(max_iterations=2), initial=fit)
     assert again.seed is None
-    with pytest.raises(ConfigError, match="another structure"):
-        fit_vector_narx([coupled()], MAPPING, NETWORK, initial=replace(fit, model=block("u -> x+y")))
+    with pytest.raises(ConfigError, match="not contained"):
+        fit_narx([coupled()], MAPPING, NETWORK, initial=replace(fit, model=block("u -> x+y")))
 
 
 def test_a_fit_is_its_seed():
-    training = JointTraining(max_iterations=4, checkpoints=2, seed=5)
-    one, two = (fit_vector_narx([coupled()], MAPPING, NETWORK, training).model.theta for _ in range(2))
+    training = Training(max_iterations=4, seed=5)
+    one, two = (fit_narx([coupled()], MAPPING, NETWORK, training).model.theta for _ in range(2))
     assert_array_equal(one, two)
 
 
@@ -140,21 +144,6 @@ def test_structures_that_cannot_be_are_refused(fields, n, match):
         VectorNARX(**({"input_delays": 2, "output_delays": 2, "neurons": 2} | fields)).lags(*n)
 
 
-def test_a_record_on_which_the_run_is_lost_counts_less_in_a_robust_loss():
-    shifted = coupled(seed=1)
-    lost = Trace(
-        name="shifted",
-        sample_time=0.1,
-        channels=shifted.channels,
-        values=shifted.values + np.where(np.arange(len(shifted)) > 400, 20.0, 0.0)[:, None] * [0.0, 1.0, 1.0],
-    )
-    plain, robust = (
-        fit_vector_narx([coupled(), lost], MAPPING, NETWORK, JointTraining(max_iterations=3, robust_scale=margin)).model
-        for margin in (np.inf, 1.0)
-    )
-    assert not np.array_equal(plain.theta, robust.theta)
-
-
 FREE = Start(kind=StartKind.ESTIMATED)
 
 
@@ -177,31 +166,17 @@ ONE_LAG = VectorNARX(input_delays=[1], output_delays=1, neurons=1)
 def test_records_may_begin_out_of_equilibrium(start):
     """Nothing is taken for granted of what came before: held at its first sample it would be another system."""
     bursts = [off_balance(seed) for seed in (1, 2, 3)]
-    fit = fit_vector_narx(bursts, MAPPING, ONE_LAG, JointTraining(max_iterations=60), start=start)
+    fit = fit_narx(bursts, MAPPING, ONE_LAG, Training(max_iterations=60), start=start)
     unseen = off_balance(4)
     begun = beginning(fit.model, unseen.columns(["u"]), unseen.columns(["x", "y"]), start)
     run = fit.model.simulate(unseen.columns(["u"])[begun.first :], begun.history)
     assert_allclose(run, unseen.columns(["x", "y"])[begun.first :], atol=4e-4)
 
 
-def test_sensitivities_of_records_that_begin_measured_equal_finite_differences():
-    bursts = [off_balance(1), off_balance(2)]
-    model = block("u -> x+y", output_delays=[[1, 3], [2]])
-    lags = model.lags
-
-    def record(trace: Trace) -> Experiment:
-        return Experiment.from_trace(trace, MAPPING, FREE, np.zeros(2)).from_measured(lags)
-
-    provider = JointTraining().provider(Cascade(models=(model,)), bursts, {"x": 1.0, "y": 2.0}, measured=record)
-    theta = 0.3 * np.random.default_rng(0).standard_normal(len(provider.theta))
-    assert provider.n_samples == 2 * (2 * 60 - 2 * lags.depth)
-    assert_allclose(provider.jacobian(theta), finite_difference_jacobian(provider.residuals, theta), atol=1e-6)
-
-
 def test_the_outputs_have_intervals_that_hold_what_is_measured():
-    training = JointTraining(max_iterations=40)
+    training = Training(max_iterations=40)
     noisy = [off_balance(seed, 200, noise=0.05) for seed in range(3)]
-    fit = fit_vector_narx(noisy, MAPPING, ONE_LAG, training, start=FREE)
+    fit = fit_narx(noisy, MAPPING, ONE_LAG, training, start=FREE)
     for loop in Loop:
         unseen = off_balance(7, 200, noise=0.05)
         interval = predict_interval(fit, unseen, loop=loop, start=FREE)
@@ -217,23 +192,111 @@ def of(trace: Trace) -> TraceSet:
     return TraceSet(name="unseen", traces=(trace,), roles={trace.name: Role.VALIDATION}, source="")
 
 
-def test_windows_lead_a_start_of_a_network_of_several_outputs() -> None:
-    options = JointTraining(max_iterations=5, windows=(40, 160))
-    for start in (None, Start(kind=StartKind.ESTIMATED)):
-        fit = fit_vector_narx([coupled(400)], MAPPING, NETWORK, options, start=start, selection=[coupled(400, 1)])
-        assert any("windows of 40, 160 samples" in note for note in fit.notes)
-        assert {one.start for one in fit.attempts} == {1, 2}
+@pytest.mark.parametrize("closed", [True, False], ids=["free run", "one step ahead"])
+@pytest.mark.parametrize("between", [(), ((-0.5, 0.6), (None, None))], ids=["free", "one held"])
+def test_sensitivities_of_records_that_begin_measured_equal_finite_differences(closed, between):
+    form = replace(block("u -> x+y", output_delays=[[1, 3], [2]]), between=between).recursion
+    bursts = [Experiment.from_trace(off_balance(seed), MAPPING, FREE, np.zeros(2)) for seed in (1, 2)]
+    provider = RecursionProvider(template=form, experiments=bursts, closed=closed, output_weights=(1.0, 0.25), stride=2)
+    theta = 0.3 * np.random.default_rng(0).standard_normal(len(form.theta))
+    assert provider.n_samples == 2 * 2 * len(range(0, 60 - form.lags.depth, 2))
+    assert_allclose(provider.jacobian(theta), finite_difference_jacobian(provider.residuals, theta), atol=1e-6)
 
 
-def test_a_drawn_start_is_not_taken_for_one_that_is_lost() -> None:
-    fit = fit_vector_narx([coupled(400)], MAPPING, NETWORK, JointTraining(max_iterations=5))
-    assert not any("windows" in note for note in fit.notes)
+def test_one_step_residuals_of_several_outputs_have_their_derivatives():
+    model, record = block("u -> x+y"), Experiment.from_trace(off_balance(1), MAPPING, FREE, np.zeros(2))
+    layout = Layout.of(model.network, 1, 2)
+    gaps = np.ones((60, 2))
+    gaps[20:30, 1] = 0.0
+    seen = replace(record, each=gaps).from_measured(layout.columns)
+    samples = StepSamples.of(model, [seen], layout, RegressorBasis.identity(layout.lags), samples=10_000, seed=0)
+    depth = layout.columns.depth
+    assert samples.n_samples == 2 * (60 - depth) - 10
+    theta = 0.3 * np.random.default_rng(0).standard_normal(layout.n_parameters)
+    at = samples.linearise(theta)
+    gradient = [(samples.loss(theta + step) - samples.loss(theta - step)) / 2e-6 for step in 1e-6 * np.eye(len(theta))]
+    assert_allclose(at.gradient, gradient, rtol=1e-6, atol=1e-6)
 
 
-def test_without_selection_traces_nothing_is_said_of_an_error_there() -> None:
-    options = JointTraining(max_iterations=5, starts=2)
-    alone = fit_vector_narx([coupled(400)], MAPPING, NETWORK, options).notes
-    assert not any("nan" in note or "selection" in note for note in alone)
-    assert any("mean squared residual (iterations): " in note for note in alone)
-    chosen = fit_vector_narx([coupled(400)], MAPPING, NETWORK, options, selection=[coupled(400, 1)]).notes
-    assert any("error on the selection traces (iterations): " in note for note in chosen)
+def test_a_sample_that_is_masked_for_one_output_counts_for_the_other():
+    trace = off_balance(1)
+    masked = replace(trace, usable=np.column_stack([np.ones((60, 2), dtype=bool), np.arange(60) < 40]))
+    record = Experiment.from_trace(masked, MAPPING, FREE, np.zeros(2))
+    provider = RecursionProvider(template=block("u -> x+y").recursion, experiments=[record], closed=True)
+    depth = block("u -> x+y").lags.depth
+    assert provider.n_samples == (60 - depth) + (40 - depth)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param({"loop": Loop.OPEN}, id="one step ahead"),
+        pytest.param({"pretraining": 100, "pretraining_iterations": 5}, id="pretraining"),
+        pytest.param({"offsets": [{"u": 0.1, "x": 0.1}]}, id="offsets"),
+        pytest.param({"stride": 3}, id="stride"),
+        pytest.param({"regularisation": 0.01}, id="regularisation"),
+        pytest.param({"basis": "plain"}, id="plain basis"),
+        pytest.param({"window": 40}, id="windows"),
+        pytest.param({"starts": 3, "ensemble": 3}, id="ensemble"),
+        pytest.param({"starts": 3, "input_subsets": [["u"]]}, id="subsets of inputs"),
+    ],
+)
+def test_every_option_of_a_network_is_for_several_outputs_too(options):
+    two = Mapping.parse("u+w -> x+y")
+    one = coupled(400)
+    wide = [with_channel(record, "w") for record in (one, coupled(400, 1))]
+    training = Training(**{"max_iterations": 30} | options)
+    fit = fit_narx(wide[:1], two, replace(NETWORK, input_delays=((0,), (0, 1))), training, selection=wide[1:])
+    run = fit.model.simulate(wide[1].columns(two.inputs))
+    off = np.mean((run - wide[1].columns(two.outputs)) ** 2, axis=0) / np.var(wide[1].columns(two.outputs), axis=0)
+    assert off.max() < 0.1
+    assert type(fit.model).__name__ == "VectorNARXModel"
+
+
+def with_channel(record: Trace, name: str) -> Trace:
+    """A record with one more channel, of noise."""
+    more = np.random.default_rng(9).standard_normal((len(record), 1))
+    channels = (*record.channels, Channel(name=name, unit="psi"))
+    return replace(record, channels=channels, values=np.column_stack([record.values, more]))
+
+
+def test_a_noisy_output_does_not_blur_what_a_clean_one_shows(monkeypatch):
+    noises, rng, offs = np.array([0.0, 1.0, 0.005]), np.random.default_rng(0), {}
+    records = [off_balance(seed) for seed in range(6)]
+    noisy = [replace(one, values=one.values + noises * rng.standard_normal(one.values.shape)) for one in records]
+    unseen = off_balance(7)
+    for rounds in (0, 3):
+        monkeypatch.setattr("sysid.estimation.networks.starts.output_weights.ROUNDS", rounds)
+        fit = fit_narx(noisy, MAPPING, ONE_LAG, Training(max_iterations=60), start=FREE)
+        begun = beginning(fit.model, unseen.columns(["u"]), unseen.columns(["x", "y"]), FREE)
+        run = fit.model.simulate(unseen.columns(["u"])[begun.first :], begun.history)
+        offs[rounds] = np.sqrt(np.mean((run[:, 1] - unseen["y"][begun.first :]) ** 2))
+    assert offs[3] < 0.7 * offs[0]
+
+
+def test_a_network_of_one_output_is_one_network_where_there_are_several():
+    plain = NARX(input_delays="0:1", output_delays=2, neurons=4, activation="cubic")
+    several = plain.for_outputs(2)
+    assert several == VectorNARX(input_delays="0:1", output_delays=2, neurons=4, activation="cubic")
+    assert plain.for_outputs(1) is plain
+    assert replace(plain, limits="found").for_outputs(3).limits == "found"
+    for own in (replace(plain, gated=True), replace(plain, limits=(0.0, 1.0))):
+        assert own.for_outputs(2) is own
+
+
+@pytest.mark.parametrize(
+    "smaller",
+    [replace(NETWORK, neurons=0), replace(NETWORK, neurons=2), replace(NETWORK, feedthrough=False)],
+    ids=lambda one: one.label,
+)
+def test_a_network_begins_as_a_smaller_one_of_other_records(smaller):
+    first = fit_narx([coupled(300)], MAPPING, smaller, Training(max_iterations=20))
+    wider = [replace(coupled(300, 1), values=1.5 * coupled(300, 1).values)]
+    layout = Layout.of(NETWORK, 1, 2)
+    fresh = layout.draw(np.random.default_rng(0), layout.centre())
+    fresh[layout.readout] = 0.0
+    fit = fit_narx(wider, MAPPING, NETWORK, Training(max_iterations=1), initial=first)
+    grew = replace(fit.model, theta=grown(first.model.recursion, fit.model.recursion, fresh))
+    inputs = wider[0].columns(["u"])
+    assert_allclose(grew.simulate(inputs), first.model.simulate(inputs), atol=1e-9)
+    assert fit.seed is None

@@ -72,7 +72,7 @@ def test_a_noisy_output_does_not_blur_what_a_clean_one_shows(monkeypatch):
     network, training = VectorNeuralStateSpace(states=2, neurons=2), Training(max_iterations=60, starts=1)
 
     def error_of_the_clean_one(rounds: int) -> float:
-        monkeypatch.setattr("sysid.estimation.networks.neural.output_weights.ROUNDS", rounds)
+        monkeypatch.setattr("sysid.estimation.networks.starts.output_weights.ROUNDS", rounds)
         model = fit_neural_state_space([noisy], BOTH, network, training, start=FREE).model
         begun = beginning(model, noisy.columns(["u", "w"]), noisy.columns(["y", "z"]), FREE)
         run = model.simulate(noisy.columns(["u", "w"])[begun.first :], begun.history)

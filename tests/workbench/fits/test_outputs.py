@@ -57,10 +57,10 @@ fits:
     initial: ARX
   - name: whole
     structure: {kind: VectorNARX, input_delays: 1, output_delays: 1, neurons: 1}
-    training: {max_iterations: 3, checkpoints: 1, workers: 1}
+    training: {max_iterations: 3, workers: 1}
   - name: further
     structure: {kind: VectorNARX, input_delays: 1, output_delays: 1, neurons: 1}
-    training: {max_iterations: 2, checkpoints: 1, workers: 1}
+    training: {max_iterations: 2, workers: 1}
     initial: whole
 export: {fit: best, formats: [onnx]}
 """

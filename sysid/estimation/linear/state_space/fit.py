@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.linear import slow_poles
-from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.arx import rests_of
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, side_by_side
 from sysid.estimation.linear.state_space.dead_times import behind_dead_times, late
@@ -66,10 +66,7 @@ def fit_state_space(
     """
     began, training = now(), training or StateSpaceTraining()
     orders = orders.for_inputs(len(mapping.inputs))
-    given = (
-        rest_output if isinstance(rest_output, Dict) else {} if rest_output is None else {mapping.output: rest_output}
-    )
-    rests = tuple(given[one.output] if one.output in given else first_output(traces, one) for one in mapping.each)
+    rests = rests_of(traces, mapping, rest_output)
     input_units = tuple(traces[0].channel(name).unit for name in mapping.inputs)
     scalings, segments, determined = records_of(traces, mapping, orders, start=start, rests=rests)
     scaling: Any = VectorScaling.of(scalings) if orders.several_outputs else scalings[0]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.correlation import correlation_time
-from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.least_squares.provider import AbstractWeighing, Linearisation
 from sysid.estimation.networks.neural.records import NeuralRecord, NeuralRecords
 from sysid.estimation.networks.program_provider import BLOCK
 from sysid.kernels import neural_state_space as kernel
@@ -17,7 +17,7 @@ from sysid.kernels.arrays import forget_what_has_died_away
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NeuralProvider(NeuralRecords, AbstractProvider):
+class NeuralProvider(NeuralRecords, AbstractWeighing):
     """Residuals of a :class:`NeuralForm` in free run, as a function of its parameters and the records' states."""
 
     def nearest(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -101,14 +101,7 @@ class NeuralProvider(NeuralRecords, AbstractProvider):
         return np.concatenate([y.copy() for record in self._records for _, y, _ in self._blocks(record, theta)])
 
     def variances(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Mean squared residual of each output over the samples that count, in scaled numbers.
-
-        Args:
-            theta: Flat parameters.
-
-        Returns:
-            Shape ``(n_outputs,)``.
-        """
+        """Mean squared residual of each output; see the base class."""
         total, counted = np.zeros(self.template.sizes.outputs), np.zeros(self.template.sizes.outputs)
         for record in self._records:
             squares = self._error(record, theta)
@@ -120,6 +113,10 @@ class NeuralProvider(NeuralRecords, AbstractProvider):
             total += np.sum(weights * squares, axis=0)
             counted += weights.sum(axis=0)  # with the weights of outputs, which thus are none
         return np.asarray(total / counted)
+
+    def with_output_weights(self, weights: tuple[float, ...]) -> NeuralProvider:
+        """The same residuals with other weights; see the base class."""
+        return replace(self, output_weights=weights)
 
     def there_and_back(self, theta: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         """Scaled outputs over each record, and from there on over its inputs backwards, with signs and without bounds.

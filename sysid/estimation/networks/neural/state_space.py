@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
-from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.arx import rests_of
 from sysid.estimation.networks.neural.directions import begun_from, in_few_directions, run_name
 from sysid.estimation.networks.neural.ensemble import United, united
 from sysid.estimation.networks.neural.layout import NeuralLayout
 from sysid.estimation.networks.neural.map import learnt_map
-from sysid.estimation.networks.neural.output_weights import reweighted, weighed
 from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.neural.start import linear_start
 from sysid.estimation.networks.neural.thinned import Thinned
@@ -28,6 +27,7 @@ from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.advancing import advanced
 from sysid.estimation.networks.starts.choosing import Choice, choose
+from sysid.estimation.networks.starts.output_weights import reweighted, weighed
 from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
@@ -125,10 +125,7 @@ def fit_neural_state_space(
         ConfigError: If the training is for one step ahead, which a hidden state does not have, or has options that are
             for lagged regressors alone.
     """
-    told = (
-        rest_output if isinstance(rest_output, Dict) else {} if rest_output is None else {mapping.output: rest_output}
-    )
-    rests = tuple(told[one.output] if one.output in told else first_output(traces, one) for one in mapping.each)
+    rests = rests_of(traces, mapping, rest_output)
     named, begun = dict(zip(mapping.outputs, rests, strict=True)), start or Start()
     given: dict[str, Any] = {"mapping": mapping, "network": network, "start": begun, "rest_output": named, "vet": vet}
     given |= {"traces": traces, "selection": selection, "on_progress": on_progress}
@@ -207,7 +204,7 @@ def _fit(
     multistart = _multistart(template, records, training, provider, base=base, began=began, on_progress=on_progress)
     candidates = run_race(multistart)
     for best in _ends(candidates, training):
-        candidates += reweighted(multistart, provider, best)
+        candidates += [one for one, _ in reweighted(multistart, provider, best)]
     whole = None
     if training.ensemble > 1 and not multistart.stop.is_set():
         whole = united(multistart, provider, candidates, vet)

@@ -39,6 +39,7 @@ from sysid.models import (
     NARXModel,
     NeuralStateSpaceModel,
     Start,
+    VectorNARXModel,
     VectorNeuralStateSpaceModel,
 )
 from sysid.traces import Trace
@@ -64,7 +65,7 @@ class Place(IntEnum):
     LAST = 2
 
 
-Network: TypeAlias = NARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel | EquationModel
+Network: TypeAlias = NARXModel | VectorNARXModel | NeuralStateSpaceModel | VectorNeuralStateSpaceModel | EquationModel
 """What is trained here."""
 
 

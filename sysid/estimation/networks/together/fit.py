@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,8 +33,10 @@ NEGLIGIBLE = 1e-6
 """Squared residual below which a target counts as met: that of a thousandth of the error that counts as one. Without it
 a target that is exactly right on a trace, such as a channel held at its bound, would outweigh all others."""
 
-IN_WINDOWS = -1
-"""In the place of a seed: the start that was trained on windows first."""
+AS_GIVEN, IN_WINDOWS = 1, 2
+"""The starts: the members as they were, and what was trained on windows first."""
+NAMES = {AS_GIVEN: "as given", IN_WINDOWS: "-1"}
+"""What their runs are kept under."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,7 +44,6 @@ class _Candidate:
     """One start as it stood at a checkpoint; without a solution, as it was given."""
 
     start: int
-    seed: int | None
     model: Cascade
     score: float
     loss: float
@@ -58,7 +58,7 @@ class _Candidate:
         solution, evidence = self.solution, self.solution.evidence if self.solution else None
         return Attempt(
             start=self.start,
-            seed=self.drawn_by,
+            seed=None,
             iterations=self.iteration,
             elapsed_s=solution.curve[-1].elapsed_s if solution and solution.curve else 0.0,
             estimation_mse=self.loss,
@@ -70,14 +70,8 @@ class _Candidate:
         )
 
     @property
-    def drawn_by(self) -> int | None:
-        """Its seed; ``None`` where it was not drawn."""
-        return None if self.seed == IN_WINDOWS else self.seed
-
-    @property
     def origin(self) -> str:
-        named = {None: "the members as they were", IN_WINDOWS: "what windows led to"}
-        return named.get(self.seed, f"seed {self.seed}")
+        return {AS_GIVEN: "the members as they were", IN_WINDOWS: "what windows led to"}[self.start]
 
     @property
     def sentence(self) -> str:
@@ -96,8 +90,6 @@ class Joint:
         selection: Traces that choose among the states looked at, by the geometric mean over traces and targets of the
             squared error; without them the least loss chooses.
         on_progress: Called after every iteration.
-        scored: The free run of a model over a selection trace, by name, and the sample of the trace at which it begins;
-            by default from the levels before the trace.
     """
 
     provider: CascadeProvider
@@ -105,46 +97,38 @@ class Joint:
     training: JointTraining
     selection: Sequence[Trace] = ()
     on_progress: Callable[[FitProgress], None] = lambda _: None
-    scored: Callable[[Cascade, Trace], tuple[Dict[str, NDArray[np.float64]], int]] | None = None
 
-    def fit(self, starts: Sequence[tuple[int | None, NDArray[np.float64]]]) -> CascadeFit:
-        """Train from some starts, dropping half of them at each checkpoint.
-
-        What training on windows makes of the first of them, where there are such, is one start more.
+    def fit(self, begun: NDArray[np.float64]) -> CascadeFit:
+        """Train from a start, and from what training on windows makes of it, where there are such.
 
         Args:
-            starts: Seed, or ``None`` for the provider's own cascade, and parameters in the basis.
+            begun: Parameters of the provider's own cascade in the basis.
 
         Returns:
-            The best state seen; a start that was given is one of them.
+            The best state seen; the start is one of them.
         """
         training, began = self.training, now() - checkpoints_of(self.on_progress).earlier_s
-        begun, first = starts[0]
-        windows = LeadingWindows.of(training.windows, self.provider, self.layout.to_plain @ first, given=begun is None)
-        led, interrupted = self._through(windows.providers, first, began)
+        windows = LeadingWindows.of(training.windows, self.provider, self.layout.to_plain @ begun)
+        led, interrupted = self._through(windows.providers, begun, began)
+        seen = [self._candidate(AS_GIVEN, begun, None)]
+        # What windows led to may fall fast and end worse than the start that they began from: none of the two goes.
+        alive: dict[int, Solution | NDArray[np.float64]] = {AS_GIVEN: begun}
         if windows.providers:
-            starts = [*starts, (IN_WINDOWS, led)]
-        numbers = {seed: number for number, (seed, _) in enumerate(starts, start=1)}
-        seen = [self._candidate((numbers[None], None), theta, None) for seed, theta in starts if seed is None]
-        alive: list[tuple[int | None, Solution | NDArray[np.float64]]] = list(starts)
+            alive[IN_WINDOWS] = led
         for checkpoint in range(1, 1 if interrupted else training.checkpoints + 1):
-            reached: list[tuple[int | None, Solution]] = []
-            for number, (seed, where) in enumerate(alive):
-                name = f"start {'as given' if seed is None else seed}, checkpoint {checkpoint}"
-                solution = self._advance(where, checkpoint, began, f"{number + 1}/{len(alive)}", name)
+            reached: dict[int, Solution] = {}
+            for start, where in alive.items():
+                name = f"start {NAMES[start]}, checkpoint {checkpoint}"
+                solution = self._advance(where, checkpoint, began, f"{start}/{len(alive)}", name)
                 if not isinstance(where, Solution) or solution.state is not where.state:
-                    seen.append(self._candidate((numbers[seed], seed), solution.theta, solution))
-                reached.append((seed, solution))
+                    seen.append(self._candidate(start, solution.theta, solution))
+                reached[start] = solution
                 interrupted = solution.status is Status.INTERRUPTED
                 if interrupted:
                     break
-            reached.sort(key=lambda entry: entry[1].at.loss)
-            # What windows led to may fall fast and end worse than the start that they began from: none of the two goes.
-            stay = {begun, IN_WINDOWS} if windows.providers else set()
-            half = max(1, (len(reached) + 1) // 2)
-            alive = [*reached[:half], *(entry for entry in reached[half:] if entry[0] in stay)]
+            alive |= reached
             late = now() - began > training.max_time_s
-            if interrupted or late or not any(_unfinished(one) for _, one in reached):
+            if interrupted or late or not any(_unfinished(one) for one in reached.values()):
                 break
         return self._result(seen, windows.told, interrupted=interrupted, seconds=now() - began)
 
@@ -206,35 +190,24 @@ class Joint:
         )
         return LevenbergMarquardt(termination=limits, damping=DAMPINGS[training.damping](), on_iteration=report)
 
-    def _candidate(
-        self, start: tuple[int, int | None], theta: NDArray[np.float64], solution: Solution | None
-    ) -> _Candidate:
+    def _candidate(self, start: int, theta: NDArray[np.float64], solution: Solution | None) -> _Candidate:
         plain = self.layout.to_plain @ theta
         # A given start is kept to the last digit, which the way into the basis and back would change.
         model = self.provider.at(plain) if solution else self.provider.cascade
         loss = solution.at.loss if solution else self.provider.loss(plain)
         mse = 2.0 * loss / self.provider.n_samples
-        number, seed = start
-        score = self._score(model)
-        return _Candidate(start=number, seed=seed, model=model, score=score, loss=mse, solution=solution)
+        return _Candidate(start=start, model=model, score=self._score(model), loss=mse, solution=solution)
 
     def _score(self, model: Cascade) -> float:
         """As between the starts of a network: one trace on which all fail must not choose alone."""
         scores = []
         for trace in self.selection:
-            run, first = self._run(model, trace)
-            counts = trace.counted(self.provider.cascade.inputs, self.provider.errors)[first:]
+            run = model.simulate_trace(trace)
+            counts = trace.counted(self.provider.cascade.inputs, self.provider.errors)
             for (name, error), seen in zip(self.provider.errors.items(), counts.T, strict=True):
                 if seen.any():
-                    scores.append(float(np.mean((run[name] - trace[name][first:])[seen] ** 2)) / error**2)
+                    scores.append(float(np.mean((run[name] - trace[name])[seen] ** 2)) / error**2)
         return float(np.exp(np.mean(np.log(np.maximum(scores, NEGLIGIBLE))))) if scores else float("nan")
-
-    def _run(self, model: Cascade, trace: Trace) -> tuple[Dict[str, NDArray[np.float64]], int]:
-        """The free run that is scored, and where it begins."""
-        if self.scored is not None:
-            return self.scored(model, trace)
-        run = model.simulate_trace(trace, rest=self.provider.begins(trace))
-        return {name: run[name] for name in self.provider.errors}, 0
 
     def _result(
         self, seen: Sequence[_Candidate], told: Sequence[str], *, interrupted: bool, seconds: float
@@ -255,7 +228,7 @@ class Joint:
                 "elapsed_s": np.array([entry.elapsed_s for entry in curve]),
             },
             train_time_s=seconds,
-            seed=chosen.drawn_by,
+            seed=None,
             evidence=chosen.solution.evidence if chosen.solution else None,
             notes=(
                 *told,
@@ -281,7 +254,7 @@ class Joint:
     def _left(self, model: Cascade) -> tuple[str, ...]:
         """Names of the records over which the free run leaves its bounds."""
         traces = (*self.provider.traces, *self.selection)
-        runs = [(trace.name, model.simulate_trace(trace, rest=self.provider.begins(trace))) for trace in traces]
+        runs = [(trace.name, model.simulate_trace(trace)) for trace in traces]
         return tuple(name for name, run in runs if any(one.lost for one in run.activity.values()))
 
     @staticmethod
@@ -295,7 +268,7 @@ class Joint:
         status = chosen.solution.status
         # Of a start that was given up for others its iterations did not run out: they were not wanted.
         given_up = status is Status.MAX_ITERATIONS
-        later = any((given_up or one.seed == chosen.seed) and one.iteration > chosen.iteration for one in seen)
+        later = any((given_up or one.start == chosen.start) and one.iteration > chosen.iteration for one in seen)
         return Status.STOPPED_EARLY if later else status
 
 

@@ -170,21 +170,6 @@ class JointLayout:
                 seen.add(at)
         return Prior(centre=self.centre(), groups=tuple(groups), alphas=np.array(alphas), beta=beta)
 
-    def draw(self, seed: int) -> Array:
-        """A random start of networks; equations start as declared.
-
-        Args:
-            seed: Of the random numbers.
-
-        Returns:
-            Shape ``(n_trained,)``.
-        """
-        rng, found = np.random.default_rng(seed), self.centre()
-        for layout, places in zip(self.members, self.places, strict=True):
-            if isinstance(layout, Layout):
-                found[places] = layout.draw(rng, found[places])
-        return found
-
 
 def _basis(
     model: Member, columns: ColumnRecursion, layout: Layout, records: Sequence[dict[str, Array]]

@@ -95,16 +95,13 @@ class LeadingWindows:
     told: tuple[str, ...] = ()
 
     @classmethod
-    def of(
-        cls, asked: str | tuple[int, ...], whole: CascadeProvider, theta: NDArray[np.float64], *, given: bool
-    ) -> LeadingWindows:
+    def of(cls, asked: str | tuple[int, ...], whole: CascadeProvider, theta: NDArray[np.float64]) -> LeadingWindows:
         """Look at a start.
 
         Args:
             asked: Samples of the windows, or ``auto``.
             whole: The residuals over whole records.
             theta: Plain parameters of the start.
-            given: Whether the start is one that was given; one that was drawn has yet to learn, it is not lost.
 
         Returns:
             The windows.
@@ -112,7 +109,7 @@ class LeadingWindows:
         used = possible_lengths(asked, whole)
         if asked != AUTO:
             return cls(providers=_cut(whole, used), told=(f"{_second(used)}, as asked.",) if used else ())
-        if not given or not used:
+        if not used:
             return cls()
         short = replace(whole, window=used[0])
         why = _far_off(whole, short, theta)

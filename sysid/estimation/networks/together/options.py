@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,6 @@ from sysid.errors import ConfigError
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.networks.together.provider import CascadeProvider
 from sysid.estimation.networks.training import check_choice
-from sysid.estimation.records.experiment import Experiment
 from sysid.models import Cascade
 from sysid.models.orders.typed_fields import TypedFields
 from sysid.traces import Trace
@@ -47,8 +46,6 @@ class JointTraining(TypedFields):
         tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
         patience: Iterations over which improvement is judged.
         checkpoints: How often the selection traces are looked at on the way; the best state seen is kept.
-        starts: Random starts, for networks that are fitted from nothing; half of them are dropped at each checkpoint.
-        seed: Seed of the first start; the others count up from it.
         stride: Every so-manieth sample counts in the loss.
         moves: A sample counts as well where a target has moved by more than so many of its errors since the last that
             counted, and so does the one before it: what comes with a jump is not missed (``counted_rows.py``).
@@ -58,8 +55,8 @@ class JointTraining(TypedFields):
             its logarithm (Cauchy loss): a few traces on which the free run is lost do not rule it (``robust_loss.py``).
         windows: Samples of the windows, the shortest first, on which a second start is trained before it is raced with
             the members as they were: each window is begun with what is measured (``joint_record.py``). ``auto`` takes
-            them by the records, and only where the free run of a start that was given is far off
-            (``leading_windows.py``); none for no second start.
+            them by the records, and only where the free run of the start is far off (``leading_windows.py``); none for
+            no second start.
         damping: How far a step may go, as in :class:`~sysid.estimation.Training`.
         workers: Records that are worked on at the same time.
     """
@@ -69,8 +66,6 @@ class JointTraining(TypedFields):
     tolerance: float = 1e-3
     patience: int = 20
     checkpoints: int = 10
-    starts: int = 1
-    seed: int = 0
     stride: int = 1
     moves: float = float("inf")
     leverage: float = float("inf")
@@ -81,7 +76,7 @@ class JointTraining(TypedFields):
 
     def __post_init__(self) -> None:
         check_choice("damping", self.damping, tuple(DAMPINGS))
-        for name in ("max_iterations", "patience", "checkpoints", "starts", "stride", "workers"):
+        for name in ("max_iterations", "patience", "checkpoints", "stride", "workers"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} is too small", where=name, expected="1 or more", got=getattr(self, name))
         object.__setattr__(self, "windows", _check_windows(self.windows))
@@ -95,9 +90,6 @@ class JointTraining(TypedFields):
         traces: Sequence[Trace],
         errors: Dict[str, float],
         trained: Sequence[str] | None = None,
-        *,
-        begins: Callable[[Trace], Dict[str, float]] = lambda _: {},
-        measured: Callable[[Trace], Experiment] | None = None,
     ) -> CascadeProvider:
         """Residuals and Jacobians of a whole as these options have them count; every option that the provider has.
 
@@ -106,8 +98,6 @@ class JointTraining(TypedFields):
             traces: Estimation traces.
             errors: For each target the error in its unit that counts as one.
             trained: Outputs of the members that are trained; all by default.
-            begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
-            measured: From a trace its record, where it begins with measured samples.
 
         Returns:
             The provider.
@@ -126,6 +116,4 @@ class JointTraining(TypedFields):
             leverage=self.leverage,
             robust_scale=self.robust_scale,
             workers=self.workers,
-            begins=begins,
-            measured=measured,
         )

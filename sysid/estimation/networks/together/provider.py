@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,6 @@ from sysid.estimation.least_squares.counted_rows import counted_rows
 from sysid.estimation.networks.joint_record import Record, windows_of
 from sysid.estimation.networks.program_provider import ProgramProvider
 from sysid.estimation.networks.trained_members import TrainedMembers
-from sysid.estimation.records.experiment import Experiment
 from sysid.models import Cascade, Member
 from sysid.traces import Trace
 
@@ -40,9 +39,6 @@ class CascadeProvider(ProgramProvider):
         robust_scale: Root mean squared residual of a trace from which on it counts by its logarithm
             (``robust_scale.py``); infinity for plain squares.
         workers: Records that are worked on at the same time.
-        begins: From a trace the levels at rest before it, where they are its own and not the cascade's.
-        measured: From a trace its record, of all channels in the wiring's order, where it begins with measured samples:
-            what came before is then not known.
         window: Samples after which the free run of a trace begins anew from what is measured (``joint_record.py``);
             ``None`` for one run over the whole trace.
 
@@ -60,8 +56,6 @@ class CascadeProvider(ProgramProvider):
     leverage: float = np.inf
     robust_scale: float = np.inf
     workers: int = 1
-    begins: Callable[[Trace], Dict[str, float]] = lambda _: {}
-    measured: Callable[[Trace], Experiment] | None = None
     window: int | None = None
 
     def __post_init__(self) -> None:
@@ -133,8 +127,6 @@ class CascadeProvider(ProgramProvider):
         if self.window is None:
             return [whole]
         known = whole.values.copy()
-        if self.measured is not None:  # it holds nothing else
-            return list(windows_of(whole, known, self.window, depth))
         for column, name in enumerate(self.cascade.wiring.channels):
             if name in trace.channel_names:
                 seen, own = trace.usable_of([name]), known[depth:, column]
@@ -144,35 +136,13 @@ class CascadeProvider(ProgramProvider):
     def _record(self, trace: Trace, depth: int) -> Record:
         cascade = self.cascade
         inputs, target = trace.columns(cascade.inputs), trace.columns(list(self.errors))
-        rest = self.begins(trace)
-        if self.measured is not None:
-            return self._begun(self.measured(trace), depth)
-        run = cascade.simulate_trace(trace, rest=rest)
+        run = cascade.simulate_trace(trace)
         counts = trace.counted(cascade.inputs, self.errors)
         rows = self._rows(target, counts)
         return Record(
-            values=np.concatenate([np.tile(cascade.levels(inputs[0], rest), (depth, 1)), run.values]),
+            values=np.concatenate([np.tile(cascade.levels(inputs[0]), (depth, 1)), run.values]),
             rows=rows,
             target=np.asfortranarray(target[rows]),
-            root_weights=_roots(counts[rows]),
-        )
-
-    def _begun(self, experiment: Experiment, depth: int) -> Record:
-        """A record whose first samples are measured, the oldest held where the lags reach further back."""
-        names = (*self.cascade.inputs, *self.errors)
-        order = [names.index(name) for name in self.cascade.wiring.channels]
-        before = np.concatenate(experiment.history.padded(depth), axis=1)
-        values = np.concatenate([before, np.concatenate([experiment.inputs, experiment.output], axis=1)])[:, order]
-        counts = np.ones(experiment.output.shape, dtype=np.bool_)
-        if experiment.each is not None:
-            counts = experiment.each.astype(np.bool_)
-        elif experiment.usable is not None:
-            counts &= experiment.usable[:, np.newaxis]
-        rows = self._rows(experiment.output, counts)
-        return Record(
-            values=values,
-            rows=rows,
-            target=np.asfortranarray(experiment.output[rows]),
             root_weights=_roots(counts[rows]),
         )
 

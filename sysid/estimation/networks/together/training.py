@@ -62,7 +62,7 @@ def fit_cascade(
     records = [_channels(cascade, trace) for trace in traces]
     layout = JointLayout.of(provider.members, records, shared)
     joint = Joint(provider=provider, layout=layout, training=training, selection=selection, on_progress=on_progress)
-    return joint.fit([(None, layout.in_basis(provider.theta))])
+    return joint.fit(layout.in_basis(provider.theta))
 
 
 def unit_errors(

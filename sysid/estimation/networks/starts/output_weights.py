@@ -9,12 +9,12 @@ the inequality of the means says that a weighed loss is never above the one it c
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.networks.neural.provider import NeuralProvider
+from sysid.estimation.least_squares.provider import AbstractWeighing
 from sysid.estimation.networks.starts.advancing import advanced
 from sysid.estimation.networks.starts.multistart import Candidate, Multistart
 
@@ -31,7 +31,10 @@ ALIKE = 0.3
 """Largest change of a weight's logarithm that is not worth another round."""
 
 
-def weighed(provider: NeuralProvider, theta: NDArray[np.float64]) -> NeuralProvider:
+Provider = TypeVar("Provider", bound=AbstractWeighing)
+
+
+def weighed(provider: Provider, theta: NDArray[np.float64]) -> Provider:
     """The same residuals, each output's over the variance that some parameters leave of it.
 
     Args:
@@ -41,14 +44,14 @@ def weighed(provider: NeuralProvider, theta: NDArray[np.float64]) -> NeuralProvi
     Returns:
         The residuals; as they are where there is one output.
     """
-    if provider.template.sizes.outputs == 1:
-        return provider
     left = provider.variances(theta)
+    if len(left) == 1:
+        return provider
     logs = -np.log(np.maximum(left, max(float(left.max()), np.finfo(np.float64).tiny) / WIDEST))
-    return replace(provider, output_weights=tuple(np.exp(logs - logs.mean()).tolist()))
+    return provider.with_output_weights(tuple(np.exp(logs - logs.mean()).tolist()))
 
 
-def reweighted(multistart: Multistart, provider: NeuralProvider, best: Candidate) -> list[Candidate]:
+def reweighted(multistart: Multistart, provider: Provider, best: Candidate) -> list[tuple[Candidate, Provider]]:
     """The best candidate, trained on with outputs weighed by what is left of them.
 
     Args:
@@ -57,18 +60,19 @@ def reweighted(multistart: Multistart, provider: NeuralProvider, best: Candidate
         best: The candidate.
 
     Returns:
-        One candidate a round; none where outputs are known alike.
+        One candidate a round, with its residuals; none where outputs are known alike.
     """
-    found: list[Candidate] = []
+    found: list[tuple[Candidate, Provider]] = []
     iterations = max(1, round(SHARE * multistart.training.max_iterations))
     for turn in range(ROUNDS):
         anew = weighed(provider, best.solution.theta)
-        if provider.output_weights is None or anew.output_weights is None or multistart.stop.is_set():
+        if anew.output_weights is None or multistart.stop.is_set():
             break
-        if np.abs(np.log(np.divide(anew.output_weights, provider.output_weights))).max() < ALIKE:
+        now = provider.output_weights or (1.0,) * len(anew.output_weights)
+        if np.abs(np.log(np.divide(anew.output_weights, now))).max() < ALIKE:
             break
         provider = anew
         name = f"start {best.number + 1}, outputs by their noise, {turn + 1}"
         best = advanced(multistart, provider, best, name=name, iterations=iterations)
-        found.append(best)
+        found.append((best, provider))
     return found
