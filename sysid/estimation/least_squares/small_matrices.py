@@ -6,8 +6,11 @@ before and after took longer than the factorisation. The routines are theirs, an
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 from scipy.linalg import lapack
 
 
@@ -67,3 +70,54 @@ def inverse_of(factor: NDArray[np.float64]) -> NDArray[np.float64]:
     if not len(factor):  # LAPACK prints that it has an illegal value
         return factor
     return np.asarray(lapack.dtrtrs(factor, np.eye(len(factor)), lower=1)[0])
+
+
+def orthogonal(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Orthonormal columns ``Q`` and an upper triangle ``R`` with ``Q R`` the matrix.
+
+    Args:
+        matrix: Finite, shape ``(m, n)``; may be overwritten.
+
+    Returns:
+        Shapes ``(m, k)`` and ``(k, n)``, where ``k`` is the less of both.
+    """
+    m, n = matrix.shape
+    if m < n or not n:
+        Q, R = linalg.qr(matrix, mode="economic", overwrite_a=True, check_finite=False)
+        return np.asarray(Q), np.asarray(R)
+    first, second, _ = _room(m, n)
+    packed, tau, _, _ = lapack.dgeqrf(matrix, lwork=first, overwrite_a=1)
+    R = np.triu(packed[:n])
+    return np.asarray(lapack.dorgqr(packed, tau, lwork=second, overwrite_a=1)[0]), R
+
+
+def singular(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Singular vectors and values.
+
+    Args:
+        matrix: Finite, shape ``(m, n)``, neither 0.
+
+    Returns:
+        ``U``, the values and ``V^T``, both of which are square.
+
+    Raises:
+        numpy.linalg.LinAlgError: If they are not found.
+
+    Example:
+        >>> singular(np.diag([3.0, 4.0]))[1].tolist()
+        [4.0, 3.0]
+    """
+    U, sizes, Vt, wrong = lapack.dgesdd(matrix, compute_uv=1, full_matrices=1, lwork=_room(*matrix.shape)[2])
+    if wrong:
+        raise np.linalg.LinAlgError("singular values that do not converge")
+    return U, sizes, Vt
+
+
+@lru_cache(maxsize=256)
+def _room(m: int, n: int) -> tuple[int, int, int]:
+    """What LAPACK takes in blocks: for both parts of orthogonal factors, and for singular values."""
+    like, tau = np.zeros((m, n), order="F"), np.zeros(min(m, n))
+    first = lapack.dgeqrf(like, lwork=-1)[2][0]
+    second = lapack.dorgqr(like[:, : min(m, n)], tau, lwork=-1)[1][0]
+    third = lapack.dgesdd_lwork(m, n, compute_uv=1, full_matrices=1)[0]
+    return int(first), int(second), int(third)

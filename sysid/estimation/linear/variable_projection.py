@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.least_squares.small_matrices import orthogonal, singular
 from sysid.estimation.linear.records import AbstractRecord, Bases
 from sysid.models.converting.orthonormal_basis import Domain, basis_of, section_orders
 
@@ -316,8 +317,8 @@ class SeparableProvider(AbstractProvider):
         scale = np.where(norms > 0.0, norms, 1.0)
         if not np.isfinite(scale).all():
             return None
-        Q, R = linalg.qr(table / scale, mode="economic", overwrite_a=True, check_finite=False)
-        U, sizes, Vt = linalg.svd(R, check_finite=False)
+        Q, R = orthogonal(table / scale)
+        U, sizes, Vt = singular(R)
         kept = sizes > RANK_TOLERANCE * sizes[0]
         span = Q @ U[:, : len(sizes)][:, kept]
         seen = span.T @ target

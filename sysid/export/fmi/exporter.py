@@ -132,11 +132,13 @@ def _run_car(calls: _Calls, details: dict[str, Any], inputs: NDArray[Any], state
         sizes = [(_N(size), _N(size)) if calls.version == 3 else (_N(size),) for size in (n_in, n_out, 1)]
         set_numbers, get_numbers, get_flag = calls.SetFloat64, calls.GetFloat64, calls.GetInt32
         step = calls.stepper(one, details["sample_time_s"])
+        # Asked for at each sample, the address of an array took as long as the FMU.
+        read, written, flagged = (table.ctypes.data for table in (values, output, flags))
         for i in range(len(values)):
-            failed = set_numbers(one, into, sizes[0][0], _P(values[i].ctypes.data), *sizes[0][1:])
+            failed = set_numbers(one, into, sizes[0][0], _P(read + 8 * n_in * i), *sizes[0][1:])
             failed |= step(i * details["sample_time_s"])
-            failed |= get_numbers(one, out_of, sizes[1][0], _P(output[i].ctypes.data), *sizes[1][1:])
-            failed |= get_flag(one, flag, sizes[2][0], _P(flags.ctypes.data + 4 * i), *sizes[2][1:])
+            failed |= get_numbers(one, out_of, sizes[1][0], _P(written + 8 * n_out * i), *sizes[1][1:])
+            failed |= get_flag(one, flag, sizes[2][0], _P(flagged + 4 * i), *sizes[2][1:])
             calls.check(failed)
         return Run(output=output, state=_state(calls, one)[: len(state)], flags=flags)
     finally:

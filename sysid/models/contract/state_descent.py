@@ -62,7 +62,9 @@ class StateSearch:
             Shape ``(n_states,)``.
         """
         with np.errstate(over="ignore", invalid="ignore"):  # runs from some of them may explode
-            ends = [self.descended(begin, NOISE) for begin in begins or self._around()]
+            # Two of them are one as a rule: what is expected lies within the bounds, or in the middle.
+            distinct = {begin.tobytes(): begin for begin in begins or self._around()}.values()
+            ends = [self.descended(begin, NOISE) for begin in distinct]
             return self._sharpened(min(ends, key=lambda end: self.total(end, NOISE)))
 
     def _around(self) -> list[Array]:

@@ -6,11 +6,13 @@ import math
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from sysid.kernels import innovations as kernel
 from sysid.models.linear.at_rest import state_at_rest
@@ -69,9 +71,12 @@ class Innovations:
 
     def at(self, entries: Array) -> Innovations:
         """The system of this size with other entries, in the order of :attr:`entries`."""
-        shapes = [getattr(self, name).shape for name in _NAMES]
-        parts = np.split(entries, np.cumsum([math.prod(shape) for shape in shapes])[:-1])
-        return Innovations(**{name: part.reshape(s) for name, part, s in zip(_NAMES, parts, shapes, strict=True)})
+        parts, first = {}, 0
+        for name in _NAMES:
+            shape = getattr(self, name).shape
+            last = first + math.prod(shape)
+            parts[name], first = entries[first:last].reshape(shape), last
+        return Innovations(**parts)
 
     @property
     def n_state(self) -> int:
@@ -88,15 +93,20 @@ class Innovations:
         """Number of outputs."""
         return len(self.C)
 
-    @property
+    @cached_property
     def predictor(self) -> Array:
         """The state matrix of the one-step predictor, ``A - K C``."""
         return np.asarray(self.A - self.K @ self.C)
 
-    @property
+    @cached_property
     def radius(self) -> float:
         """Largest magnitude of a pole."""
         return spectral_radius(self.A)
+
+    @cached_property
+    def predictor_radius(self) -> float:
+        """Largest magnitude of a pole of the one-step predictor; that of the system where no noise is modelled."""
+        return self.radius if np.array_equal(self.predictor, self.A) else spectral_radius(self.predictor)
 
     def poles(self) -> NDArray[np.complex128]:
         """Eigenvalues of ``A``."""
@@ -192,7 +202,7 @@ class Innovations:
         Returns:
             The system; as it is where a state is neither reached nor seen, or the Gramians cannot be computed.
         """
-        if self.n_state == 0 or spectral_radius(self.predictor) >= 1.0:
+        if self.n_state == 0 or self.predictor_radius >= 1.0:
             return self
         drive = np.concatenate([self.B - self.K @ self.D, self.K], axis=1)
         return self.in_coordinates(*self._balance(self.predictor, drive))
@@ -256,7 +266,15 @@ def spectral_radius(A: Array) -> float:
         return 0.0
     if not np.isfinite(A).all():
         return np.inf
-    return float(np.abs(scipy.linalg.eigvals(A, check_finite=False)).max())
+    # Straight to LAPACK: a search asks at every step, of matrices for which SciPy's wrapper takes most of the time.
+    real, imaginary, _, _, wrong = lapack.dgeev(A, compute_vl=0, compute_vr=0, lwork=_room(len(A)))
+    return np.inf if wrong else float(np.abs(real + 1j * imaginary).max())
+
+
+@cache
+def _room(n: int) -> int:
+    """What LAPACK takes for the eigenvalues of ``n`` rows in blocks."""
+    return int(lapack.dgeev_lwork(n, compute_vl=0, compute_vr=0)[0])
 
 
 def _gramian(A: Array, Q: Array) -> Array:

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from sysid.estimation.least_squares.small_matrices import add_to_diagonal, cholesky, inverse_of, solved
+from sysid.estimation.least_squares.small_matrices import (
+    add_to_diagonal,
+    cholesky,
+    inverse_of,
+    orthogonal,
+    singular,
+    solved,
+)
 
 
 @pytest.mark.parametrize("n", [1, 2, 65, 200])
@@ -41,3 +48,18 @@ def test_a_diagonal_is_added_to_in_place():
     add_to_diagonal(matrix, np.array([1.0, 2.0]))
     add_to_diagonal(matrix, 0.5)
     np.testing.assert_array_equal(matrix, [[2.5, 1.0], [1.0, 3.5]])
+
+
+@pytest.mark.parametrize("shape", [(300, 6), (40, 40), (3, 5), (7, 1), (5, 0)], ids=str)
+def test_orthogonal_factors_are_scipys_to_the_last_bit(shape):
+    matrix = np.asfortranarray(np.random.default_rng(3).standard_normal(shape))
+    expected = linalg.qr(matrix, mode="economic")
+    for one, other in zip(orthogonal(matrix.copy(order="F")), expected, strict=True):
+        np.testing.assert_array_equal(one, other, strict=True)
+
+
+@pytest.mark.parametrize("shape", [(6, 6), (40, 40), (3, 5), (7, 1)], ids=str)
+def test_singular_values_and_vectors_are_scipys_to_the_last_bit(shape):
+    matrix = np.random.default_rng(3).standard_normal(shape)
+    for one, other in zip(singular(matrix), linalg.svd(matrix), strict=True):
+        np.testing.assert_array_equal(one, other, strict=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import signal
+from scipy import linalg, signal
 
 import sysid
 from sysid.models import History
-from sysid.models.linear.innovations import Innovations
+from sysid.models.linear.innovations import Innovations, spectral_radius
 from sysid.models.linear.state_space_polynomials import polynomials
 
 
@@ -77,3 +77,15 @@ def test_a_free_run_keeps_its_digits_where_hardly_any_noise_was_seen() -> None:
     gain = (form.C @ np.linalg.solve(np.eye(3) - form.A, form.B)).ravel()
     system = fit.model.system
     assert gain == pytest.approx((system.C @ np.linalg.solve(np.eye(3) - system.A, system.B)).ravel(), abs=2e-3)
+
+
+@pytest.mark.parametrize("n", [1, 4, 40])
+def test_the_largest_pole_is_that_of_scipys_eigenvalues_to_the_last_bit(n: int) -> None:
+    A = np.random.default_rng(n).normal(size=(n, n))
+    assert spectral_radius(A) == np.abs(linalg.eigvals(A)).max()
+
+
+def test_the_predictor_has_a_radius_of_its_own_where_noise_is_modelled() -> None:
+    one = system()
+    assert one.predictor_radius == spectral_radius(one.A - one.K @ one.C) != one.radius
+    assert one.without_noise().predictor_radius == one.radius

@@ -50,12 +50,6 @@ def data(*estimation: Trace, others: dict[Role, Trace] | None = None) -> Data:
     return Data(traces=known, selection=known.with_role(Role.SELECTION))
 
 
-@pytest.fixture(autouse=True)
-def _quiet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No machine is looked at before a search: it is as free as its clock says."""
-    monkeypatch.setattr("sysid.workbench.auto.budget.slowness", lambda: 1.0)
-
-
 @pytest.fixture(scope="module")
 def small() -> Iterator[None]:
     """A search that tries little, and looks at the data without an order search."""

@@ -8,7 +8,17 @@ from sysid.field_checks import check
 from sysid.models import ARX
 from sysid.reporting.sections.fit_tables import DRAWN
 from sysid.workbench.auto.config import AutoConfig
-from sysid.workbench.auto.finish import DRAWING_S, PICTURE_S, SLOWEST_PACE, drawn_in, finish_s, pace, time_told
+from sysid.workbench.auto.finish import (
+    DRAWING_S,
+    MOST,
+    PICTURE_S,
+    SLOWEST_PACE,
+    drawn_in,
+    finish_s,
+    pace,
+    slowness,
+    time_told,
+)
 
 SEARCH = {"kind": "auto", "name": "a", "data": "rig", "mapping": "u -> a+b+c+d+e"}
 STRUCTURE = ARX(na=1, nb=(1,), nk=(1,))
@@ -63,3 +73,7 @@ def test_a_time_that_is_too_short_says_how_long_it_takes_and_what_would_do() -> 
     assert "after some 78 s: give it 2.1 min or more" in said
     assert "63 s of it" not in said
     assert time_told(600.0, 20.0).startswith("Time: 10.0 min at most, about 20 s of it")
+
+
+def test_a_second_of_work_takes_a_second_or_more() -> None:
+    assert 1.0 <= slowness() <= MOST

@@ -22,12 +22,14 @@ import scipy.signal  # noqa: F401
 import sysid
 import sysid.workbench.surrogates.make
 from sysid.export import writing
+from sysid.export.fmi import units
 from sysid.reporting import charts, parts, report
 from sysid.workbench import cli
-from sysid.workbench.auto import finish, ledger, plan
+from sysid.workbench.auto import budget, finish, ledger, plan
 from sysid.workbench.auto.families import Family, Try
 from sysid.workbench.runner.events import Event, StepProgress, StepStarted
 from sysid.workbench.runner.screen import LogFile
+from sysid.workbench.surrogates import work
 
 SESSIONS = (
     ("SIGTERM", "experiments"), ("SIGINT", "experiments"), ("SIGTERM", "Searching"), ("SIGINT", "Fitting best"),
@@ -127,6 +129,8 @@ def main() -> None:
     parts.svg = lambda *_, **__: "<svg/>"
     charts.chart_figure = lambda *_: None
     finish.pace = lambda: 1.0  # it draws pictures to find it
+    finish.slowness = budget.slowness = work.slowness = lambda: 1.0  # it is busy to find it
+    units.unit_definitions(["V"])  # reads all units, once for every session
     found: dict[str, Any] = {"ended": []}
     for name in ("whole", "ended"):
         place = Path(sys.argv[1]).resolve() / name

@@ -22,7 +22,7 @@ from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import AbstractChart, Directions
 from sysid.estimation.linear.subspace.system import EDGE
 from sysid.kernels import innovations as kernel
-from sysid.models.linear.innovations import Innovations, spectral_radius
+from sysid.models.linear.innovations import Innovations
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ class PredictionErrors(AbstractProvider):
     def allowed(self, system: Innovations) -> bool:
         """Whether a system may be a step: its predictor is stable and, where that is asked, the system too."""
         with_noise = bool(system.K.any())
-        if with_noise and not spectral_radius(system.predictor) < 1.0:
+        if with_noise and not system.predictor_radius < 1.0:
             return False
         return system.radius < self.largest if self.stable else system.radius < _LOST
 
@@ -200,7 +200,7 @@ _LOST = 1.5
 
 def _lasting(system: Innovations, n: int) -> int:
     """Samples after which an initial state no longer shows."""
-    rate = spectral_radius(system.predictor)
+    rate = system.predictor_radius
     if rate <= 0.0:
         return min(n, 10 * system.n_state + 10)
     if rate >= 1.0 - 1e-9:
