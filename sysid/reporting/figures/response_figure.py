@@ -105,7 +105,9 @@ def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, w
         if not response.any():  # an input that does nothing in the model
             continue
         above.loglog(w, np.abs(response), label=fit.model.label, **look)
-        phase, measured = np.degrees(view.phase(w)), np.degrees(found.phase[found.frequency > 0.0, j])
+        # Unwrapped between the same points as what was measured: of far points both lose the same turns.
+        phase = np.degrees(np.unwrap(np.angle(response)))
+        measured = np.degrees(found.phase[found.frequency > 0.0, j])
         seen = np.flatnonzero(np.isfinite(measured))[:1]
         turns = 360.0 * float(np.round((measured[seen] - phase[seen]) / 360.0).sum())
         below.semilogx(w, phase + turns, **look)
