@@ -56,6 +56,13 @@ def test_a_phase_counts_every_turn(one: LinearView, begins: float, ends: float |
         assert at_end == pytest.approx(ends, abs=1.0)
 
 
+@pytest.mark.parametrize(("zero", "pole"), [(-1.2e-6, 1.3e-6), (1.2e-6, 0.9e-6), (-1e-9, 1.2e-6), (5e-6, -5e-6)])
+def test_what_nearly_cancels_beside_one_is_no_turn(zero: float, pole: float) -> None:
+    """Of two outputs that integrate, a model of both has the other's sum in each: it was told as 270, not -90."""
+    one = view([0.0, 0.02, -0.02 * (1.0 + zero)], np.convolve(SUM, [1.0, -1.0 - pole]))
+    assert_allclose(np.degrees(one.phase(np.array([1e-3, 0.1]))), [-90.0, -90.0], atol=3.0)
+
+
 def test_what_does_nothing_turns_nothing() -> None:
     assert_allclose(view([0.0, 0.0], LAG, delay=5).phase(np.array([0.0, 1.0, 2.0])), 0.0)
 
