@@ -18,7 +18,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from sysid.estimation import JointTraining, Training
+from sysid.estimation import Training
 from sysid.estimation.estimators import fit
 from sysid.estimation.results.result import Loop
 from sysid.models import (
@@ -48,7 +48,7 @@ SAMPLES, AHEAD = 300, 5
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
 MAPPING, BOTH = Mapping.parse("u1 -> y"), Mapping.parse("u1 -> y+z")
 QUICK = Training(starts=1, max_iterations=60)
-STRUCTURES: dict[str, tuple[AbstractStructure, Training | JointTraining | None, bool]] = {
+STRUCTURES: dict[str, tuple[AbstractStructure, Training | None, bool]] = {
     "ARX": (ARX(na=2, nb=(1,), nk=(1,)), None, True),
     "TF": (TransferFunction(poles=(2,), zeros=(0,), delays=(1,)), None, False),
     "continuous TF": (TransferFunction(poles=(2,), zeros=(1,), delays=(0,), domain="continuous"), None, False),
@@ -63,7 +63,7 @@ STRUCTURES: dict[str, tuple[AbstractStructure, Training | JointTraining | None, 
     "NSS of two outputs": (VectorNeuralStateSpace(states=2, neurons=1), QUICK, False),
     "NARX of two outputs": (
         VectorNARX(input_delays=1, output_delays=2, neurons=1),
-        JointTraining(max_iterations=60),
+        Training(max_iterations=60),
         True,
     ),
 }
