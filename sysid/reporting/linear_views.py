@@ -85,7 +85,8 @@ class LinearView:
         exact = np.where(np.isfinite(exact), exact, turned)
         # A pole and a zero that nearly cancel beside 1 may be taken for different kinds, and be a turn apart.
         further = exact[-1] - begun
-        return exact[:-1] - 2.0 * np.pi * np.sign(further) * np.floor((np.abs(further) + 0.5 * np.pi) / (2.0 * np.pi))
+        turns = np.sign(further) * np.floor((np.abs(further) + 0.5 * np.pi) / (2.0 * np.pi))
+        return np.asarray(exact[:-1] - 2.0 * np.pi * turns)
 
     def _turned(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
         """The phase by roots and dead time, up to the sign of the gain; each root's part never leaves a half turn."""

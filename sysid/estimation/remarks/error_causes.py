@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.correlation import correlation_time
-from sysid.estimation.records.informative import by_chance, informative, unit, with_past
+from sysid.estimation.records.informative import by_chance, informative, still, unit, with_past
 from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.estimation.remarks.input_features import CURVES, LINEAR, features
 from sysid.models import AbstractModel
@@ -33,6 +33,9 @@ then, in standard deviations of the output."""
 TERMS, EXPLAINED, IN_EACH = 8, 0.3, 0.15
 """Terms that the error is explained by, and what part of the other half's error they must explain: in the mean, and in
 each half."""
+OTHERS, OWN_PART, MOST_NAMED = 0.5, 0.2, 3
+"""The same of channels that the model does not read, of which nothing says that they have to do with the output; what
+part of it one must explain by itself to be named, and how many are."""
 PLAINLY, PLAINLY_IN_EACH = 0.7, 0.5
 """The same of signals as they are."""
 MOSTLY = 0.8
@@ -90,6 +93,9 @@ def _of_output(
     kept = informative(run.inputs[sound]) if kept is None else kept
     names = [model.mapping.inputs[j] for j in kept]
     inputs = " and ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])
+    aside = _of_another(run, y - s, sound, name)
+    if aside:
+        return [*told, aside]
     if kept:
         groups = features(run.inputs[:, list(kept)], s)
         found = _drift(groups, y, sound, name) or _nothing(model, (y, s), groups, sound).format(
@@ -163,6 +169,35 @@ def _of_inputs(groups: dict[str, list[Array]], target: Array, usable: Mask) -> s
             "lags of the output, more states, or more"
         )
     return f"{share}{how} starts. (Or {{name}} is fed back to {{inputs}}.)"
+
+
+def _of_another(run: FreeRun, error: Array, usable: Mask, name: str) -> str:
+    """A sentence where channels that the model does not read explain the error, by their earlier values."""
+    groups = dict[str, list[Array]]()
+    for other, column in run.beside.items():
+        # What only ever rises or falls is a clock or a count, and goes with every drift.
+        if np.ptp(np.sign(np.diff(column[usable]))) > 1.0 and not still(column[usable]):
+            earlier = np.concatenate([column[:1], column[:-1]])[:, np.newaxis]
+            groups[other] = features(earlier, column)[LINEAR]
+    share = _explained([one for columns in groups.values() for one in columns], error, usable) if groups else 0.0
+    if not share > OTHERS:
+        return ""
+    each = {other: _alone(columns, error, usable) for other, columns in groups.items()}
+    most = sorted((one for one in each if each[one] > OWN_PART * share), key=lambda one: -each[one])[:MOST_NAMED]
+    names = " and ".join(most) if len(most) < MOST_NAMED else f"{', '.join(most[:-1])} and {most[-1]}"
+    return (
+        f"{100 * share:.0f} % of what the free run of {name} leaves moves with earlier values of {names}, which the "
+        f"record has and this model does not read. What acts on {name} should be an input; where each acts on the "
+        "other, fit both as outputs of one model (a state space, or NARX, whose outputs read the past of all)."
+    )
+
+
+def _alone(columns: list[Array], target: Array, usable: Mask) -> float:
+    """The part of a signal that some columns explain, to see which of many matter."""
+    rows = np.flatnonzero(usable[1:] & usable[:-1])
+    pieces, wanted = [_news(piece, 0.0, rows) for piece in _pieces(columns)], _news(target, 0.0, rows)
+    *_, left = _pursued(pieces, wanted)
+    return 1.0 - float(left @ left) / max(float(wanted @ wanted), TINY)
 
 
 def _explained(columns: list[Array], target: Array, usable: Mask) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping as Dict
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from sysid.traces import Trace
 
 MOST_SAMPLES = 20_000
 """Samples of a record that are looked at: more would not make the finding any surer."""
+MOST_BESIDE = 8
+"""Channels that a model does not read that are looked at."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,6 +27,8 @@ class FreeRun:
         simulated: Likewise.
         usable: Which samples are not masked, shape ``(n_samples,)``.
         history: What the run began with.
+        beside: Channels of the record that the model does not read, by name, each of shape ``(n_samples,)``; the first
+            so many that are never missing.
     """
 
     inputs: NDArray[np.float64]
@@ -31,6 +36,7 @@ class FreeRun:
     simulated: NDArray[np.float64]
     usable: NDArray[np.bool_]
     history: History
+    beside: Dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, model: AbstractModel, trace: Trace, start: Start) -> FreeRun:
@@ -58,4 +64,12 @@ class FreeRun:
             simulated=model.simulate(inputs[window], begun.history).reshape(shape),
             usable=usable[window],
             history=begun.history,
+            beside=_beside(model, trace, window),
         )
+
+
+def _beside(model: AbstractModel, trace: Trace, window: slice) -> dict[str, NDArray[np.float64]]:
+    """What else was recorded, where it is known throughout."""
+    names = [name for name in trace.channel_names if name not in model.mapping.channels]
+    known = [name for name in names if trace.usable_of([name])[window].all()]
+    return {name: trace[name][window].copy() for name in known[:MOST_BESIDE]}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,7 +48,7 @@ def _play(u: np.ndarray, width: float) -> np.ndarray:
     return np.array(held)
 
 
-def _told(u: np.ndarray, y: np.ndarray, simulated: np.ndarray, parameters: int = 10) -> list[str]:
+def _told(u: np.ndarray, y: np.ndarray, simulated: np.ndarray, parameters: int = 10, **beside: np.ndarray) -> list[str]:
     model = SimpleNamespace(mapping=Mapping(inputs=("u",), outputs=("y",)), n_parameters=parameters)
     run = FreeRun(
         inputs=u[:, np.newaxis],
@@ -55,6 +56,7 @@ def _told(u: np.ndarray, y: np.ndarray, simulated: np.ndarray, parameters: int =
         simulated=simulated[:, np.newaxis],
         usable=np.ones(len(u), dtype=bool),
         history=History.at_rest(inputs=[0.0], output=0.0),
+        beside=beside,
     )
     return causes(model, run)
 
@@ -186,3 +188,40 @@ def test_an_output_behind_a_curve_and_filters_moves_with_its_inputs(seed: int) -
     )
     (told,) = causes(model, run)
     assert "along a curve that the model lacks" in told
+
+
+def test_channels_that_the_model_does_not_read_and_that_move_its_error_are_named() -> None:
+    u, w, v = _u(0), _u(1), _u(2)
+    y = _slow(u) + 0.5 * _slow(w, 9.0) + 0.01 * np.random.default_rng(3).standard_normal(N)
+    (told,) = _told(u, y, _slow(u), valve=w, weather=v, stood=np.ones(N))
+    assert "moves with earlier values of valve, which the record has" in told
+    (told,) = _told(u, y + 0.4 * _slow(v, 4.0), _slow(u), valve=w, weather=v, other=_u(5))
+    assert re.search("earlier values of (valve and weather|weather and valve), which", told)
+
+
+def test_a_drift_is_not_told_by_a_clock_that_was_recorded() -> None:
+    u, clock = _u(0), np.linspace(0.0, 2.0, N)
+    told = _told(u, _slow(u) + clock, _slow(u) + 1.0, clock=clock, counts=np.floor(20.0 * clock))
+    assert len(told) == 1
+    assert CAUSES["drift"] in told[0]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_channel_that_wanders_by_itself_is_not_accused(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    u, walk = _u(seed), np.cumsum(rng.standard_normal(N))
+    lasting = lfilter([1.0], [1.0, -0.97], 0.1 * rng.standard_normal(N))
+    told = _told(u, _slow(u) + lasting, _slow(u), walk=walk / np.std(walk), noise=rng.standard_normal(N))
+    assert not any("does not read" in one for one in told)
+
+
+def test_outputs_that_drive_each_other_are_told_where_each_has_a_model_of_its_own() -> None:
+    u, x, values = np.column_stack([_u(0), _u(1)]), np.zeros(2), []
+    for now in u:
+        values.append(x)
+        x = np.array([[0.9, 0.1], [-0.2, 0.8]]) @ x + np.array([[0.1, 0.05], [0.0, 0.2]]) @ now
+    traces = sysid.data((u, np.array(values)), sample_time=1.0)
+    apart = sysid.fit(traces, "u1+u2 -> y1+y2", sysid.ARX(na=1, nb=1, nk=1))
+    assert any(one.startswith("y2: ") and "earlier values of y1, which the record has" in one for one in apart.warnings)
+    together = sysid.fit(traces, "u1+u2 -> y1+y2", sysid.NARX(input_delays=1, output_delays=1, neurons=0))
+    assert not together.warnings
