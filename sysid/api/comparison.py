@@ -145,7 +145,7 @@ def compare(traces: TracesLike, *fits: Compared | Sequence[Compared], start: Sta
             evaluations[label], outputs[label] = judged.evaluation, (judged.output, judged.unit)
         for fit in [one] if isinstance(one, FitResult) else [*getattr(one, "fits", {}).values()]:
             unsound = [] if fit.status.usable else [f"{fit.model.label}: {fit.status.value}"]
-            notes |= dict.fromkeys((*unsound, *_beyond(fit, traces), *_begun(fit, traces, start)))
+            notes |= dict.fromkeys((*unsound, *_beyond(fit, traces), *first_states(fit.model, traces, start)))
     return Comparison(evaluations=evaluations, outputs=outputs, notes=tuple(notes))
 
 
@@ -200,11 +200,6 @@ def _fits(given: Sequence[Any]) -> list[Compared]:
             "sysid.read_bundle(folder)",
         )
     return found
-
-
-def _begun(fit: FitResult, traces: TraceSet, start: Start) -> tuple[str, ...]:
-    """What is said of cases whose first state is known too badly."""
-    return first_states(fit.model, [one for one in traces if traces.roles[one.name] is not Role.ESTIMATION], start)
 
 
 def _beyond(fit: FitResult, traces: TraceSet) -> tuple[str, ...]:

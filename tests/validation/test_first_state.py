@@ -7,6 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 import sysid
+from sysid.models import ARXModel, Mapping
+from sysid.validation.first_state import first_states
 
 
 @pytest.mark.parametrize(("pole", "told"), [(0.9998, True), (0.95, False)])
@@ -41,3 +43,19 @@ def test_of_an_output_that_never_changes_the_error_is_told_and_no_percent() -> N
     rms = np.sqrt(scored["mse"].iloc[1])
     assert "% " not in told
     assert f"on 40 samples {rms:.3g} kPa" in told
+
+
+def test_a_curved_model_whose_run_hangs_on_its_beginning_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It rings for ever; its window lasts as long as what disturbs it, and says nothing of the samples after it."""
+    u = np.zeros(400)
+    y = np.where(np.arange(400) < 6, 0.0, np.where(np.arange(400) < 50, 1.0, 0.0)) + 1e-3 * np.sin(np.arange(400))
+    traces = sysid.data((u, y), sample_time=1.0)
+    model = ARXModel(
+        orders=sysid.ARX(na=2, nb=(1,), nk=(1,)), coefficients=np.array([0.0, 2.0 * np.cos(0.01), -1.0]), intercept=0.0,
+        mapping=Mapping.parse("u -> y"), sample_time=1.0, input_units=("1",), output_unit="1", rest_output=0.0,
+    )  # fmt: skip
+    monkeypatch.setattr(ARXModel, "pole_radius", None)  # as of a network
+    (told,) = first_states(model, traces, sysid.Start.of("estimated"))
+    assert "hangs on where it began" in told
+    assert "start: {measured: 4}" in told
+    assert not first_states(model, traces, sysid.Start.of({"measured": 4}))

@@ -133,8 +133,10 @@ class AbstractLaggedForm(AbstractForm):
     def refined(self, history: History) -> History:
         """Past outputs by Gauss-Newton on those before the first row, followed by the free run from there.
 
-        Masked outputs take no part. A single Gauss-Newton step is exact for a linear model. The history is as it is
-        where it is no longer than the lags, or the run is lost; see the base class.
+        Masked outputs take no part. A single Gauss-Newton step is exact for a linear model. What is found leaves no
+        more of the history than what was measured before the first row; where it foretells clearly worse than that, see
+        :func:`foretold`, what was measured stays. The history is as it is where it is no longer than the lags, or the
+        run is lost; see the base class.
         """
         depth, own, n = self.columns.lags.depth, self._own, len(history.output)
         if own == 0 or n <= depth:
@@ -153,6 +155,8 @@ class AbstractLaggedForm(AbstractForm):
         found = gauss_newton(run, measured[:own].ravel(), measured.ravel(), known)
         if found is None:
             return history
+        if not foretold(run, measured[:own].ravel(), measured.ravel(), known):
+            found = measured[:own].ravel()
         output = history.output.copy()
         output[places] = scaling.unscale_output(run(found).reshape(measured.shape))
         return History(inputs=history.inputs, output=output)
@@ -207,7 +211,8 @@ class AbstractLaggedForm(AbstractForm):
         """
         inputs = self._checked(inputs, history)
         past_inputs, past_output = history.padded(self.columns.lags.depth)
-        past = self.scaling.scale_output(past_output).reshape(len(past_inputs), -1)
+        n_outputs = len(self.columns.lags.inputs) - self.n_inputs  # of no past none can be counted
+        past = self.scaling.scale_output(past_output).reshape(len(past_inputs), n_outputs)
         u = self.scaling.scale_inputs(np.concatenate([past_inputs, inputs]))
         return u, np.concatenate([past, np.zeros((len(inputs), past.shape[1]))])
 
@@ -238,6 +243,42 @@ def walk(plan: Planned, room: Array, past: int) -> None:
 
 STEPS, APART = 12, 1e-5
 """Gauss-Newton steps at most, and how far apart outputs are put for a derivative, in scaled numbers."""
+
+
+CLEARLY = 2.0
+"""Times the squared error of a run from what was measured from which on one from what was found is worse."""
+
+
+def foretold(
+    run: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    start: NDArray[np.float64],
+    target: NDArray[np.float64],
+    known: NDArray[np.bool_],
+) -> bool:
+    """Whether what is found on the first half of a target foretells the second no worse than the first guess does.
+
+    Over what it is found on it is always better. Where a model errs for longer than that, as one that rings over half a
+    swing, it makes up for these errors, and is far off later.
+
+    Args:
+        run: See :func:`gauss_newton`.
+        start: The first guess.
+        target: What the run should give.
+        known: Which of the target's values count.
+
+    Returns:
+        Whether it does, or halves are too short to say.
+    """
+    if len(target) < 3 * len(start):
+        return True
+    later = known & (np.arange(len(target)) >= (len(target) + len(start)) // 2)
+    found = gauss_newton(run, start, target, known & ~later)
+
+    def left(x: NDArray[np.float64]) -> float:
+        error = (run(x) - target)[later]
+        return float(error @ error)
+
+    return found is None or bool(left(found) <= CLEARLY * left(start))  # a run that is lost leaves no number
 
 
 def gauss_newton(

@@ -164,7 +164,7 @@ def _fit_record(ready: FitReady, exports: Sequence[Mapping[str, Any]], traces: T
     scored = [trace for trace in traces if traces.roles[trace.name] is not Role.ESTIMATION]
     channels = (*model.mapping.inputs, *model.mapping.outputs)
     further = *beyond(model, fitted, scored), *repeated(channels, fitted, scored)
-    further = *further, *still(model.mapping, fitted, scored), *first_states(model, scored, ready.pipeline.start)
+    further = *further, *still(model.mapping, fitted, scored), *first_states(model, traces, ready.pipeline.start)
     return {
         "name": ready.config.name,
         "slug": ready.config.slug,

@@ -109,3 +109,28 @@ def test_the_other_starts_say_themselves_where_they_begin() -> None:
     u, y = off_equilibrium(model, 40, 0)
     assert beginning(model, u, y, Start(kind=StartKind.MEASURED, n_measured=7)).first == 7
     assert beginning(model, u, y, Start(kind=StartKind.FIRST_SAMPLE)).history.output.tolist() == [y[0]]
+
+
+def line(history: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The free run, over 50 samples, of a model that goes on as it went: where a record has its first samples."""
+    model = ARXModel(
+        orders=ARX(na=2, nb=(1,), nk=(1,)), coefficients=np.array([0.0, 2.0, -1.0]), intercept=0.0, rest_output=0.0,
+        **TERMS,
+    )  # fmt: skip
+    output = np.concatenate([history, np.zeros(250 - len(history))])
+    begun = beginning(model, np.zeros((250, 1)), output, ESTIMATED)
+    assert begun.first == 50
+    return model.simulate(np.zeros((50, 1)), begun.history)
+
+
+def test_what_is_estimated_does_not_make_up_for_an_error_that_goes_by() -> None:
+    """Samples 5 to 20 are not the model's: the line that is nearest to the window's was 1.9 off fifty samples later."""
+    disturbed = np.where((np.arange(50) >= 5) & (np.arange(50) < 20), 1.0, 0.0)
+    assert np.abs(line(disturbed)).max() < 1e-12
+
+
+def test_noise_of_the_first_samples_is_still_averaged_out() -> None:
+    """A line through two noisy samples leads far away: that of all fifty foretells the later ones better."""
+    noisy = 0.1 * np.random.default_rng(3).standard_normal(50)
+    assert np.abs(line(noisy)).max() < 0.1
+    assert abs(noisy[1] - noisy[0]) > 0.02
