@@ -123,11 +123,14 @@ def _settling(record: Record, whole: ImpulseResponse, j: int, name: str) -> Find
         "lags_seconds": float(whole.time[-1]),
         "explained": whole.explained,
     }
+    ends = settled(whole.values[j]) and not record.lasts
+    # What a linear model leaves, a curve or noise, may hold the end of its response up as well as a slow mode does.
     if record.integrates:
         code, verdict = INTEGRATES, Verdict.NOTE
-    elif whole.explained < BARELY:
+    elif (whole.explained if ends else record.explained) < (BARELY if ends else MOST_EXPLAINED):
         code, verdict = "settling.unknown", Verdict.UNKNOWN
-    elif not settled(whole.values[j]) or record.lasts:
+        figures["explained"] = record.explained
+    elif not ends:
         code, verdict = "settling.never", Verdict.LOOK
     elif figures["length"] < 10.0:
         code, verdict = "settling.short_record", Verdict.LOOK

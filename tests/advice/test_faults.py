@@ -167,3 +167,22 @@ def test_a_drift_that_is_the_sum_of_an_input_is_no_drift() -> None:
     found = look(trace(u, plant(u) + charge + noise(2000, 9, 0.02)))
     assert finding(found, "output.sums", "u1").figures["size"] == pytest.approx(charge[-1] - charge[0], rel=0.2)
     assert "output.drift" not in codes(found)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_curve_is_no_step_that_never_settles(seed: int) -> None:
+    """A lag of 100 samples whose output is bent settles: a linear response to it does not."""
+    u = np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, 50), 40)
+    lag = lfilter([0.0, 0.01], [1.0, -0.99], u)
+    y = np.abs(lag) + 0.3 * lag
+    found = look(trace(u, y + noise(2000, seed, 0.01 * y.std())))
+    assert not codes(found) & {"settling.never", "settling.integrates", "settling"}
+    unknown = finding(found, "settling.unknown", "u1")
+    assert f"explain {unknown.figures['explained']:.0%} of the output" in said(unknown, {"y": "m"})[0]
+    assert unknown.figures["explained"] < 0.9
+
+
+def test_a_slow_plant_that_is_linear_is_still_told_not_to_settle() -> None:
+    u = np.repeat(np.random.default_rng(2).uniform(-1.0, 1.0, 100), 20)
+    y = lfilter([0.0, 0.001], [1.0, -0.999], u)
+    assert "settling.never" in codes(look(trace(u, y)))

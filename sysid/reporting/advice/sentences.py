@@ -222,7 +222,9 @@ SAID: Final[dict[str, Words]] = {
         "A step of {who} does not settle within {lags_seconds:.3g} s.",
         "An integrator, a very slow mode or a drift: fit with a pole near one, or record longer.",
     ),
-    "settling.unknown": Words("How long a step of {who} takes: a linear response explains too little to say."),
+    "settling.unknown": Words(
+        "How long a step of {who} takes: linear models explain {explained:.0%} of the output, too little to say."
+    ),
     "sampling.good": Words("A step response of {who} rises over {rise:.1f} samples."),
     "sampling.little": Words(
         "A step response of {who} rises over {rise:.1f} samples; it explains only {explained:.0%} of the output."
