@@ -27,6 +27,7 @@ from sysid.models import Mapping
 from sysid.models.orders.typed_fields import plain_values
 from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.advice.words import lines
+from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.traces import Role, TraceSet
 
 if TYPE_CHECKING:
@@ -58,18 +59,21 @@ class Advice(room.Advice):
 
         return pd.DataFrame(lines(self.record), columns=["question", "verdict", "says", "do"])
 
-    def plot(self) -> Figure:
+    def plot(self, *, unit: str = HERTZ.value) -> Figure:
         """Impulse response, frequency response and coherence.
+
+        Args:
+            unit: Of the frequencies that are drawn: ``"Hz"`` or ``"rad/s"``.
 
         Returns:
             A figure of matplotlib's.
 
         Raises:
-            ConfigError: If there is nothing to draw: no input moves, or the record is too short.
+            ConfigError: If it is another unit, or there is nothing to draw: no input moves, or the record is too short.
         """
         from sysid.reporting.figures.advice_figure import advice_figure
 
-        figure = advice_figure(self.record)
+        figure = advice_figure(self.record, FrequencyUnit.of(unit))
         if figure is None:
             raise ConfigError(
                 "there is nothing to draw",
@@ -155,24 +159,29 @@ class FrequencyResponse(response.FrequencyResponse):
     """A frequency response that draws itself, beside models if asked; printed, it says what it is."""
 
     def __str__(self) -> str:
-        low, high = self.frequency[[0, -1]]
+        low, high = HERTZ.told(self.frequency[[0, -1]])
         head = f"frequency response, {self.mapping}: {self.method.value}, {len(self.frequency)} points"
-        return "\n".join([f"{head} from {low:.4g} to {high:.4g} rad/s, averages {self.averages:.3g}", *self.notes])
+        return "\n".join([f"{head} from {low:.4g} to {high:.4g} Hz, averages {self.averages:.3g}", *self.notes])
 
     __repr__ = __str__
 
-    def plot(self, *fits: FitResult | Several) -> Figure:
+    def plot(self, *fits: FitResult | Several, unit: str = HERTZ.value) -> Figure:
         """Gain, phase and coherence with 95 % bands, and the responses of linear models over them.
 
         Args:
             fits: Of this output, or of several among which it is; networks are left out, as they have no response.
+            unit: Of the frequencies that are drawn: ``"Hz"``, or ``"rad/s"``, as ``frequency`` has them.
 
         Returns:
             A figure of matplotlib's.
+
+        Raises:
+            ConfigError: If it is another unit.
         """
         from sysid.reporting.figures.response_figure import response_figure
 
-        return response_figure(self, [part for one in fits for part in members(one)])
+        parts = [part for one in fits for part in members(one)]
+        return response_figure(self, parts, FrequencyUnit.of(unit))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

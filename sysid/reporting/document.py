@@ -92,7 +92,7 @@ def build_document(folder: Path, results: Results, published: PublishedTable | N
         timed = exported_run_times(results)
         parts = (exports,) if timed is None else (exports, timed)
         sections.append(Section(anchor="exports", title="Exported files", parts=parts))
-    sections += [advice_section(results.advice)] if results.advice else []
+    sections += [advice_section(results.advice, results.frequency)] if results.advice else []
     sections += [_data(results), *_others(results, signals, columns)]
     comparability = "" if published is None else published.comparability
     found = verdict(results, instants, comparability)

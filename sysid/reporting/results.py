@@ -15,6 +15,7 @@ from pydantic import Field
 
 from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.fit_records import FitRecord
+from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.reporting.records import (
     RESULTS_FILE,
     DataSetRecord,
@@ -160,6 +161,7 @@ class Results(RunResults):
     advice: list[AdviceRecord] = Field(default=[], description="What is in the traces, output by output.")
     published: str | None = Field(default=None, description="Reference table to set beside ours.")
     drawn: int = Field(default=12, ge=1, description="Cases of each fit that are drawn at most.")
+    frequency: FrequencyUnit = Field(default=HERTZ, description="Unit of the frequencies that the page draws.")
     sweep: SweepSummary | None = Field(default=None, description="How the fits were found, where a sweep found them.")
 
     @property

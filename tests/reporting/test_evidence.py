@@ -19,6 +19,7 @@ from sysid.reporting import read_results, write_report
 from sysid.reporting.curves import read_curves
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
+from sysid.reporting.frequency import FrequencyUnit
 from sysid.reporting.linear.computing import bode_of, step_of
 from sysid.reporting.linear_views import linear_views
 from sysid.reporting.parts import Picture
@@ -168,7 +169,7 @@ def test_the_residual_picture_marks_what_lies_outside_its_bounds(run: Path) -> N
 def test_pictures_of_an_arx_model_are_those_of_its_transfer_function() -> None:
     fit, _ = arx()
     system = fit.model.to_control()
-    bode = bode_figure(bode_of([(fit.model, fit.uncertainty)], points=50))
+    bode = bode_figure(bode_of([(fit.model, fit.uncertainty)], points=50), FrequencyUnit.RADIANS)
     for j in range(2):
         frequency, gain = bode.axes[j].lines[0].get_data()
         expected = np.abs(system[0, j](np.exp(1j * np.asarray(frequency) * fit.model.sample_time)))

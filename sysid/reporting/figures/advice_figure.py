@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sysid.models import Mapping
 from sysid.reporting.advice.record import AdviceRecord, ImpulseRecord, ResponseRecord
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
+from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.units import per
 
 MOST_INPUTS = 4
@@ -17,11 +18,12 @@ MOST_INPUTS = 4
 BAND_COLOUR = "#DDDDDD"
 
 
-def advice_figure(advice: AdviceRecord) -> Figure | None:
+def advice_figure(advice: AdviceRecord, unit: FrequencyUnit = HERTZ) -> Figure | None:
     """Draw what was found by estimates without a structure.
 
     Args:
         advice: The findings.
+        unit: Of frequencies.
 
     Returns:
         One column an input, the coherence below them; ``None`` where there is nothing to draw.
@@ -37,13 +39,13 @@ def advice_figure(advice: AdviceRecord) -> Figure | None:
         grid = figure.add_gridspec(len(heights), len(inputs), height_ratios=heights)
         output = advice.units.get(Mapping.parse(advice.mapping).output, "1")
         for j, name in enumerate(inputs):
-            unit = per(output, advice.units.get(name, "1"))
+            gain = per(output, advice.units.get(name, "1"))
             if impulse is not None:
-                _impulse(figure.add_subplot(grid[0, j]), impulse, (j, name), unit)
+                _impulse(figure.add_subplot(grid[0, j]), impulse, (j, name), gain)
             if response is not None:
-                _gain(figure.add_subplot(grid[len(heights) - 2, j]), response, (j, name), unit)
+                _gain(figure.add_subplot(grid[len(heights) - 2, j]), response, (j, name, gain), unit)
         if response is not None:
-            _coherence(figure.add_subplot(grid[-1, :]), response)
+            _coherence(figure.add_subplot(grid[-1, :]), response, unit)
         return figure
 
 
@@ -62,9 +64,9 @@ def _impulse(axes: Axes, impulse: ImpulseRecord, which: tuple[int, str], unit: s
     axes.legend()
 
 
-def _gain(axes: Axes, response: ResponseRecord, which: tuple[int, str], unit: str) -> None:
-    j, name = which
-    frequency, gain = _array(response.frequency) / (2.0 * np.pi), _array(response.gain[j])
+def _gain(axes: Axes, response: ResponseRecord, which: tuple[int, str, str], unit: FrequencyUnit) -> None:
+    j, name, of = which
+    frequency, gain = unit.told(_array(response.frequency)), _array(response.gain[j])
     low, high = _array(response.low[j]), _array(response.high[j])
     seen = np.isfinite(gain) & (gain > 0.0)
     if not seen.any():
@@ -74,15 +76,15 @@ def _gain(axes: Axes, response: ResponseRecord, which: tuple[int, str], unit: st
     floor = 0.1 * float(gain[seen].min())
     axes.fill_between(frequency[banded], np.maximum(low[banded], floor), high[banded], color=BAND_COLOUR, label="95 %")
     axes.loglog(frequency[seen], gain[seen], color=PALETTE[0], label=name)
-    axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel(f"gain [{unit}]")
+    axes.set_xlabel(unit.label)
+    axes.set_ylabel(f"gain [{of}]")
     axes.legend(loc="lower left")
 
 
-def _coherence(axes: Axes, response: ResponseRecord) -> None:
-    frequency, coherence = _array(response.frequency) / (2.0 * np.pi), _array(response.coherence)
+def _coherence(axes: Axes, response: ResponseRecord, unit: FrequencyUnit) -> None:
+    frequency, coherence = unit.told(_array(response.frequency)), _array(response.coherence)
     known = np.isfinite(coherence)
     axes.semilogx(frequency[known], coherence[known], color=PALETTE[2])
     axes.set_ylim(0.0, 1.02)
-    axes.set_xlabel("frequency [Hz]")
+    axes.set_xlabel(unit.label)
     axes.set_ylabel("coherence")

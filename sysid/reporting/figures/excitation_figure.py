@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from sysid.excitation import Excitation
 from sysid.reporting.figures.style import PALETTE, new_figure, styled
 from sysid.reporting.figures.thinning import thin
+from sysid.reporting.frequency import HERTZ
 
 _COLUMNS = 900
 MOST_CHANNELS = 8
@@ -42,5 +43,5 @@ def excitation_figure(found: Excitation) -> Figure:
             right.set_ylim(0.0, 1.1 * max(float(size.max(initial=0.0)), 1e-300))
             right.set_ylabel("amplitude")
         rows[-1, 0].set_xlabel("time [s]")
-        rows[-1, 1].set_xlabel("frequency [Hz]")
+        rows[-1, 1].set_xlabel(HERTZ.label)
         return figure

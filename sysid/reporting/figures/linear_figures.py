@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
+from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.reporting.linear_views import LinearView
 from sysid.units import in_unit, per
 
@@ -24,16 +25,17 @@ SHOWN = 400
 """Samples shown of a step response."""
 
 
-def bode_figure(found: Bode) -> Figure:
+def bode_figure(found: Bode, unit: FrequencyUnit = HERTZ) -> Figure:
     """Magnitude and phase of every pair, with their bands.
 
     Args:
         found: The responses.
+        unit: Of frequencies.
 
     Returns:
         One column a pair.
     """
-    w, gain, phase = found.frequency, found.gain, found.phase
+    w, gain, phase = unit.told(found.frequency), found.gain, found.phase
     with styled():
         figure = new_figure(max(7.6, 2.2 * len(found.names)), 4.2)
         axes = figure.subplots(2, len(found.names), sharex=True, squeeze=False)
@@ -49,7 +51,7 @@ def bode_figure(found: Bode) -> Figure:
             below.semilogx(w, phase[:, j], color=PALETTE[0])
             above.set_ylabel(f"gain [{per(y, u)}]")
             below.set_ylabel("phase [degrees]")
-            below.set_xlabel("frequency [rad/s]")
+            below.set_xlabel(unit.label)
             above.legend(loc="lower left")
         return figure
 

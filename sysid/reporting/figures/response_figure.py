@@ -12,6 +12,7 @@ from sysid.estimation import FitResult
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
 from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.reporting.figures.style import DASHES, PALETTE, TARGET, new_figure, styled
+from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.reporting.linear_views import linear_views
 from sysid.units import per
 
@@ -42,12 +43,13 @@ def impulse_figure(found: ImpulseResponse) -> Figure:
         return figure
 
 
-def response_figure(found: FrequencyResponse, fits: Sequence[FitResult] = ()) -> Figure:
+def response_figure(found: FrequencyResponse, fits: Sequence[FitResult] = (), unit: FrequencyUnit = HERTZ) -> Figure:
     """Gain, phase and coherence with their 95 % bands, models over them.
 
     Args:
         found: The response.
         fits: Linear models; what has no frequency response, or another output, is left out.
+        unit: Of frequencies.
 
     Returns:
         One column an input, the coherence below.
@@ -59,41 +61,44 @@ def response_figure(found: FrequencyResponse, fits: Sequence[FitResult] = ()) ->
         for j, name in enumerate(found.mapping.inputs):
             above = figure.add_subplot(grid[0, j])
             below = figure.add_subplot(grid[1, j], sharex=above)
-            _measured(above, below, found, j)
+            _measured(above, below, found, j, unit)
             for number, fit in enumerate(fits):
-                _model(above, below, found, fit, (j, number))
+                _model(above, below, found, fit, (j, number, unit))
             above.set_ylabel(f"gain [{per(found.output_unit, found.input_units[j])}]")
             below.set_ylabel("phase [degrees]")
             above.set_title(name)
             above.legend(loc="lower left")
         place = figure.add_subplot(grid[2, :])
-        place.semilogx(found.frequency, found.coherence, color=PALETTE[2])
+        place.semilogx(unit.told(found.frequency), found.coherence, color=PALETTE[2])
         place.set_ylim(0.0, 1.02)
         place.set_ylabel("coherence")
-        place.set_xlabel("frequency [rad/s]")
+        place.set_xlabel(unit.label)
         return figure
 
 
-def _measured(above: Axes, below: Axes, found: FrequencyResponse, j: int) -> None:
+def _measured(above: Axes, below: Axes, found: FrequencyResponse, j: int, unit: FrequencyUnit) -> None:
     gain, (low, high) = found.gain[:, j], found.gain_band
     seen = np.isfinite(gain) & (gain > 0.0)
-    w = found.frequency[seen]
+    every = unit.told(found.frequency)
+    w = every[seen]
     if not len(w):
         above.text(0.5, 0.5, "not in the input", ha="center", transform=above.transAxes)
         return
     floor = 0.1 * float(gain[seen].min())
     banded = seen & np.isfinite(high[:, j])
     above.fill_between(
-        found.frequency[banded], np.maximum(low[banded, j], floor), high[banded, j], color=BAND_COLOUR, label="95 %"
+        every[banded], np.maximum(low[banded, j], floor), high[banded, j], color=BAND_COLOUR, label="95 %"
     )
     above.loglog(w, gain[seen], color=TARGET, label=found.method.value)
     phase, half = np.degrees(found.phase[:, j]), np.degrees(found.phase_band[:, j])
-    below.fill_between(found.frequency[banded], (phase - half)[banded], (phase + half)[banded], color=BAND_COLOUR)
+    below.fill_between(every[banded], (phase - half)[banded], (phase + half)[banded], color=BAND_COLOUR)
     below.semilogx(w, phase[seen], color=TARGET)
 
 
-def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, which: tuple[int, int]) -> None:
-    j, number = which
+def _model(
+    above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, which: tuple[int, int, FrequencyUnit]
+) -> None:
+    j, number, unit = which
     ends, pair = fit.model.ends, (found.mapping.inputs[j], found.mapping.output)
     views = [
         one for one in linear_views(fit.model, None) if (ends.inputs[one.source], ends.outputs[one.target]) == pair
@@ -104,10 +109,10 @@ def _model(above: Axes, below: Axes, found: FrequencyResponse, fit: FitResult, w
         response = view.responses(w)[0]
         if not response.any():  # an input that does nothing in the model
             continue
-        above.loglog(w, np.abs(response), label=fit.model.label, **look)
+        above.loglog(unit.told(w), np.abs(response), label=fit.model.label, **look)
         # Unwrapped between the same points as what was measured: of far points both lose the same turns.
         phase = np.degrees(np.unwrap(np.angle(response)))
         measured = np.degrees(found.phase[found.frequency > 0.0, j])
         seen = np.flatnonzero(np.isfinite(measured))[:1]
         turns = 360.0 * float(np.round((measured[seen] - phase[seen]) / 360.0).sum())
-        below.semilogx(w, phase + turns, **look)
+        below.semilogx(unit.told(w), phase + turns, **look)

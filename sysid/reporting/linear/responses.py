@@ -15,6 +15,7 @@ from sysid.estimation.linear.modes import Mode
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.extras import need
 from sysid.models import AbstractModel
+from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.reporting.linear.step_responses import (
     SETTLED,
     stepinfo,
@@ -181,15 +182,21 @@ class Bode(_Response):
         phases = {"phase": self.phase, "phase_low": self.phase_low, "phase_high": self.phase_high}
         return self._frame("frequency", self.frequency, {"gain": self.gain, **ends, **phases})
 
-    def plot(self) -> Figure:
+    def plot(self, *, unit: str = HERTZ.value) -> Figure:
         """Gain and phase with their bands.
+
+        Args:
+            unit: Of the frequencies that are drawn: ``"Hz"``, or ``"rad/s"``, as ``frequency`` has them.
 
         Returns:
             A figure of matplotlib's, one column a pair.
+
+        Raises:
+            ConfigError: If it is another unit.
         """
         from sysid.reporting.figures.linear_figures import bode_figure
 
-        return bode_figure(self)
+        return bode_figure(self, FrequencyUnit.of(unit))
 
     def __str__(self) -> str:
         lines = []
@@ -199,9 +206,9 @@ class Bode(_Response):
                 continue
             at = int(np.argmax(self.gain[:, k]))
             peak = _with_interval(self.gain[at, k], self.gain_low[at, k], self.gain_high[at, k], per(y, u))
-            lines.append(f"{name}: largest gain {peak} at {quantity(float(self.frequency[at]), 'rad/s')}")
-        w = self.frequency
-        return "\n".join([*lines, f"{len(w)} frequencies from {number(float(w[0]))} to {number(float(w[-1]))} rad/s"])
+            lines.append(f"{name}: largest gain {peak} at {quantity(float(HERTZ.told(self.frequency[at])), 'Hz')}")
+        w = HERTZ.told(self.frequency)
+        return "\n".join([*lines, f"{len(w)} frequencies from {number(float(w[0]))} to {number(float(w[-1]))} Hz"])
 
     __repr__ = __str__
 

@@ -8,6 +8,7 @@ from sysid.advice import Verdict
 from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.advice.words import lines
 from sysid.reporting.figures.advice_figure import advice_figure
+from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.reporting.parts import Part, Section, picture
 from sysid.reporting.tables import Cell, Table
 
@@ -17,11 +18,12 @@ CAPTION = (
 )
 
 
-def advice_section(found: Sequence[AdviceRecord]) -> Section:
+def advice_section(found: Sequence[AdviceRecord], unit: FrequencyUnit = HERTZ) -> Section:
     """What is in the record: every finding with what to do, structures to try, pictures.
 
     Args:
         found: What was found, output by output.
+        unit: Of the frequencies that are drawn.
 
     Returns:
         The section.
@@ -29,7 +31,7 @@ def advice_section(found: Sequence[AdviceRecord]) -> Section:
     parts: list[Part] = []
     for number, advice in enumerate(found):
         parts += [_summary(advice), _table(advice)]
-        drawing = advice_figure(advice)
+        drawing = advice_figure(advice, unit)
         if drawing is not None:
             parts.append(picture(drawing, f"First look at {advice.mapping}", CAPTION, f"advice-{number}"))
     return Section(anchor="advice", title="What is in this record?", parts=tuple(parts))

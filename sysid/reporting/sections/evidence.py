@@ -13,6 +13,7 @@ from sysid.reporting.figures.curves_figure import curves_figure
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.residual_figure import residual_figure
 from sysid.reporting.fit_records import FitRecord
+from sysid.reporting.frequency import FrequencyUnit
 from sysid.reporting.linear.computing import bode_of, step_of
 from sysid.reporting.linear_views import linear_views
 from sysid.reporting.numbers import number
@@ -48,7 +49,8 @@ def evidence_sections(folder: Path, results: Results) -> list[Section]:
     shown = [part for fit in results.fits for part in _curves(folder, fit)]
     if shown:
         sections.append(Section(anchor="curves", title="Static curves", parts=tuple(shown)))
-    parts = [part for fit in results.fits if _linear(fit) for part in _responses(folder, fit)]
+    unit = results.frequency
+    parts = [part for fit in results.fits if _linear(fit) for part in _responses(folder, fit, unit)]
     if parts:
         sections.append(Section(anchor="frequency-response", title="Frequency response", parts=tuple(parts)))
     return sections
@@ -142,7 +144,7 @@ def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord
     )
 
 
-def _responses(folder: Path, fit: FitRecord) -> list[Part]:
+def _responses(folder: Path, fit: FitRecord, unit: FrequencyUnit) -> list[Part]:
     stored = _read_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
     if stored is None or stored.model.pole_radius is None:
         return []
@@ -153,7 +155,7 @@ def _responses(folder: Path, fit: FitRecord) -> list[Part]:
     band = "Grey: 95 % of what the covariance of the parameters allows." if uncertainty else "Uncertainty not known."
     return [
         picture(
-            bode_figure(bode_of([(model, uncertainty)])),
+            bode_figure(bode_of([(model, uncertainty)]), unit),
             f"Bode diagram of {fit.name}",
             f"{fit.name}, {fit.label}: frequency response up to the Nyquist frequency. {band}",
             f"bode-{name}",

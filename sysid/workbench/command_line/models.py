@@ -114,11 +114,12 @@ def response(
     out: Annotated[
         Path | None, typer.Option(help="Folder for pictures and tables; the current one by default.")
     ] = None,
+    frequency: Annotated[str, typer.Option(help="Unit of the frequencies that are drawn: Hz or rad/s.")] = "Hz",
 ) -> None:
     """Step response, Bode diagram and poles of a linear model: numbers, tables and pictures, with intervals."""
     from sysid.workbench.commands.response import response_command
 
-    response_command(model, fit=fit, seconds=seconds, out=out)
+    response_command(model, fit=fit, seconds=seconds, out=out, frequency=frequency)
 
 
 @commands.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')

@@ -70,11 +70,12 @@ def advise(
     mapping: Annotated[
         str | None, typer.Option(help="Inputs and output, as u1+u2 -> y; not needed for two channels.")
     ] = None,
+    frequency: Annotated[str, typer.Option(help="Unit of the frequencies that are drawn: Hz or rad/s.")] = "Hz",
 ) -> None:
     """What is in this record? Excitation, feedback, dead times, sampling, noise, linearity, and what to try."""
     from sysid.workbench.commands.advise import advise_command
 
-    advise_command(source, mapping=mapping)
+    advise_command(source, mapping=mapping, frequency=frequency)
 
 
 @commands.command(epilog='Example: sysid auto rig.csv --mapping "pump -> level" --minutes 5')

@@ -13,6 +13,7 @@ from sysid.export.reading import read_bundle
 from sysid.names import slug
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import as_file, svg
+from sysid.reporting.frequency import FrequencyUnit
 from sysid.reporting.linear.responses import Bode, StepResponse
 from sysid.reporting.results import read_results
 from sysid.workbench.fits.record import read_fit
@@ -23,9 +24,9 @@ from sysid.workbench.runner.store import RunFolder
 RESULTS = "results.json"
 
 
-def response_command(model: Path, *, fit: str | None, seconds: float | None, out: Path | None) -> None:
+def response_command(model: Path, *, fit: str | None, seconds: float | None, out: Path | None, frequency: str) -> None:
     """Print poles, gains and times, and write tables and pictures."""
-    model = meant(model)
+    unit, model = FrequencyUnit.of(frequency), meant(model)
     run = (model / RESULTS).is_file()
     asked, title = (_fits(model, fit), fit or model.name) if run else (_bundle(model, fit), model.stem)
     # What has no response at all is told before anything is written.
@@ -37,7 +38,8 @@ def response_command(model: Path, *, fit: str | None, seconds: float | None, out
     for kind, found in shown.items():
         target.print(f"{kind.capitalize()}\n{found}", soft_wrap=True)
         with styled():
-            drawing = svg(found.plot(), title=kind.capitalize(), description=f"{kind} of {title}", name=kind)
+            figure = found.plot(unit=unit) if isinstance(found, Bode) else found.plot()
+            drawing = svg(figure, title=kind.capitalize(), description=f"{kind} of {title}", name=kind)
         table, picture = (folder / f"{slug(title)}.{kind}.{ending}" for ending in ("csv", "svg"))
         write_bytes(picture, as_file(drawing))
         write_bytes(table, found.to_frame().to_csv(index=False).encode())

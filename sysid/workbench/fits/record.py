@@ -250,6 +250,7 @@ def results_document(
         "advice": list(advice),
         "published": config.report.published,
         "drawn": config.report.drawn or DRAWN,
+        "frequency": config.report.frequency.value,
         "sweep": None if sweep is None else sweep.summary.model_dump(),
     }
 

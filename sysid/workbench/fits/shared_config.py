@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field, FiniteFloat, model_validator
 
 from sysid.field_checks import FieldError, FolderName
 from sysid.models import Start, StartKind
+from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.workbench.fields import FormatField, MappingField, StartField
 from sysid.workbench.old_words import STRICT
 from sysid.workbench.stability import StabilityConfig
@@ -44,12 +45,14 @@ class ReportConfig(BaseModel):
         published: Name of a table of published figures.
         drawn: Cases of each fit that are drawn at most, the worst of those that were not fitted first; 12 by default,
             and fewer where a search has little time.
+        frequency: Unit of the frequencies that are drawn: ``Hz``, or ``rad/s``.
     """
 
     model_config = STRICT
 
     published: str | None = None
     drawn: int | None = Field(default=None, ge=1)
+    frequency: FrequencyUnit = HERTZ
 
 
 class SharedConfig(BaseModel):

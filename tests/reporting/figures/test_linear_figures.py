@@ -13,6 +13,7 @@ from sysid.estimation import FitResult, TransferFunctionTraining, fit_transfer_f
 from sysid.models import Mapping, TransferFunction
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
 from sysid.reporting.figures.svg import svg
+from sysid.reporting.frequency import FrequencyUnit
 from sysid.reporting.linear.computing import bode_of, step_of
 from sysid.reporting.linear.step_responses import band, filter_step
 from sysid.reporting.linear_views import linear_views
@@ -32,7 +33,7 @@ def fitted(noise: float, domain: str) -> FitResult:
 @pytest.mark.parametrize("domain", ["discrete", "continuous"])
 def test_bode_shows_the_response_within_its_band(domain: str) -> None:
     fit = fitted(0.3, domain)
-    above, below = bode_figure(bode_of([(fit.model, fit.uncertainty)])).axes
+    above, below = bode_figure(bode_of([(fit.model, fit.uncertainty)]), FrequencyUnit.RADIANS).axes
     frequency, gain = above.lines[0].get_data()
     np.testing.assert_allclose(gain, np.abs(fit.model.response(0, np.asarray(frequency))))
     outline = above.collections[0].get_paths()[0].vertices
