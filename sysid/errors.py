@@ -280,6 +280,7 @@ class ParityError(SysidError):
         unit: The output's unit.
         coarse: Whether the file computes in float32, whose rounding a model may make too much of.
         grown: How many times larger the model makes a difference; 0 where that is not the reason.
+        searched: Whether the file itself searched for the state in which it begins.
 
     ``summary`` says it in one sentence.
     """
@@ -294,6 +295,7 @@ class ParityError(SysidError):
         *,
         coarse: bool = False,
         grown: float = 0.0,
+        searched: bool = False,
     ) -> None:
         self.difference = difference
         self.tolerance = tolerance
@@ -304,7 +306,10 @@ class ParityError(SysidError):
             where=f"case {case}",
             expected=f"a largest difference of at most {tolerance:g} {unit}",
             got=f"{difference:g} {unit}",
-            remedy=f"nothing was published: this model makes {grown:.2g} times as much of a difference in the last "
+            remedy="nothing was published: the file finds another state at rest than the model. Say where states of "
+            "its equations are at rest (initial), so that none is searched for"
+            if searched
+            else f"nothing was published: this model makes {grown:.2g} times as much of a difference in the last "
             "digit, which no two programs round alike. Fit fewer states, train it longer or on more data, fit the free "
             "run (noise: false), or leave out an output that is made of others"
             if grown

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, given, step_by_step
 from sysid.export.flags import Flag
 from sysid.export.forms.programs import INPUT, STATE, Listing, ProgramForm
 from sysid.export.forms.stage import Side, Stage
@@ -40,8 +40,8 @@ class CasadiExporter(AbstractExporter):
 
         step = casadi.Function.load(str(folder / file.name))
 
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
-            y, after, flags = (value.full() for value in step(inputs.T, state.T))
+        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
+            y, after, flags = (value.full() for value in step(inputs.T, given(state).T))
             return Run(output=y.T, state=after.T, flags=flags[0].astype(np.int32))
 
         return step_by_step(run)

@@ -31,6 +31,9 @@ class ParityCase:
         output: The model's outputs, shape ``(n_samples, n_outputs)``.
         amplification: Largest change of an output in the run over the change before its first sample that caused it.
         reached: The sample at which it is reached.
+        rests: Whether its state is that at rest at its first inputs, to which files may come by themselves.
+        searched: Whether that state is searched for, and found by a file as finely as it searches.
+        itself: Whether a file has to begin the run by itself.
     """
 
     name: str
@@ -39,6 +42,9 @@ class ParityCase:
     output: NDArray[np.float64]
     amplification: float
     reached: int = 0
+    rests: bool = False
+    searched: bool = False
+    itself: bool = False
 
 
 def parity_cases(surrogate: Surrogate, traces: TraceSet, start: Start) -> tuple[ParityCase, ...]:
@@ -105,6 +111,8 @@ def case_from_rest(
         output=surrogate.chosen(computed),
         amplification=grown,
         reached=reached,
+        rests=begun is None,
+        searched=any(stage.searched for stage in surrogate.stages),
     )
 
 

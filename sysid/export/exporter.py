@@ -60,9 +60,10 @@ class Run:
     flags: NDArray[Any]
 
 
-Runner = Callable[[NDArray[Any], NDArray[Any]], Run]
+Runner = Callable[[NDArray[Any], NDArray[Any] | None], Run]
 """Runs a loaded file on inputs in their units, ``(n_samples, n_cars, n_inputs)``, and a state,
-``(n_cars, n_state)``. In float32 the state may come without its remainders, which are 0 then; it goes out with them."""
+``(n_cars, n_state)``. In float32 the state may come without its remainders, which are 0 then; it goes out with
+them. Where the exporter ``begins``, it may be ``None``: the file then begins by itself, at rest at its first inputs."""
 
 
 class AbstractExporter(ABC):
@@ -73,6 +74,12 @@ class AbstractExporter(ABC):
 
     packages: ClassVar[tuple[str, ...]] = ()
     """Optional packages that write or run its files, by the names that are imported."""
+
+    begins: ClassVar[bool] = False
+    """Whether its files come to rest by themselves; others are handed the state of ``model.json``."""
+
+    searches: ClassVar[bool] = False
+    """Whether they also find the states at rest of equations that nobody declared."""
 
     def check(self) -> None:
         """Make sure that files of this format can be written and run here.
@@ -127,7 +134,7 @@ def step_by_step(step: Runner) -> Runner:
         What runs whole records.
     """
 
-    def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+    def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
         one = step(inputs[0], state)
         output, flags = (np.empty((len(inputs), *a.shape), dtype=a.dtype) for a in (one.output, one.flags))
         for k in range(len(inputs)):
@@ -136,6 +143,12 @@ def step_by_step(step: Runner) -> Runner:
         return Run(output=output, state=one.state, flags=flags)
 
     return run
+
+
+def given(state: NDArray[Any] | None) -> NDArray[Any]:
+    """The state that a file which does not begin by itself is handed."""
+    assert state is not None  # noqa: S101 - see Runner
+    return state
 
 
 def with_remainders(state: NDArray[Any], length: int) -> NDArray[Any]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, given, step_by_step
 from sysid.export.flags import Flag
 from sysid.export.forms.programs import INPUT, STATE, Listing, ProgramForm
 from sysid.export.forms.stage import Side, Stage
@@ -60,9 +60,9 @@ class JaxExporter(AbstractExporter):
 
         step = jax.jit(export.deserialize(bytearray((folder / file.name).read_bytes())).call)
 
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
             with jax.enable_x64(True):
-                y, after, flags = (np.asarray(value) for value in step(inputs, state))
+                y, after, flags = (np.asarray(value) for value in step(inputs, given(state)))
             return Run(output=y, state=after, flags=flags)
 
         return step_by_step(run)

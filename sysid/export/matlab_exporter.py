@@ -30,6 +30,7 @@ class MatlabExporter(AbstractExporter):
     """Writes ``<name>_run.m``, and beside it ``<name>_step.m`` and ``<name>_rest.m``."""
 
     name = "matlab"
+    begins = True
 
     def check(self) -> None:
         """Look for Octave: what is written is run before it is published."""
@@ -54,8 +55,9 @@ class MatlabExporter(AbstractExporter):
         place = process.add([folder / name for name in (file.name, *file.companions)])
         function, n_outputs = f"{file.details['prefix']}_run", file.details["n_outputs"]
 
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
-            cars = [process.run(place, function, inputs[:, car], state[car], n_outputs) for car in range(len(state))]
+        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
+            begun = [None] * inputs.shape[1] if state is None else list(state)
+            cars = [process.run(place, function, inputs[:, car], one, n_outputs) for car, one in enumerate(begun)]
             y, after, flags = (np.stack(parts) for parts in zip(*cars, strict=True))
             return Run(output=y.transpose(1, 0, 2), state=after, flags=flags.T.astype(np.int32))
 

@@ -81,7 +81,7 @@ class Octave:
         return place
 
     def run(
-        self, place: str, function: str, inputs: NDArray[np.float64], state: NDArray[np.float64], n_outputs: int
+        self, place: str, function: str, inputs: NDArray[np.float64], state: NDArray[np.float64] | None, n_outputs: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Run ``[y, state, flags] = function(u, state)``.
 
@@ -89,7 +89,7 @@ class Octave:
             place: Where the function was put.
             function: Its name, an identifier.
             inputs: Shape ``(n_samples, n_inputs)``.
-            state: Shape ``(n_state,)``.
+            state: Shape ``(n_state,)``; ``None`` for a function that begins by itself.
             n_outputs: Number of outputs.
 
         Returns:
@@ -101,9 +101,9 @@ class Octave:
         n, m = inputs.shape
         with self.lock:
             (self.folder / place / "in").write_bytes(
-                np.concatenate([inputs.ravel(), state]).astype("<f8", copy=False).tobytes()
+                np.concatenate([inputs.ravel(), [] if state is None else state]).astype("<f8", copy=False).tobytes()
             )
-            answer = self._ask(f"{place} {function} {n} {m} {len(state)}")
+            answer = self._ask(f"{place} {function} {n} {m} {-1 if state is None else len(state)}")
             if answer != "done":
                 raise OctaveError(
                     "Octave refuses an exported function",
@@ -112,7 +112,7 @@ class Octave:
                     remedy="please report this with the version of Octave",
                 )
             found = np.fromfile(self.folder / place / "out", dtype="<f8")
-        y, after, flags = np.split(found, [n * n_outputs, n * n_outputs + len(state)])
+        y, after, flags = np.split(found, [n * n_outputs, len(found) - n])
         return y.reshape(n, n_outputs), after, flags
 
     def _ask(self, line: str) -> str:

@@ -7,7 +7,7 @@ number rounded otherwise in its last digit comes out larger by :attr:`ParityCase
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,14 @@ SHARES: Mapping[str, float] = {"float64": 1e-9, "float32": 1e-5}
 """How far a file may be from its model by default, as a share of an output's size, by the type of its numbers."""
 LOST = 1e6
 """Amplification from which a difference in the last digit may be as large as what is allowed."""
+
+RESTED, STANDING = 10, 5
+"""Runs that a file begins by itself, where it can: from rest at their first inputs; and samples over which a state that
+is searched for has to stand."""
+
+FOUND, NEARLY = 1e-5, 1e-9
+"""Share of an output's size by which such a run may be off, as step sizes go by differences in the last digit; and of a
+state, by which one is all but the same."""
 
 ROUNDINGS = 1e3
 """Roundings of the last digit that add up in a run, of which each is amplified."""
@@ -103,6 +111,8 @@ class Allowed:
         Returns:
             Shape ``(n_outputs,)``.
         """
+        if run.itself and run.searched:
+            return np.asarray(np.maximum(self.each, FOUND * np.abs(run.output).max(axis=0, initial=0.0)))
         if self.share is None:
             return self.each
         own = np.maximum(self.each, self.share * np.abs(run.output).max(axis=0, initial=0.0))
@@ -157,6 +167,8 @@ def check_parity(
 ) -> Parity:
     """Run an exported file on every case and on the random sequences over which its model stays finite.
 
+    A file that comes to rest by itself runs some of them from its own beginning, too.
+
     Args:
         file: The file.
         folder: Where it lies.
@@ -171,12 +183,16 @@ def check_parity(
     Raises:
         ParityError: If a difference is larger than the tolerance, or not a number.
     """
-    runner = exporter(file.format).load(file, folder)
+    writer = exporter(file.format)
+    runner = writer.load(file, folder)
     differences = np.concatenate([_compare(runner, (case,)) for case in cases])
     # Where the model itself grows without bound there is nothing to reproduce: in float32 it does so sooner.
     sequences = tuple(case for case in sequences if np.isfinite(case.output).all())
     drawn = _compare(runner, sequences) if sequences else differences[:0]
-    for found, runs in ((differences, cases), (drawn, sequences)):
+    begun = [case for case in (*sequences, *cases) if writer.begins and (writer.searches or not case.searched)]
+    rested = _resting(runner, begun, file.dtype, allowed)
+    own = _compare(runner, rested, begun=False) if rested else differences[:0]
+    for found, runs in ((differences, cases), (drawn, sequences), (own, rested)):
         larger = np.array([allowed.over(run) for run in runs]).reshape(found.shape) / allowed.each
         np.divide(found, larger, out=found)
         ratios = found / allowed.each
@@ -187,14 +203,14 @@ def check_parity(
             coarse, grown = file.dtype == "float32", runs[row].amplification
             raise ParityError(
                 file.name, runs[row].name, found_there, each, port.unit, coarse=coarse,
-                grown=grown if not coarse and grown > LOST else 0.0,
+                grown=grown if not coarse and grown > LOST else 0.0, searched=runs[row].itself and runs[row].searched,
             )  # fmt: skip
-    every = np.concatenate([differences, drawn])
+    every = np.concatenate([differences, drawn, own])
     near = int((every / allowed.each).max(axis=0).argmax())
     return Parity(
         largest_difference=float(differences[:, near].max()),
         case=cases[int(differences[:, near].argmax())].name,
-        random_difference=float(drawn[:, near].max(initial=0.0)),
+        random_difference=float(np.concatenate([drawn, own])[:, near].max(initial=0.0)),
         random_sequences=len(sequences),
         tolerance=float(allowed.each[near]),
         share=allowed.share,
@@ -204,8 +220,39 @@ def check_parity(
     )
 
 
-def _compare(runner: Runner, cases: tuple[ParityCase, ...]) -> NDArray[np.float64]:
-    """The largest difference of each case and output, all run side by side as cars; shape ``(n_cases, n_outputs)``."""
-    run = runner(np.stack([case.inputs for case in cases], axis=1), np.stack([case.state for case in cases]))
+def _compare(runner: Runner, cases: tuple[ParityCase, ...], *, begun: bool = True) -> NDArray[np.float64]:
+    """The largest difference of each case and output, all run side by side as cars; shape ``(n_cases, n_outputs)``.
+
+    They begin at the states of the cases, or as the file does by itself.
+    """
+    states = np.stack([case.state for case in cases]) if begun else None
+    run = runner(np.stack([case.inputs for case in cases], axis=1), states)
     found = [differences(run.output[:, i], case.output).max(axis=0, initial=0.0) for i, case in enumerate(cases)]
     return np.array(found).reshape(len(cases), -1)
+
+
+def _resting(runner: Runner, cases: Sequence[ParityCase], dtype: str, allowed: Allowed) -> tuple[ParityCase, ...]:
+    """Cases that a file may begin by itself, told by their names.
+
+    A state at rest that is searched for is found as finely as a program searches. Where nothing stands still, where the
+    run is another from a state that is all but the same, and in float32, there is nothing to find again.
+    """
+    own = tuple(
+        replace(case, name=f"{case.name}, begun by the file itself", itself=True)
+        for case in cases
+        if case.rests and np.isfinite(case.output).all()
+    )
+    if any(case.searched for case in own):
+        own = own[: RESTED * RESTED] if dtype == "float64" else ()
+        own = tuple(case for case in own if _found_again(runner, case, allowed.over(case)))
+    return own[:RESTED]
+
+
+def _found_again(runner: Runner, case: ParityCase, allowed: NDArray[np.float64]) -> bool:
+    """Whether a state stands still, and a run from close by is the same."""
+    nudge = NEARLY * (1.0 + np.abs(case.state))
+    still = case.inputs[:1].repeat(STANDING, axis=0)
+    stands = runner(still[:, np.newaxis], case.state[np.newaxis]).output[:, 0]
+    near = [replace(case, state=case.state + sign * nudge) for sign in (1.0, -1.0)]
+    moved = np.concatenate([_compare(runner, (one,)) for one in near])
+    return bool((np.abs(stands - stands[0]).max(axis=0) <= allowed).all() and (moved <= allowed).all())

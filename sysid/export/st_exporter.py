@@ -31,6 +31,7 @@ class StructuredTextExporter(AbstractExporter):
     """Writes ``<name>.st``: a function block of LREAL numbers and the functions that it calls."""
 
     name = "st"
+    begins = True
 
     def check(self) -> None:
         """Look for MATIEC: what is written is compiled and run before it is published."""
@@ -57,7 +58,7 @@ class StructuredTextExporter(AbstractExporter):
                 encoding="utf-8",
             )
             library = ctypes.CDLL(str(build(folder / file.name, Path(workplace))))
-        return caller(library.run, file)
+        return caller(library.go_on, library.from_rest, file)
 
 
 def block_of(surrogate: Surrogate) -> str:

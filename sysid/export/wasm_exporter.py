@@ -23,6 +23,7 @@ class WasmExporter(AbstractExporter):
     """Writes ``<name>.wasm``, which imports nothing, and ``<name>.html``, which holds it."""
 
     name = "wasm"
+    begins = searches = True
     packages: ClassVar[tuple[str, ...]] = ("wasmtime", "ziglang")
 
     def write(self, surrogate: Surrogate, folder: Path) -> tuple[ExportedFile, ...]:
@@ -52,7 +53,7 @@ class WasmExporter(AbstractExporter):
         store = wasmtime.Store()
         module = wasmtime.Module(store.engine, (folder / file.name).read_bytes())
         exports: Any = wasmtime.Instance(store, module, []).exports(store)
-        memory, step = exports["memory"], exports["step"]
+        memory, begin, step = exports["memory"], exports["init"], exports["step"]
         places = {name: exports[name](store) for name in ("inputs", "outputs", "state")}
         n_outputs, n_state = exports["n_outputs"](store), exports["n_state"](store)
 
@@ -63,12 +64,16 @@ class WasmExporter(AbstractExporter):
             at = places[place]
             return np.frombuffer(bytes(memory.read(store, at, at + 8 * length)), dtype=np.float64)
 
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
             n_samples, n_cars, _ = inputs.shape
             y, after = np.empty((n_samples, n_cars, n_outputs)), np.empty((n_cars, n_state))
             flags = np.empty((n_samples, n_cars), dtype=np.int32)
             for car in range(n_cars):
-                write(state[car], "state")
+                if state is None:
+                    write(inputs[0, car], "inputs")
+                    begin(store)
+                else:
+                    write(state[car], "state")
                 for i in range(n_samples):
                     write(inputs[i, car], "inputs")
                     flags[i, car] = step(store)

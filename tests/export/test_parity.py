@@ -19,6 +19,7 @@ from sysid.export.forms.stage import Port
 from sysid.export.parity import SHARES, Allowed
 from sysid.export.stability import UnboundedRunWarning, state_unbounded
 from sysid.models import ARX, NARX, ARXModel, Mapping, Start, StartKind
+from tests.export.cascades import build_limited
 from tests.export.conftest import ROWS, usable
 
 
@@ -165,7 +166,9 @@ def test_of_several_outputs_each_is_held_to_its_own_and_the_nearest_is_told(tmp_
         def run(*_: object) -> SimpleNamespace:
             return SimpleNamespace(output=case.output[:, np.newaxis] + np.array(by))
 
-        monkeypatch.setattr("sysid.export.parity.exporter", lambda _: SimpleNamespace(load=lambda *_: run))
+        monkeypatch.setattr(
+            "sysid.export.parity.exporter", lambda _: SimpleNamespace(load=lambda *_: run, begins=False)
+        )
 
     off_by(1e-15, 1e-4)
     allowed = Allowed.of((case,), "float64")
@@ -232,3 +235,36 @@ def test_an_unstable_model_is_held_to_the_size_that_its_outputs_have(tmp_path: P
     fitted = sysid.fit(sysid.data((u, y), sample_time=0.1), "u -> y", sysid.ARX(na=1, nb=(1,), nk=(1,)))
     fitted.save(tmp_path / "unstable", formats=("c",))
     assert (tmp_path / "unstable" / "model.json").is_file()
+
+
+BEGIN = [name for name, one in EXPORTERS.items() if one.begins]
+
+
+@pytest.mark.parametrize("format_name", BEGIN)
+def test_a_file_begins_at_rest_by_itself(format_name, inputs, tmp_path):
+    """A cascade with levels that follow inputs: the check runs it from there, beside the states that it is handed."""
+    surrogate = Surrogate.of(build_limited())
+    file = usable(format_name).write(surrogate, tmp_path)[0]
+    run, u = EXPORTERS[format_name].load(file, tmp_path), inputs(60, len(surrogate.inputs))
+    allowed = SHARES[file.dtype] * np.abs(surrogate.simulate(u)).max() * 10.0
+    assert largest_difference(run(u[:, np.newaxis], None).output[:, 0], surrogate.simulate(u)) <= allowed
+
+
+@pytest.mark.parametrize("format_name", ["c", "cpp", "fmi3", "arduino"])
+def test_a_file_that_begins_elsewhere_is_refused(format_name, tmp_path, monkeypatch):
+    """From the states that it is handed it is right: only its own beginning shows the fault."""
+    surrogate = Surrogate.of(build_limited())
+    writer = usable(format_name)
+    file = writer.write(surrogate, tmp_path)[0]
+    right, elsewhere = writer.load(file, tmp_path), surrogate.at_rest(np.full(len(surrogate.inputs), 7.0))
+
+    def wrong(u, state):
+        return right(u, np.tile(elsewhere, (u.shape[1], 1)) if state is None else state)
+
+    monkeypatch.setattr(type(writer), "load", lambda *_: wrong)
+    sequences = random_cases(surrogate, sequences=3, samples=50)
+    allowed = Allowed.of(sequences, file.dtype)
+    with pytest.raises(ParityError, match="begun by the file itself"):
+        check_parity(file, tmp_path, sequences, sequences, allowed=allowed, outputs=surrogate.outputs)
+    monkeypatch.setattr(type(writer), "begins", False)
+    check_parity(file, tmp_path, sequences, sequences, allowed=allowed, outputs=surrogate.outputs)

@@ -7,6 +7,7 @@ import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -28,6 +29,9 @@ class ArduinoExporter(AbstractExporter):
     Args:
         name: Name in the table.
     """
+
+    begins: ClassVar[bool] = True
+    searches: ClassVar[bool] = True
 
     name: str = "arduino"
 

@@ -6,6 +6,7 @@ import ctypes
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from sysid.export.c.compiler import build_library, compiler
 from sysid.export.c.exporter import caller
@@ -15,13 +16,23 @@ from sysid.export.templating import render
 
 SHIM = """#define {P}_IMPLEMENTATION
 #include "{p}.hpp"
-extern "C" unsigned int run_by_class({p}_real *state, size_t n, const {p}_real *u, {p}_real *y, unsigned int *flags)
+static unsigned int
+run_by_class(bool fresh, {p}_real *state, size_t n, const {p}_real *u, {p}_real *y, unsigned int *flags)
 {{
     {p}::Surrogate model(u);
-    std::memcpy(static_cast<void *>(&model.state()), state, sizeof model.state());
+    if (!fresh)
+        std::memcpy(static_cast<void *>(&model.state()), state, sizeof model.state());
     const unsigned int raised = model.run(n, u, y, flags);
     std::memcpy(state, &model.state(), sizeof model.state());
     return raised;
+}}
+extern "C" unsigned int go_on({p}_real *state, size_t n, const {p}_real *u, {p}_real *y, unsigned int *flags)
+{{
+    return run_by_class(false, state, n, u, y, flags);
+}}
+extern "C" unsigned int from_rest({p}_real *state, size_t n, const {p}_real *u, {p}_real *y, unsigned int *flags)
+{{
+    return run_by_class(true, state, n, u, y, flags);
 }}
 """
 
@@ -33,6 +44,9 @@ class CppExporter(AbstractExporter):
     Args:
         name: Name in the table.
     """
+
+    begins: ClassVar[bool] = True
+    searches: ClassVar[bool] = True
 
     name: str = "cpp"
 
@@ -71,8 +85,8 @@ class CppExporter(AbstractExporter):
             )
             build_library(["shim.cpp"], Path(workplace), "surrogate.so", language="c++")
             # The loader keeps what it has mapped, so that the file may go.
-            function = ctypes.CDLL(str(Path(workplace) / "surrogate.so")).run_by_class
-        return caller(function, file)
+            library = ctypes.CDLL(str(Path(workplace) / "surrogate.so"))
+        return caller(library.go_on, library.from_rest, file)
 
 
 def _undefined(source: str) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ class CExporter(AbstractExporter):
         name: Name in the table.
         dtype: The number type in which the source is run against the model; the files are the same for both.
     """
+
+    begins: ClassVar[bool] = True
+    searches: ClassVar[bool] = True
 
     name: str = "c"
     dtype: str = "float64"
@@ -59,8 +63,14 @@ class CExporter(AbstractExporter):
     def load(self, file: ExportedFile, folder: Path) -> Runner:
         """Build the source with this machine's compiler, and call it."""
         prefix = file.details["prefix"]
-        function = _library(file, folder)[f"{prefix}_run"]
-        return caller(function, file)
+        library = _library(file, folder)
+        function, begin = library[f"{prefix}_run"], library[f"{prefix}_init"]
+
+        def from_rest(state: Any, n_samples: Any, inputs: Any, *others: Any) -> None:
+            begin(state, inputs, None)
+            function(state, n_samples, inputs, *others)
+
+        return caller(function, from_rest, file)
 
 
 def _library(file: ExportedFile, folder: Path) -> ctypes.CDLL:
@@ -73,28 +83,30 @@ def _library(file: ExportedFile, folder: Path) -> ctypes.CDLL:
         return ctypes.CDLL(str(Path(workplace) / "surrogate.so"))
 
 
-def caller(function: Any, file: ExportedFile) -> Runner:
+def caller(function: Callable[..., Any], from_rest: Callable[..., Any], file: ExportedFile) -> Runner:
     """A compiled run, as the contract of exporters has it.
 
     Args:
         function: ``(state, n_samples, inputs, outputs, flags)``, of one car.
+        from_rest: The same, which sets the state itself.
         file: What it was built from; its details tell how many outputs and numbers of the state there are.
 
     Returns:
         The runner.
     """
-    function.restype = ctypes.c_uint
     dtype, n_outputs = np.dtype(file.dtype), file.details["n_outputs"]
 
-    def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+    def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
         n_samples, n_cars, _ = inputs.shape
-        after = np.array(with_remainders(state, file.details["n_state"]), dtype=dtype, order="C")
+        before = np.zeros((n_cars, 0)) if state is None else state
+        after = np.array(with_remainders(before, file.details["n_state"]), dtype=dtype, order="C")
+        walked = from_rest if state is None else function
         u = np.ascontiguousarray(inputs.transpose(1, 0, 2), dtype=dtype)
         y = np.empty((n_cars, n_samples, n_outputs), dtype=dtype)
         flags = np.empty((n_cars, n_samples), dtype=np.uint32)
         for car in range(n_cars):
             places = [ctypes.c_void_p(array[car].ctypes.data) for array in (after, u, y, flags)]
-            function(places[0], ctypes.c_size_t(n_samples), *places[1:])
+            walked(places[0], ctypes.c_size_t(n_samples), *places[1:])
         return Run(output=y.transpose(1, 0, 2), state=after, flags=flags.T.astype(np.int32))
 
     return run

@@ -6,7 +6,7 @@ import ctypes
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ class FmuExporter(AbstractExporter):
         name: Name in the table.
         version: 2 or 3.
     """
+
+    begins: ClassVar[bool] = True
+    searches: ClassVar[bool] = True
 
     name: str
     version: int
@@ -54,8 +57,9 @@ class FmuExporter(AbstractExporter):
             library = ctypes.CDLL(str(unpack_binary(folder / file.name, self.version, Path(workplace))))
         calls = _Calls(library=library, version=self.version)
 
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
-            cars = [_run_car(calls, file.details, inputs[:, i], state[i]) for i in range(inputs.shape[1])]
+        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
+            begun = [None] * inputs.shape[1] if state is None else list(state)
+            cars = [_run_car(calls, file.details, inputs[:, i], one) for i, one in enumerate(begun)]
             return Run(
                 output=np.stack([car.output for car in cars], axis=1),
                 state=np.stack([car.state for car in cars]),
@@ -117,12 +121,10 @@ class _Calls:
             raise SysidError("a function of the FMU failed", expected="status 0", got=status)
 
 
-def _run_car(calls: _Calls, details: dict[str, Any], inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+def _run_car(calls: _Calls, details: dict[str, Any], inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
     n_in, n_out = details["n_inputs"], details["n_outputs"]
     one = calls.instantiate(details["guid"])
     try:
-        calls.initialise(one)
-        _put_state(calls, one, state)
         values = np.ascontiguousarray(inputs, dtype=np.float64)
         output, flags = np.empty((len(values), n_out)), np.empty(len(values), dtype=np.int32)
         into, out_of, flag = (
@@ -131,6 +133,11 @@ def _run_car(calls: _Calls, details: dict[str, Any], inputs: NDArray[Any], state
         )
         sizes = [(_N(size), _N(size)) if calls.version == 3 else (_N(size),) for size in (n_in, n_out, 1)]
         set_numbers, get_numbers, get_flag = calls.SetFloat64, calls.GetFloat64, calls.GetInt32
+        if state is None:  # as a simulator does, which hands over what the inputs are at the start
+            calls.check(set_numbers(one, into, sizes[0][0], _P(values[0].ctypes.data), *sizes[0][1:]))
+        calls.initialise(one)
+        if state is not None:
+            _put_state(calls, one, state)
         step = calls.stepper(one, details["sample_time_s"])
         # Asked for at each sample, the address of an array took as long as the FMU.
         read, written, flagged = (table.ctypes.data for table in (values, output, flags))
@@ -140,7 +147,7 @@ def _run_car(calls: _Calls, details: dict[str, Any], inputs: NDArray[Any], state
             failed |= get_numbers(one, out_of, sizes[1][0], _P(written + 8 * n_out * i), *sizes[1][1:])
             failed |= get_flag(one, flag, sizes[2][0], _P(flagged + 4 * i), *sizes[2][1:])
             calls.check(failed)
-        return Run(output=output, state=_state(calls, one)[: len(state)], flags=flags)
+        return Run(output=output, state=_state(calls, one)[: None if state is None else len(state)], flags=flags)
     finally:
         calls.FreeInstance(one)
 

@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sysid
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step, with_remainders
+from sysid.export.exporter import (
+    AbstractExporter,
+    ExportedFile,
+    Kind,
+    Run,
+    Runner,
+    given,
+    step_by_step,
+    with_remainders,
+)
 from sysid.export.surrogate import Surrogate
 
 
@@ -56,8 +65,8 @@ class OnnxExporter(AbstractExporter):
         dtype = np.dtype(file.dtype)
         length = session.get_inputs()[1].shape[1]
 
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
-            before = np.asarray(with_remainders(state, length), dtype=dtype)
+        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
+            before = np.asarray(with_remainders(given(state), length), dtype=dtype)
             feed = {"u": np.asarray(inputs, dtype=dtype), "state": before}
             output, state_out, flags = session.run(["y", "state_out", "flags"], feed)
             return Run(output=output, state=state_out, flags=flags[..., 0])

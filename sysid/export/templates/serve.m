@@ -19,9 +19,12 @@ while waited < 600 && getppid() == asker
         addpath(words{1});
         file = fopen(fullfile(words{1}, 'in'), 'r', 'l');
         u = fread(file, [counts(2), counts(1)], 'double').';
-        state = fread(file, counts(3), 'double');
+        begun = {};
+        if counts(3) >= 0
+            begun = {fread(file, counts(3), 'double')};
+        end
         fclose(file);
-        [y, state, flags] = feval(words{2}, u, state);
+        [y, state, flags] = feval(words{2}, u, begun{:});
         file = fopen(fullfile(words{1}, 'out'), 'w', 'l');
         fwrite(file, y.', 'double');
         fwrite(file, state, 'double');

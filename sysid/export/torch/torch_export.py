@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.export.archive import write_archive
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, given, step_by_step
 from sysid.export.surrogate import Surrogate
 
 LARGEST_BATCH = 1 << 20
@@ -55,10 +55,10 @@ class TorchExportExporter(AbstractExporter):
 
         module = torch.export.load(folder / file.name).module()
 
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
             with torch.inference_mode():
                 output, state_out, flags = module(
-                    torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(state))
+                    torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(given(state)))
                 )
             return Run(output=output.numpy(), state=state_out.numpy(), flags=flags.numpy()[..., 0])
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, step_by_step
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, given, step_by_step
 from sysid.export.surrogate import Surrogate
 
 
@@ -77,10 +77,10 @@ class TorchScriptExporter(AbstractExporter):
         with _deprecation_known():
             module = torch.jit.load(folder / file.name, map_location="cpu")  # type: ignore[no-untyped-call]  # torch.jit has no types
 
-        def run(inputs: NDArray[Any], state: NDArray[Any]) -> Run:
+        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
             with torch.inference_mode():
                 output, state_out, flags = module(
-                    torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(state))
+                    torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(given(state)))
                 )
             return Run(output=output.numpy(), state=state_out.numpy(), flags=flags.numpy()[..., 0])
 
