@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, TraceError
 from sysid.traces.channel import Channel, check_text
+from sysid.traces.stretch import Stretch
 from sysid.units import is_same_unit
 
 SMALLEST, LARGEST = 1e-150, 1e150
@@ -262,6 +263,47 @@ class Trace:
         """
         known = tuple(inputs)
         return np.column_stack([self.usable_of((*known, name)) for name in outputs])
+
+    def masked(self, channel: str | None = None, *, start: float | None = None, stop: float | None = None) -> Trace:
+        """The trace without samples of a stretch of time, in which a sensor was stuck, saturated or disturbed.
+
+        What is read from a file is masked there, before anything is filled or resampled (``repairs: {mask: ...}``).
+
+        Args:
+            channel: The channel; all of them where none is named.
+            start: Seconds, in the trace's own time: the first sample that does not count.
+            stop: The last one.
+
+        Returns:
+            The trace, whose provenance says so.
+
+        Raises:
+            ChannelError: If there is no such channel.
+            TraceError: If the stretch has no end, holds no sample, or leaves a channel none.
+
+        Example:
+            >>> u = Channel(name="u", unit="V")
+            >>> trace = Trace(name="a", sample_time=0.1, channels=(u,), values=np.zeros((4, 1)))
+            >>> trace.masked("u", start=0.1, stop=0.2).usable_samples.tolist()
+            [True, False, False, True]
+        """
+        stretch = Stretch(start=start, stop=stop)
+        inside = stretch.holds(self.time, self.sample_time)
+        usable = np.ones(self.values.shape, dtype=np.bool_)
+        if self.usable is not None:
+            usable &= self.usable if self.usable.ndim == 2 else self.usable[:, np.newaxis]
+        which = np.arange(len(self.channels)) if channel is None else np.array([self.index(channel)])
+        usable[np.ix_(inside, which)] = False
+        if not stretch.told or not inside.any() or not usable.any(axis=0).all():
+            raise TraceError(
+                "a stretch to be masked holds no sample" if not inside.any() else "a mask leaves a channel no sample",
+                where=f"trace {self.name}",
+                expected=f"start, stop, or both, from {self.time[0]:.10g} s to {self.time[-1]:.10g} s",
+                got=stretch.told or "neither",
+                remedy="correct start and stop, in seconds of the trace's own time; leave a useless channel out",
+            )
+        note = f"{channel or 'all channels'}: {int(inside.sum())} samples masked, {stretch.told}"
+        return replace(self, usable=usable, provenance=(*self.provenance, note))
 
     def seen_by(self, names: Iterable[str], *, each: bool = False) -> Trace:
         """The trace as who knows some of its channels alone sees it: what others lack is nothing to it.

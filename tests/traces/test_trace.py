@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sysid.errors import TraceError
+import sysid
+from sysid.errors import ChannelError, TraceError
 from sysid.traces import Channel, Role, Trace, TraceSet
 
 TRACE = Trace(name="EST01", sample_time=0.1, channels=(Channel(name="BP", unit="psi"),), values=np.zeros((5, 1)))
@@ -104,3 +105,43 @@ def test_a_slice_of_a_trace_is_a_trace_with_all_that_belongs_to_its_samples() ->
 def test_a_slice_that_is_no_part_of_a_record_is_refused(window: slice) -> None:
     with pytest.raises(TraceError, match="no part of a trace"):
         TRACE[window]
+
+
+def stuck() -> Trace:
+    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
+    values = np.random.default_rng(0).normal(size=(300, 2))
+    return Trace(name="a", sample_time=0.1, channels=channels, values=values, start_time=40.0)
+
+
+def test_a_stretch_is_masked_in_the_time_of_the_trace_with_both_its_ends():
+    trace = stuck().masked("y", start=50.3, stop=51.2)
+    lost = np.flatnonzero(~trace.usable_of(["y"]))
+    assert (lost[0], lost[-1], len(lost)) == (103, 112, 10)
+    assert trace.usable_of(["u"]).all()
+    assert trace.provenance == ("y: 10 samples masked, from 50.3 s to 51.2 s",)
+    both = trace.masked(stop=40.4)
+    assert np.flatnonzero(~both.usable_of(["u"])).tolist() == [0, 1, 2, 3, 4]
+    assert both.usable_of(["y"]).sum() == 300 - 15
+
+
+@pytest.mark.parametrize(
+    ("asked", "complaint"),
+    [({}, "neither"), ({"start": 1.0, "stop": 2.0}, "holds no sample"), ({"channel": "y", "start": 0.0}, "leaves")],
+)
+def test_a_stretch_that_cannot_be_masked_is_refused_with_the_times_there_are(asked, complaint):
+    with pytest.raises(TraceError, match=complaint) as refused:
+        stuck().masked(**asked)
+    assert "from 40 s to 69.9 s" in str(refused.value)
+    with pytest.raises(ChannelError):
+        stuck().masked("z", start=41.0)
+
+
+def test_a_trace_is_masked_as_what_is_read_is():
+    """By the same words, to the same samples and with the same note."""
+    trace, mask = stuck(), {"channel": "y", "start": 10.3, "stop": 11.2}
+    pair = (trace["u"], trace["y"])
+    (read,) = sysid.data(pair, inputs="u", outputs="y", sample_time=0.1, repairs={"mask": [mask]})
+    (made,) = sysid.data(pair, inputs="u", outputs="y", sample_time=0.1)
+    made = made.masked(**mask)
+    np.testing.assert_array_equal(read.usable_of(["y"]), made.usable_of(["y"]))
+    assert made.provenance[-1] in read.provenance

@@ -12,9 +12,6 @@ from sysid.errors import ConfigError
 from sysid.ingest.tables.options import MaskOptions, RepairOptions
 from sysid.traces import Trace
 
-FUZZ = 1e-6
-"""How far outside of a stretch, in sample times, a stamp still counts as its end: ends are decimal numbers."""
-
 
 def hidden(
     stamps: NDArray[np.float64],
@@ -55,8 +52,8 @@ def hidden(
             )
         if mask.cases and case not in mask.cases:
             continue
-        low, high = mask.span(FUZZ * sample_time)
-        inside = (stamps >= max(low, span[0])) & (stamps <= min(high, span[1]))
+        low, high = mask.stretch.span(sample_time)
+        inside = mask.stretch.holds(stamps, sample_time) & (stamps >= span[0]) & (stamps <= span[1])
         left = stamps[(stamps >= span[0]) & (stamps <= span[1])]
         if not inside.any():
             if len(left) and (mask.cases or (low <= left.max() and high >= left.min())):
@@ -68,9 +65,34 @@ def hidden(
     return cells, notes
 
 
+def masked(trace: Trace, repairs: RepairOptions, where: str) -> Trace:
+    """A trace that was made, and not read, without the samples in stretches that are for it.
+
+    Args:
+        trace: The trace.
+        repairs: What was asked for.
+        where: Named in errors.
+
+    Returns:
+        The trace; itself where none is.
+
+    Raises:
+        ChannelError: If a channel is not there.
+        ConfigError: If a stretch that names the trace holds no sample.
+    """
+    for number, mask in enumerate(repairs.mask or ()):
+        if mask.cases and trace.name not in mask.cases:
+            continue
+        if mask.stretch.holds(trace.time, trace.sample_time).any():
+            trace = trace.masked(mask.channel, start=mask.start, stop=mask.stop)
+        elif mask.cases:
+            raise _empty(mask, number, where, [(trace.name, float(trace.time[0]), float(trace.time[-1]))])
+    return trace
+
+
 def _sentence(mask: MaskOptions) -> tuple[str, str]:
     """What is noted of a stretch, before the number of samples and behind it."""
-    return f"{mask.channel or 'all channels'}: ", f" samples masked, {mask.told}"
+    return f"{mask.channel or 'all channels'}: ", f" samples masked, {mask.stretch.told}"
 
 
 def check_masks(
@@ -97,7 +119,7 @@ def check_masks(
                 f"repairs.mask names the case {strangers[0]}, which is not there",
                 strangers[0],
                 cases,
-                "write names of cases that are read from files, or leave cases out: all of them are masked",
+                "write names of the data set's cases, or leave cases out: all of them are masked",
                 where=f"{where}, repairs.mask[{number}]",
             )
         before, behind = _sentence(mask)
@@ -113,7 +135,7 @@ def _empty(mask: MaskOptions, number: int, where: str, ends: Sequence[tuple[str,
         "a stretch to be masked holds no sample",
         where=f"{where}, repairs.mask[{number}]",
         expected=f"a stretch of {there}" + (" ..." if len(ends) > 5 else ""),
-        got=mask.told,
+        got=mask.stretch.told,
         remedy="correct start and stop; they are seconds in the file's own time, and calendar time counts from its "
         "first row" + (", or name the cases it is for" if not mask.cases else ""),
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 from sysid.content import content_folders, nearest_name, unique_folders
 from sysid.errors import ConfigError, SysidError, near_words
 from sysid.ingest.assembling.assemble import Wanted, assemble, round_channels
-from sysid.ingest.assembling.masks import check_masks
+from sysid.ingest.assembling.masks import check_masks, masked
 from sysid.ingest.datasets.cache import TraceCache, content_key, default_cache_folder
 from sysid.ingest.datasets.description import DatasetDescription, read_description
 from sysid.ingest.datasets.generators import Generator, find_generator
@@ -155,13 +155,11 @@ def load_described(
         if progress is not None:
             progress(case, index, len(chosen))
         if generator is not None and description.cases[case].recipe is not None:
-            traces.append(_generated(description, case, generator, store))
+            made = _generated(description, case, generator, store)
+            traces.append(masked(made, source.repairs, f"{path}, source"))
         else:
             traces.append(_read(description, case, path))
-    files = [case for case, said in description.cases.items() if said.recipe is None]
-    read = [trace for trace in traces if trace.name in files]
-    if read:
-        check_masks(source.repairs, read, cases=files, where=f"{path}, source", whole=cases is None)
+    check_masks(source.repairs, traces, cases=[*description.cases], where=f"{path}, source", whole=cases is None)
     return TraceSet(
         name=description.name,
         traces=tuple(traces),

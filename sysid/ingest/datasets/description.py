@@ -116,11 +116,14 @@ class SourceDescription(Options):
                 remedy="give one of them; files: {} reads files that say everything themselves",
             )
         foreign = set() if self.files is not None else FOR_FILES
+        if self.repairs.model_fields_set <= {"mask"}:  # what is made is masked, too
+            foreign = foreign - {"repairs"}
         strangers = sorted(self.model_fields_set & (foreign if self.generator else {"options"}))
         if strangers:
             raise FieldError(
                 f"source.{strangers[0]} means nothing here",
-                expected=f"options with a generator; {', '.join(sorted(FOR_FILES))} with files",
+                expected="options with a generator, repairs of no other kind than mask; "
+                f"{', '.join(sorted(FOR_FILES))} with files",
                 got=f"{strangers[0]} with {'a generator' if self.generator else 'files'}",
                 remedy=f"remove {strangers[0]}",
             )

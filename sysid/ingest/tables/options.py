@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection
 from datetime import date
@@ -14,6 +13,7 @@ from sysid.field_checks import FieldError
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.tables.frames import seconds
 from sysid.ingest.tables.time_columns import is_time_unit
+from sysid.traces.stretch import Stretch
 from sysid.units import Reference
 
 
@@ -269,7 +269,8 @@ def _seconds_only(value: Any) -> Any:
             "the ends of a masked stretch are seconds",
             expected="a number: seconds in the file's own time; calendar time counts from the first row",
             got=str(value),
-            remedy="write a number; of calendar time how many seconds after the first row it is",
+            remedy="write a number; of calendar time how many seconds after the first row it is: 90 for "
+            "10:01:30 where the first row is of 10:00:00",
         )
     return seconds(value)
 
@@ -310,23 +311,10 @@ class MaskOptions(Options):
             )
         return self
 
-    def span(self, fuzz: float) -> tuple[float, float]:
-        """Its ends, where a stamp may lie a little outside.
-
-        Args:
-            fuzz: Seconds.
-
-        Returns:
-            The first and the last second; infinite where it has no end.
-        """
-        low = -math.inf if self.start is None else self.start - fuzz - 4.0 * math.ulp(self.start)
-        return low, math.inf if self.stop is None else self.stop + fuzz + 4.0 * math.ulp(self.stop)
-
     @property
-    def told(self) -> str:
-        """Its ends in words."""
-        ends = (("from", self.start), ("to", self.stop))
-        return " ".join(f"{word} {end:.15g} s" for word, end in ends if end is not None)
+    def stretch(self) -> Stretch:
+        """When it is."""
+        return Stretch(start=self.start, stop=self.stop)
 
 
 def _one_mask(value: Any) -> Any:

@@ -32,6 +32,25 @@ def test_a_generated_data_set_has_its_roles_rounding_and_provenance(ramp: Any, r
     assert traces.source == "made for a test\nInferred: the slope"
 
 
+@pytest.mark.parametrize("kept", [False, True])
+def test_what_a_generator_makes_is_masked(ramp: Any, ramp_dataset: Path, tmp_path: Path, kept: bool) -> None:
+    """Made or kept from before: the mask is no part of what is made."""
+    where = tmp_path / "cache" if kept else False
+    plain = load_dataset(ramp_dataset, cache=where)
+    file = ramp_dataset if ramp_dataset.is_file() else ramp_dataset / "dataset.yaml"
+    text = file.read_text(encoding="utf-8")
+    mask = "source:\n  repairs: {mask: [{channel: y, start: 1.0, stop: 1.9, cases: [VAL]}]}\n"
+    file.write_text(text.replace("source:\n", mask), encoding="utf-8")
+    traces = load_dataset(ramp_dataset, cache=where)
+    assert np.flatnonzero(~traces["VAL"].usable_of(["y"])).tolist() == [*range(10, 20)]
+    assert traces["VAL"].usable_of(["u"]).all() and traces["EST"].usable is None
+    assert traces["VAL"].provenance == (*plain["VAL"].provenance, "y: 10 samples masked, from 1 s to 1.9 s")
+    assert len(ramp.calls) == (2 if kept else 4)
+    file.write_text(text.replace("source:\n", mask.replace("start: 1.0, stop: 1.9", "start: 90")), encoding="utf-8")
+    with pytest.raises(ConfigError, match="holds no sample"):
+        load_dataset(ramp_dataset, cache=where)
+
+
 def test_a_trace_is_made_once(ramp: Any, ramp_dataset: Path, tmp_path: Path) -> None:
     first = load_dataset(ramp_dataset, cache=tmp_path / "cache")
     second = load_dataset(ramp_dataset, cache=tmp_path / "cache")
