@@ -20,11 +20,13 @@ from typing import Any
 
 import numpy as np
 
+from sysid.bounded_text import read_json
 from sysid.errors import ConfigError
+from sysid.export.card import in_short
 from sysid.export.flags import MEANING
 from sysid.export.manifest import MANIFEST
 from sysid.extras import need
-from sysid.names import read_sides, slug, told_apart, tracking_text
+from sysid.names import markdown_inline, read_sides, slug, told_apart, tracking_text
 from sysid.traces import TraceSet
 from sysid.workbench.runner.events import FitReady
 from sysid.workbench.tracking import fit_values as tracked
@@ -254,6 +256,7 @@ def log_model(
             run_id=run_id,
             model_id=logged.model_id,
             fit=ready.config.name,
+            description=markdown_inline(in_short(read_json(bundle / MANIFEST))),
         )
     finally:
         mlflow.set_tracking_uri(before)

@@ -86,7 +86,9 @@ def parsed(address: str) -> tuple[str, str | None, str | None]:
     return found.group(1), found.group(2), found.group(3)
 
 
-def register(client: Any, mapping: str, *, source: str, run_id: str, model_id: str | None, fit: str) -> str:
+def register(
+    client: Any, mapping: str, *, source: str, run_id: str, model_id: str | None, fit: str, description: str = ""
+) -> str:
     """Make a tracked model the newest version of its mapping, and the candidate.
 
     Args:
@@ -96,6 +98,7 @@ def register(client: Any, mapping: str, *, source: str, run_id: str, model_id: s
         run_id: The run that logged it.
         model_id: Its identifier among logged models.
         fit: Name of the fit.
+        description: What the version is, in some sentences.
 
     Returns:
         The version.
@@ -103,7 +106,10 @@ def register(client: Any, mapping: str, *, source: str, run_id: str, model_id: s
     name = registered_name(mapping)
     if not _found(client, name):
         client.create_registered_model(name, description=f"Exported surrogates of {mapping}.")
-    version = client.create_model_version(name, source, run_id=run_id, model_id=model_id, tags={"fit": fit}).version
+    made = client.create_model_version(
+        name, source, run_id=run_id, model_id=model_id, tags={"fit": fit}, description=description or None
+    )
+    version = made.version
     client.set_registered_model_alias(name, CANDIDATE, version)
     return str(version)
 

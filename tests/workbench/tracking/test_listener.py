@@ -331,6 +331,14 @@ def test_the_exported_model_is_the_newest_version_and_the_candidate(tracked_once
     version = client.get_model_version(model.name, str(model.aliases["candidate"]))
     assert version.run_id == runs_of(client)[results.best.name].info.run_id
     assert version.tags["fit"] == results.best.name
+    best = results.best_fit
+    said = version.description.replace("\\", "")  # of Markdown
+    assert best.label in said and f"{best.n_parameters} parameters" in said
+    assert (
+        f"Fitted on data set {results.data.name} by sysid run" in said or "Fitted to its own free run on data" in said
+    )
+    worst = min(case.free_run.nrmse_fit for case in best.cases.values() if case.role != "estimation")
+    assert f"cases that it was not fitted to: {worst:.4g} " in said
     graph = load_onnx(workspace, "models:/inlet-valve-to-outlet@candidate").graph
     assert [value.name for value in graph.output] == ["y", "state_out", "flags"]
 
