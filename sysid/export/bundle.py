@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.export.measured_run import Initial, check_able, check_one_start, run_measured, run_with
+from sysid.export.ranges import taking_rounding
 from sysid.export.surrogate import Surrogate
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.memory.run_inputs import inputs_of
@@ -184,10 +185,11 @@ def said_outside(inputs: NDArray[np.float64], units: Dict[str, str], ranges: Dic
         >>> said_outside(np.array([[90.0], [0.0]]), {"STP": "psi"}, {"STP": (64.2, 90.0)})[:49]
         'STP is beyond 64.2 to 90 psi in 50 % of the sampl'
     """
-    told = []
+    told, wide = [], taking_rounding(ranges)
     for column, (name, unit) in zip(inputs.T, units.items(), strict=True):
-        low, high = ranges.get(name, (-np.inf, np.inf))
-        if share := float(np.mean((column < low) | (column > high))):
+        least, most = wide.get(name, (-np.inf, np.inf))
+        if share := float(np.mean((column < least) | (column > most))):
+            low, high = ranges[name]
             of = in_unit(f"{low:g} to {high:g}", unit)
             told.append(f"{name} is beyond {of} in {100.0 * share:.3g} % of the samples")
     return f"{'; '.join(told)}: nothing there was fitted, and the accuracy is unknown" if told else ""

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from sysid.export.forms.stage import Range
 from sysid.traces import Role, Trace, TraceSet
+
+DIGITS = 4.0
+"""Last digits by which a number that was converted from another unit may be off."""
 
 
 def declared_ranges(inputs: Sequence[str], traces: TraceSet) -> dict[str, Range]:
@@ -58,3 +63,23 @@ def range_of(name: str, estimation: Sequence[Trace]) -> Range | None:
     """Least and greatest of a channel in the traces that have it; ``None`` where none has."""
     there = [trace[name] for trace in estimation if name in trace.channel_names]
     return (min(float(v.min()) for v in there), max(float(v.max()) for v in there)) if there else None
+
+
+def taking_rounding(ranges: Mapping[str, Range]) -> dict[str, Range]:
+    """Ranges that their own ends are in where these come from another unit: 700 mV are 0.7000000000000001 V.
+
+    Args:
+        ranges: By channel.
+
+    Returns:
+        The ranges, wider by some last digits.
+
+    Example:
+        >>> low, high = taking_rounding({"u": (0.0, 0.7)})["u"]
+        >>> high >= 0.001 * 700.0 > 0.7
+        True
+    """
+    return {
+        name: (low - DIGITS * float(np.spacing(abs(low))), high + DIGITS * float(np.spacing(abs(high))))
+        for name, (low, high) in ranges.items()
+    }

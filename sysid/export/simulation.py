@@ -16,6 +16,7 @@ from sysid.export.command_table import CommandTable, read_command
 from sysid.export.flags import MEANING, Flag, Held, expected_flags, limits_reached
 from sysid.export.inputs import check_constants, ticking, with_constants
 from sysid.export.measured_run import Initial, able, check_able, check_one_start, obstacle, run_measured, run_with
+from sysid.export.ranges import taking_rounding
 from sysid.export.reading import read_bundle
 from sysid.export.surrogate import Surrogate
 from sysid.ingest.memory.run_records import record_of
@@ -165,7 +166,7 @@ def _run(
 ) -> Simulation:
     outputs = tuple(channel_of(entry) for entry in bundle.outputs)
     names, targets = tuple(channel.name for channel in channels), [channel.name for channel in outputs]
-    surrogate = Surrogate.of(bundle.model, bundle.ranges, outputs=targets)
+    surrogate = Surrogate.of(bundle.model, taking_rounding(bundle.ranges), outputs=targets)
     measured = [name for name in targets if name in given.channel_names]
     start, note = _start(bundle, given, measured, initial, start)
     values, firsts = given.columns(names), dict[str, int]()
