@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 from sysid.composite import Doubting, TrainedComposite, TrainingData, committee, doubting, whole_score
 from sysid.composite.doubt.committee import check_alike
+from sysid.errors import BundleError, ConfigError
 from sysid.models import Cascade, Interpolation
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.assembly.interpolation import interpolation_of
 from sysid.workbench.assembly.proof_config import DoubtConfig, InterpolationConfig, MeanConfig
 from sysid.workbench.assembly.written import written
-from sysid.workbench.runner.store import digest, strict
+from sysid.workbench.runner.store import LINE, digest, strict
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
@@ -119,14 +120,13 @@ class Beside:
 
         Raises:
             BundleError: If a bundle is damaged or lacking.
+            ConfigError: If it is a line.
             FieldError: If nobody doubts, or a mean is to be doubted otherwise than by its spread.
         """
-        from sysid.export import read_bundle
-
         if doubt is not None:
             doubt.check_judges(averaged=mean is not None)
         doubting, averaged = (
-            tuple(Other.of_bundle(read_bundle(folder / place), place) for place in (section.beside if section else ()))
+            tuple(Other.of_bundle(_read(folder / place), place) for place in (section.beside if section else ()))
             for section in (doubt, mean)
         )
         return cls(
@@ -270,3 +270,23 @@ class Beside:
             return ""
         others = " and of ".join(one.sentence for one in self.averaged)
         return f"The mean of {1 + len(self.averaged)} wholes answers: of {first} and of {others}."
+
+
+def _read(path: Path) -> Bundle:
+    """A bundle; of a line without one it is said why that is none."""
+    from sysid.export import read_bundle
+
+    try:
+        return read_bundle(path)
+    except BundleError:
+        line = path if path.name == LINE else path / LINE
+        if not line.is_file():
+            raise
+        raise ConfigError(
+            "a line cannot stand beside a whole",
+            where=path,
+            expected="a whole, which has its outputs where the pipeline scores them",
+            got=f"{line.name}: what writes the field, and apart from it what reads it at any one place",
+            remedy="name a bundle that the line's pipeline exported, as runs/NAME; sysid publish RUN --bundle keeps it "
+            "beside the page. With interpolation the mean of wholes has positions between",
+        ) from None

@@ -240,6 +240,8 @@ def test_a_whole_beside_that_has_no_such_positions_is_refused_before_anything_is
     [
         (("beside: [../runs/tanks/bundle]", "beside: []"), "beside"),
         (("beside: [../runs/tanks/bundle]", "beside: [../runs/nobody]"), "nobody"),
+        (("beside: [../runs/tanks/bundle]", "beside: [../pages/line]"), "a line cannot stand beside a whole"),
+        (("beside: [../runs/tanks/bundle]", "beside: [../pages/line/line.json]"), "a line cannot stand beside a whole"),
         (("spread: [lower]", "seeds: [3]"), "seed 3 would train the same whole again"),
         (("spread: [lower]", "seeds: [5, 5]"), "no mean of several wholes"),
         (("spread: [lower]", "spread: [middle]"), "mean, spread names middle"),
@@ -253,6 +255,8 @@ def test_what_cannot_be_averaged_is_said_before_anything_is_trained(
     complaint: str,
 ) -> None:
     write_tanks(workspace / "datasets" / "calm", seed=50)
+    (workspace / "pages" / "line").mkdir(parents=True)
+    (workspace / "pages" / "line" / "line.json").write_text("{}", encoding="utf-8")
     text = FIRST.replace("name: tanks", "name: third", 1) + MEAN + DOUBT
     assert changed[0] in text
     with pytest.raises((ConfigError, BundleError), match=complaint):
