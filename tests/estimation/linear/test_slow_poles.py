@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+import sysid
 from sysid.estimation import fit_polynomial, fit_state_space, fit_transfer_function
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.transfer_function_problem import SLOWEST
@@ -125,3 +126,15 @@ def test_a_level_that_only_innovations_reach_is_estimated_from_a_history() -> No
     y = clean + 0.1 * rng.normal(size=200)
     run = form.simulate(u[50:], History(inputs=u[:50], output=y[:50]))
     np.testing.assert_allclose(run, clean[50:], atol=0.1)
+
+
+@pytest.mark.parametrize("level", [0.0, 5.0])
+def test_an_output_error_integrates_about_the_input_at_which_its_plant_stands(level: float) -> None:
+    """Away from zero its gain came out a seventieth: the constant that undoes the ramp had counted as nothing."""
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 200), 20)
+    y = np.cumsum(np.r_[0.0, 0.02 * u[:-1]]) + 0.01 * rng.standard_normal(4000)
+    traces = sysid.data((u + level, y + 8.0 * level), sample_time=2.0, split=0.6)
+    fit = sysid.fit(traces, "u -> y", sysid.OE(nb=1, nf=1, nk=1))
+    assert fit.step(seconds=20.0).values[-1, 0] == pytest.approx(0.2, rel=0.01)
+    assert min(sysid.compare(traces, fit).to_frame()["fit"]) > 98.0

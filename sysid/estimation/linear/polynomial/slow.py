@@ -181,8 +181,19 @@ def of_transfer_function(
     here = problem.linearise(theta)
     if not np.isfinite(here.loss):
         return None
-    theta[linear] -= np.linalg.lstsq(here.gauss_newton[np.ix_(linear, linear)], here.gradient[linear], rcond=None)[0]
+    theta[linear] -= _minimum(here.gauss_newton[np.ix_(linear, linear)], here.gradient[linear])
     return problem, theta, scaling
+
+
+def _minimum(normal: Array, gradient: Array) -> Array:
+    """The step to the minimum of what is linear, each coefficient measured by what it moves.
+
+    Beside what an integrator adds up a constant moves next to nothing, and undoes the ramp that an input away from
+    zero makes of a pole that is nearly 1: it would count as nothing.
+    """
+    size = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    size = np.where(size > 0.0, size, 1.0)
+    return np.asarray(np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=None)[0] / size)
 
 
 def _coefficients(
