@@ -112,7 +112,7 @@ IMPLICIT = {
 @pytest.mark.parametrize("name", sorted(IMPLICIT))
 def test_an_implicit_run_is_that_of_the_tree(name: str) -> None:
     model = a_model(name, solver=ROSENBROCK)
-    inputs, begin = a_run(model, n=20)
+    inputs, begin = a_run(model, n=10)
     form, states = model.recursion, model.lowered.states
     u, x = form.given(inputs, inputs[:1]), np.array([begin[state] for state in states])
     expected = EquationTwin(model, model.theta).run(inputs, begin)

@@ -16,6 +16,7 @@ from typing import Any
 
 import fmpy  # noqa: F401 - what every session needs is loaded once, before they are forked
 import matplotlib.figure  # noqa: F401
+import numpy as np
 import pint  # noqa: F401
 import scipy.signal  # noqa: F401
 
@@ -23,6 +24,7 @@ import sysid
 import sysid.workbench.surrogates.make
 from sysid.export import writing
 from sysid.export.fmi import units
+from sysid.kernels.passages import closest
 from sysid.reporting import charts, parts, report
 from sysid.workbench import cli
 from sysid.workbench.auto import budget, finish, ledger, plan
@@ -130,7 +132,9 @@ def main() -> None:
     charts.chart_figure = lambda *_: None
     finish.pace = lambda: 1.0  # it draws pictures to find it
     finish.slowness = budget.slowness = work.slowness = lambda: 1.0  # it is busy to find it
-    units.unit_definitions(["V"])  # reads all units, once for every session
+    # What every session would read and load anew: all units, and all that Numba knows of.
+    units.unit_definitions(["V"])
+    closest(np.zeros((3, 1)), np.zeros(1, dtype=np.int64), 0, 1)
     found: dict[str, Any] = {"ended": []}
     for name in ("whole", "ended"):
         place = Path(sys.argv[1]).resolve() / name
