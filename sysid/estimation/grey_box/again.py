@@ -15,7 +15,8 @@ from sysid.estimation.grey_box.profile import LEVEL, TERMS, Profile, Profiler
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.least_squares.evidence import update
-from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.state import Solution
 from sysid.estimation.parameters.named import named_of
 from sysid.estimation.records.experiment import experiments_of
 from sysid.estimation.results.result import FitResult

@@ -13,7 +13,9 @@ from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.stepping import ACCURACY, Stepping, substeps_for
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.evidence import update
-from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, at_minimum
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.minimum import at_minimum
+from sysid.estimation.least_squares.state import Solution
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.training import Training

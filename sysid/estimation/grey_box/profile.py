@@ -29,7 +29,8 @@ import scipy
 from numpy.typing import NDArray
 
 from sysid.estimation.grey_box.provider import EquationProvider
-from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, State
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.state import Solution, State
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.parameters.named import Named
 from sysid.estimation.results.result import Status

@@ -15,8 +15,8 @@ import numpy as np
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.damping import damping_of
 from sysid.estimation.least_squares.evidence import Prior
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration, State
 from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.least_squares.state import Iteration, State
 from sysid.estimation.results.result import Evidence
 
 MEASURED = ("mse", "damping", "effective_parameters", "elapsed_s")

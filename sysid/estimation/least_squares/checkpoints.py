@@ -18,8 +18,9 @@ from typing import Any
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.evidence import Prior
-from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution, State
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.least_squares.state import Solution, State
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.results.result import Status
 

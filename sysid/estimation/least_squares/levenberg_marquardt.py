@@ -63,11 +63,13 @@ from sysid.estimation.clock import now
 from sysid.estimation.least_squares.damping import DAMPINGS, DEFAULT
 from sysid.estimation.least_squares.damping.base import AbstractDamping
 from sysid.estimation.least_squares.evidence import Prior, update
-from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.least_squares.minimum import at_minimum, stands
+from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.small_matrices import add_to_diagonal, cholesky, solved
+from sysid.estimation.least_squares.state import Iteration, Solution, State
 from sysid.estimation.least_squares.termination import MAX_DAMPING, Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
-from sysid.estimation.results.result import Evidence, Status
+from sysid.estimation.results.result import Status
 
 MIN_GAIN = 1e-4
 """Smallest share of the promised decrease for which a step is taken (Nocedal and Wright 2006, algorithm 4.1)."""
@@ -76,138 +78,8 @@ MOST_OF_THE_WAY = 0.9
 """To a bound at which there is no run, in one step."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Iteration:
-    """What a progress bar or a learning curve sees.
-
-    Args:
-        iteration: Iterations done.
-        mse: Mean squared residual in scaled numbers.
-        damping: Damping factor.
-        effective_parameters: Number of parameters that the data determine; NaN before the first update.
-        elapsed_s: Seconds since the fit began.
-    """
-
-    iteration: int
-    mse: float
-    damping: float
-    effective_parameters: float
-    elapsed_s: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class State:
-    """Where a fit stands."""
-
-    # updated after each accepted step
-    theta: NDArray[np.float64]
-    at: Linearisation
-    # updated every iteration
-    damping: AbstractDamping
-    iteration: int = 0
-    # updated with the evidence
-    prior: Prior
-    evidence: Evidence | None = None
-    # used for termination and reports
-    losses: tuple[float, ...] = ()
-    curve: tuple[Iteration, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Solution:
-    """Where a fit ended.
-
-    Args:
-        state: Where it stands; a later run can go on from here.
-        status: Why it stopped.
-    """
-
-    state: State
-    status: Status
-
-    @property
-    def theta(self) -> NDArray[np.float64]:
-        """Flat parameters."""
-        return self.state.theta
-
-    @property
-    def curve(self) -> tuple[Iteration, ...]:
-        """One entry per iteration, the start first."""
-        return self.state.curve
-
-    @property
-    def evidence(self) -> Evidence | None:
-        """From the last update; ``None`` if there was none."""
-        return self.state.evidence
-
-    @property
-    def at(self) -> Linearisation:
-        """Loss, gradient and Gauss-Newton matrix at ``theta``."""
-        return self.state.at
-
-
 def _ignore(_: Iteration) -> None:
     """The callback of those who do not watch."""
-
-
-FLAT = 1e-8
-"""Share of the loss that one more Newton step would take away, below which a fit stands at a minimum."""
-
-NOTHING_LEFT = 1e-24
-"""Mean squared error over the output's scale that is rounding."""
-
-STANDS = 1e-6
-"""Over the loss of one sample: what a Newton step would take away where it would move no parameter by more than a
-thousandth of its standard deviation."""
-
-
-def stands(state: State, provider: AbstractProvider) -> bool:
-    """Whether a fit that goes on changes nothing but rounding: neither did its last step, nor would the next.
-
-    A decrease over many iterations says that some time after it is so. Where precisions of the prior are found on the
-    way, they may still move what a step would bring: such a fit does not stand.
-
-    Args:
-        state: Where it stands.
-        provider: Residuals and Jacobians.
-
-    Returns:
-        Whether it does.
-    """
-    if len(state.losses) < 2 or not all(group.known for group in state.prior.groups):
-        return False
-    share = STANDS / provider.n_samples
-    before, loss = state.losses[-2:]
-    return abs(before - loss) <= share * loss and at_minimum(state, provider, share)
-
-
-def at_minimum(state: State, provider: AbstractProvider, share: float = FLAT) -> bool:
-    """Whether a fit that finds no better step stands where there is none: its gradient is zero to rounding.
-
-    Args:
-        state: Where it stands.
-        provider: Residuals and Jacobians.
-        share: Of the loss, that one more Newton step may take away.
-
-    Returns:
-        Whether it does.
-    """
-    at, prior = state.at, state.prior
-    if 2.0 * at.loss <= NOTHING_LEFT * provider.n_samples:
-        return True
-    if not at.finite:
-        return False
-    ridge = prior.precision / prior.beta
-    g = at.gradient + ridge * (state.theta - prior.centre)
-    free = np.ones(len(g), dtype=np.bool_)
-    if provider.bounds is not None:
-        low, high = provider.bounds
-        free = ~(((state.theta <= low) & (g > 0.0)) | ((state.theta >= high) & (g < 0.0)))
-    H = at.gauss_newton + np.diag(ridge)
-    root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
-    scaled = g[free] / root
-    step = np.linalg.lstsq(H[np.ix_(free, free)] / np.outer(root, root), scaled, rcond=1e-12)[0]
-    return bool(scaled @ step <= share * at.loss)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration
+from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import scattered, sections_of, stabilised
 from sysid.estimation.linear.sanathanan_koerner import sk_poles

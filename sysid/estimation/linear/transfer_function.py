@@ -10,7 +10,7 @@ import numpy as np
 
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration
+from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output

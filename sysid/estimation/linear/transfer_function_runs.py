@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining

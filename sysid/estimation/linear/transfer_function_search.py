@@ -14,7 +14,7 @@ import numpy as np
 
 from sysid.errors import FitDivergedError
 from sysid.estimation.clock import now
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration
+from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.linear.delay_search import FEW, READ_BACKWARDS
 from sysid.estimation.linear.pole_moves import filled_up, next_smaller, slowness
 from sysid.estimation.linear.pole_starts import PoleStart

@@ -41,8 +41,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.estimation.least_squares.evidence import settled
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Solution
 from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.least_squares.state import Iteration, Solution
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.starts import multistart as starts

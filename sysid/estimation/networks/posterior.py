@@ -52,7 +52,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.least_squares.evidence import SAMPLES_PER_PARAMETER
-from sysid.estimation.least_squares.levenberg_marquardt import State
+from sysid.estimation.least_squares.state import State
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.nonparametric.noise import persistence
 from sysid.estimation.records.experiment import Experiment

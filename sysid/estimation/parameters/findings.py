@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.evidence import settled
-from sysid.estimation.least_squares.levenberg_marquardt import Solution
+from sysid.estimation.least_squares.state import Solution
 from sysid.estimation.parameters.named import Named
 from sysid.estimation.results.uncertainty import Uncertainty
 

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from sysid.estimation import Evidence, Loop, Posterior, Training, fit_narx
 from sysid.estimation.least_squares.damping.marquardt import MarquardtDamping
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.least_squares.levenberg_marquardt import State
+from sysid.estimation.least_squares.state import State
 from sysid.estimation.networks.posterior import Noise, calibrate, laplace, remaining
 from sysid.estimation.networks.provider import RecursionProvider
 from sysid.estimation.records.experiment import Experiment

@@ -7,8 +7,8 @@ import pytest
 
 from sysid.estimation.least_squares.damping import DAMPINGS
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.least_squares.levenberg_marquardt import Solution, State
 from sysid.estimation.least_squares.provider import Linearisation
+from sysid.estimation.least_squares.state import Solution, State
 from sysid.estimation.parameters.findings import TOGETHER, Findings, _lost
 from sysid.estimation.parameters.named import Named
 from sysid.estimation.results.result import Status

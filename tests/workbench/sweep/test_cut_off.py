@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from sysid.estimation.least_squares.checkpoints import Checkpoints, Watch
-from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, State
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.state import State
 from sysid.export import read_bundle
 from sysid.traces import Role, TraceSet
 from sysid.workbench.cli import run_cli

@@ -12,8 +12,9 @@ from scipy import linalg
 
 from sysid.errors import ConfigError, FitDivergedError, TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.least_squares.state import Solution
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError, TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.least_squares.levenberg_marquardt import Solution
 from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.least_squares.state import Solution
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.polynomial.starts import LongARX
 from sysid.estimation.linear.segments import Segment, delayed_inputs, segments_of

@@ -17,8 +17,9 @@ from scipy import linalg
 from sysid.errors import FitDivergedError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.evidence import Group, Prior
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.provider import Linearisation
+from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.colour import coloured

@@ -31,7 +31,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration, Solution
+from sysid.estimation.least_squares.state import Iteration, Solution
 from sysid.estimation.networks.ensemble import elect
 from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.posterior import Posterior, laplace

@@ -26,8 +26,9 @@ from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import Checkpoints, checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.provider import AbstractProvider
+from sysid.estimation.least_squares.state import Iteration, Solution
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks.initialise import AbstractLayout
 from sysid.estimation.networks.pretraining import StepSamples

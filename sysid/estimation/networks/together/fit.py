@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.least_squares.damping import DAMPINGS
-from sysid.estimation.least_squares.levenberg_marquardt import Iteration, LevenbergMarquardt, Solution
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.state import Iteration, Solution
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.networks.basis import RebasedProvider
 from sysid.estimation.networks.starts.multistart import INITIAL_ALPHA

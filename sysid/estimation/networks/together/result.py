@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.least_squares.levenberg_marquardt import Solution
+from sysid.estimation.least_squares.state import Solution
 from sysid.estimation.results.attempts import Attempt
 from sysid.estimation.results.result import Evidence, Status, common_fields
 from sysid.estimation.results.uncertainty import Uncertainty
