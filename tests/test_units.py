@@ -6,11 +6,18 @@ import numpy as np
 import pint
 import pytest
 
-from sysid import units
+from sysid import units, written_units
 from sysid.ingest.tables.time_columns import is_time_unit
-from sysid.units import STANDARD_ATMOSPHERE_PA, USUAL_UNITS, Reference, atmosphere_in, convert, is_pressure
+from sysid.units import STANDARD_ATMOSPHERE_PA, Reference, atmosphere_in, convert, is_pressure
+from sysid.written_units import USUAL_UNITS
 
 REGISTRY = pint.UnitRegistry(cache_folder=None)
+
+
+def without_pint(patch: pytest.MonkeyPatch) -> None:
+    """Nothing is looked up there, neither to convert nor to read how a unit is written."""
+    for room in (units, written_units):
+        patch.setattr(room, "registry", lambda: pytest.fail("asked pint"))
 
 
 def of(unit: str) -> pint.Unit:
@@ -28,7 +35,7 @@ def test_a_usual_unit_is_what_it_is_to_pint(unit: str) -> None:
 
 @pytest.mark.parametrize("unit", ["kPa", "degC", "1"])
 def test_what_has_its_unit_stays_as_it_is(unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(units, "_registry", lambda: pytest.fail("looked up"))
+    without_pint(monkeypatch)
     values = np.array([0.1, np.nan, -3e7])
     converted = convert(values, unit, unit)
     np.testing.assert_array_equal(converted, values)
@@ -36,7 +43,7 @@ def test_what_has_its_unit_stays_as_it_is(unit: str, monkeypatch: pytest.MonkeyP
 
 
 def test_a_reference_is_another_by_the_atmosphere(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(units, "_registry", lambda: pytest.fail("looked up"))
+    without_pint(monkeypatch)
     values = np.array([0.0, 250.5])
     absolute = convert(values, "kPa", "kPa", reference=Reference.GAUGE, to_reference=Reference.ABSOLUTE)
     np.testing.assert_array_equal(absolute, values + 101.325)
@@ -45,22 +52,6 @@ def test_a_reference_is_another_by_the_atmosphere(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("unit", ["s", "ms", "us", "ns", "min", "h"])
 def test_stamps_become_seconds_without_pint_and_to_its_last_digit(unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     stamps = np.random.default_rng(0).normal(scale=1e5, size=1_000)
-    monkeypatch.setattr(units, "_registry", lambda: pytest.fail("asked pint"))
+    without_pint(monkeypatch)
     expected = REGISTRY.Quantity(stamps, REGISTRY.parse_units(unit)).to("s").magnitude
     assert np.array_equal(convert(stamps, unit, "s"), expected)
-
-
-@pytest.mark.parametrize(
-    ("written", "meant"),
-    [
-        *(("Grad", "deg"), ("Min", "min"), ("C", "degC"), ("cfm", "ft^3/min"), ("kNm", "kN*m"), ("mPas", "mPa*s")),
-        *(("Std", "hour"), ("PS", "metric_horsepower"), ("МПа", "MPa"), ("об/мин", "rpm"), ("mPa", "mPa")),
-    ],
-)
-def test_a_unit_is_what_people_mean_by_it(written: str, meant: str) -> None:
-    assert units.plain_unit(written) == meant
-
-
-@pytest.mark.parametrize("text", ["Mft", "kin", "cfermi", "mday"])
-def test_no_prefix_stands_before_what_has_none(text: str) -> None:
-    assert units.plain_unit(text) is None

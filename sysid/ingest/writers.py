@@ -17,7 +17,8 @@ from sysid.extras import need
 from sysid.ingest.cells.headers import parse_header
 from sysid.names import csv_cell
 from sysid.traces import Channel, Trace
-from sysid.units import Reference, plain_unit
+from sysid.units import Reference
+from sysid.written_units import plain_unit
 
 
 def write_trace(trace: Trace, path: str | Path) -> Path:

@@ -13,7 +13,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from sysid.errors import UnitError
 from sysid.field_checks import FieldError
-from sysid.units import Reference, check_unit, is_pressure, plain_unit
+from sysid.units import Reference, check_unit, is_pressure
+from sysid.written_units import plain_unit
 
 MOST_SAMPLES = 5_000_000
 """Of one run."""

@@ -10,7 +10,8 @@ import numpy as np
 
 from sysid.errors import ConfigError, UnitError
 from sysid.references.config import ReferenceConfig, VariedPort
-from sysid.units import check_unit, plain_unit
+from sysid.units import check_unit
+from sysid.written_units import plain_unit
 
 TYPES: Mapping[str, Any] = {"Real": np.float64, "Float64": np.float64, "Float32": np.float32, "Boolean": np.bool_}
 INTEGERS = ("Integer", "Enumeration", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64")

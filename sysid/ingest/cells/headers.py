@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sysid.units import Reference, plain_unit
+from sysid.units import Reference
+from sysid.written_units import plain_unit
 
 # "p [1]" is a pure number, "p[1]" an element of p.
 _INDEX = re.compile(r"^.*?(?:\S\[\s*\d*\s*\]|\[\s*(?!1\s*\])\d*\s*\])\s*$", re.DOTALL)

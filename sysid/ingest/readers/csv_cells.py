@@ -14,7 +14,7 @@ from sysid.errors import ReaderError
 from sysid.ingest.cells.calendar import is_calendar
 from sysid.ingest.cells.headers import is_unit
 from sysid.ingest.cells.numbers import HEXADECIMAL, MISSING, usually_missing
-from sysid.units import USUAL_UNITS
+from sysid.written_units import USUAL_UNITS
 
 BLANKS = " "
 """The separator that stands for a run of blanks and tabs."""

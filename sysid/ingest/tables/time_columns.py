@@ -9,7 +9,8 @@ import numpy as np
 
 from sysid.errors import UnitError
 from sysid.ingest.tables.columns import RawColumn
-from sysid.units import USUAL_UNITS, check_unit, convert, plain_unit
+from sysid.units import check_unit, convert
+from sysid.written_units import USUAL_UNITS, plain_unit
 
 _TIME_NAMES = {
     "t", "time", "zeit", "tijd", "temps", "tiempo", "tempo", "tid", "timestamp", "timestamps", "time stamp",
