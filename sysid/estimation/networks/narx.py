@@ -121,9 +121,7 @@ def fit_narx(
     # A cautious fit is made anew, so that a fit that goes on ends where one in a single run would.
     raced = [one for one in tasks if not one.cautious]
     on_checkpoint(Checkpoint.of(choose(raced, training.choose_by).chosen.solution.state))
-    best = choose(list(tasks), training.choose_by).chosen
-    for one, provider in reweighted(replace(multistart, to_plain=tasks[best].to_plain), tasks[best].provider, best):
-        tasks[one] = replace(tasks[best], provider=provider)
+    tasks |= _by_noise(multistart, tasks)
     tasks |= _with_ensemble(multistart, list(tasks), experiments, vet)
     choice, tasks = _chosen(multistart, windows, tasks, vet)
     chosen = choice.chosen
@@ -249,6 +247,14 @@ def _started(
         if multistart.stop.is_set():
             break
     return tasks
+
+
+def _by_noise(multistart: starts.Multistart, tasks: Dict[starts.Candidate, _Task]) -> dict[starts.Candidate, _Task]:
+    """The best candidate of several outputs, trained on with each over what is left of it; none of one output."""
+    best = choose(list(tasks), multistart.training.choose_by).chosen
+    task = tasks[best]
+    found = reweighted(replace(multistart, to_plain=task.to_plain), task.provider, best)
+    return {one: replace(task, provider=provider) for one, provider in found}
 
 
 def _with_ensemble(
