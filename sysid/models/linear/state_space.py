@@ -312,6 +312,12 @@ class StateSpace(AbstractForm):
             return np.asarray(found / scale)
         if len(left) <= rank:
             level = HISTORY_NOISE * max(float(np.trace(seen)) / len(seen), np.finfo(np.float64).tiny)
+        if (
+            self.n_inputs and self._radius < 1.0
+        ):  # the first input may not have been held always
+            held = scipy.linalg.lstsq(np.eye(self.n_state) - self.A, self.B)[0]
+            spread = spread + held @ held.T
+            seen = observed @ spread @ observed.T
         with np.errstate(all="ignore"):
             moved = spread @ observed.T @ scipy.linalg.lstsq(seen + level * np.eye(len(seen)), missing)[0]
         return np.asarray(moved if np.isfinite(moved).all() else found / scale)
