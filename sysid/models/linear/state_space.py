@@ -312,9 +312,7 @@ class StateSpace(AbstractForm):
             return np.asarray(found / scale)
         if len(left) <= rank:
             level = HISTORY_NOISE * max(float(np.trace(seen)) / len(seen), np.finfo(np.float64).tiny)
-        if (
-            self.n_inputs and self._radius < 1.0
-        ):  # the first input may not have been held always
+        if self.n_inputs and self._radius < 1.0:  # the first input may not have been held always
             held = scipy.linalg.lstsq(np.eye(self.n_state) - self.A, self.B)[0]
             spread = spread + held @ held.T
             seen = observed @ spread @ observed.T
