@@ -21,7 +21,7 @@ from sysid.estimation.nonparametric.impulse_response import ImpulseResponse as E
 from sysid.estimation.nonparametric.kernels import Kernel
 from sysid.estimation.nonparametric.spectra import SpectralMethod
 from sysid.excitation import AbstractExcitation, excitation
-from sysid.ingest.tables.frames import length_of_time
+from sysid.ingest.tables.durations import length_of_time
 from sysid.ingest.writers import write_trace
 from sysid.models import Mapping
 from sysid.models.orders.typed_fields import plain_values

@@ -10,7 +10,7 @@ import numpy as np
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.export.own_figures import side_by_side
-from sysid.ingest.tables.frames import length_of_time
+from sysid.ingest.tables.durations import length_of_time
 from sysid.models import AbstractModel, Cascade
 from sysid.models.orders.typed_fields import plain_values
 from sysid.reporting.linear.computing import bode_of, check_linear, poles_of, step_of

@@ -10,7 +10,7 @@ from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from importlib import metadata, resources
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,15 @@ from sysid.export.exporter import ExportedFile
 from sysid.export.forms.layout import HiddenState
 from sysid.export.forms.stage import Port, Stage
 from sysid.export.heeded import heeded
-from sysid.export.parity import Parity
 from sysid.export.ranges import example_of, range_of
 from sysid.export.surrogate import Surrogate
 from sysid.extras import has
 from sysid.models import EquationModel, Start
 from sysid.traces import Role, Trace, TraceSet
 from sysid.units import Reference
+
+if TYPE_CHECKING:
+    from sysid.export.parity import Parity
 
 SCHEMA_VERSION = 5
 """Raised when a reader of an earlier version cannot read the file, or would misread it. Every version from 1 on can be

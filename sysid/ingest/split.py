@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, shortened
-from sysid.ingest.tables.frames import seconds
+from sysid.ingest.tables.durations import seconds
 from sysid.traces import Role, Trace, TraceSet
 
 Split = float | Sequence[float] | Sequence[str | Role] | Mapping[Any, Any] | str | None

@@ -1,5 +1,7 @@
 """The compiled pass of one network against finite differences, NumPy and its own formula."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -37,7 +39,7 @@ def a_provider(network: NARX, *, closed: bool, n: int = 40, seed: int = 0, weigh
 
 
 def outputs(provider: RecursionProvider, theta: np.ndarray) -> np.ndarray:
-    form = provider.at(theta)
+    form = replace(provider.template, theta=theta)
     runs = []
     for e in provider.experiments:
         if provider.closed:
@@ -76,7 +78,8 @@ def test_sensitivities_equal_finite_differences(network, closed):
 @pytest.mark.parametrize("network", STRUCTURES)
 def test_the_free_run_and_the_prediction_are_those_of_the_slow_twin(network):
     provider = a_provider(network, closed=True, n=16)
-    form = provider.at(0.3 * np.random.default_rng(1).standard_normal(len(provider.template.theta)))
+    theta = 0.3 * np.random.default_rng(1).standard_normal(len(provider.template.theta))
+    form = replace(provider.template, theta=theta)
     e = provider.experiments[0]
     assert_allclose(form.simulate(e.inputs, e.history), simulate(form, e.inputs, e.history), rtol=0.0, atol=1e-13)
     u, y = np.concatenate([e.history.inputs, e.inputs]), np.concatenate([e.history.output, e.output])
@@ -94,7 +97,8 @@ def test_the_free_run_and_the_prediction_are_those_of_the_slow_twin(network):
 def test_models_of_one_structure_share_a_plan_and_not_their_parameters():
     provider = a_provider(NARX(input_delays=3, output_delays=2, neurons=4), closed=True)
     e, rng = provider.experiments[0], np.random.default_rng(5)
-    for form in [provider.at(0.3 * rng.standard_normal(len(provider.template.theta))) for _ in range(3)]:
+    for theta in 0.3 * rng.standard_normal((3, len(provider.template.theta))):
+        form = replace(provider.template, theta=theta)
         assert_allclose(form.simulate(e.inputs, e.history), simulate(form, e.inputs, e.history), rtol=0.0, atol=1e-13)
 
 

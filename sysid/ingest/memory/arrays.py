@@ -20,11 +20,8 @@ from sysid.ingest.memory.experiments import columns_of, experiments_of
 from sysid.ingest.memory.in_python import remedies_in_python
 from sysid.ingest.memory.memory_table import check_lengths, table_of
 from sysid.ingest.split import Split, split_traces
-from sysid.ingest.tables.frames import (
-    check_distinct,
-    check_rows,
-    length_of_time,
-)
+from sysid.ingest.tables.durations import length_of_time
+from sysid.ingest.tables.frames import check_distinct, check_rows
 from sysid.ingest.tables.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
 from sysid.ingest.tables.table import RawTable
 from sysid.traces import Channel, Trace, TraceSet

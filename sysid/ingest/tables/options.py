@@ -11,7 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from sysid.field_checks import FieldError
 from sysid.ingest.cells.headers import parse_header
-from sysid.ingest.tables.frames import seconds
+from sysid.ingest.tables.durations import seconds
 from sysid.ingest.tables.time_columns import is_time_unit
 from sysid.traces.stretch import Stretch
 from sysid.units import Reference
