@@ -94,6 +94,6 @@ def _again(
     engine = LevenbergMarquardt(termination=TERMS, evidence_after=None)
     for _ in range(ROUNDS):
         prior, _ = update(prior, theta, provider.linearise(theta), provider.n_samples)
-        solution = engine.minimise(provider, theta, prior)
+        solution = engine.minimise_within(provider, theta, prior)
         theta = solution.theta
     return provider, solution

@@ -33,7 +33,6 @@ from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquard
 from sysid.estimation.least_squares.state import Solution, State
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.parameters.named import Named
-from sysid.estimation.results.result import Status
 
 Array = NDArray[np.float64]
 
@@ -248,10 +247,7 @@ class _Walk:
 
     def _minimised(self, provider: EquationProvider, theta: Array) -> Solution:
         engine = LevenbergMarquardt(termination=TERMS, evidence_after=None)
-        found = engine.minimise(provider, theta, self.state.prior)
-        if found.status is Status.INTERRUPTED:  # which ends the profile, not this fit of the others alone
-            raise KeyboardInterrupt
-        return found
+        return engine.minimise_within(provider, theta, self.state.prior)
 
     def freed(self, theta: Array) -> State:
         """A better minimum, with nothing held."""

@@ -122,6 +122,25 @@ class LevenbergMarquardt:
         first = State(theta=theta, at=at, damping=self.damping, prior=prior)
         return self.resume(provider, self._record(first, provider, 0.0))
 
+    def minimise_within(self, provider: AbstractProvider, theta: NDArray[np.float64], prior: Prior) -> Solution:
+        """Fit the parameters as a part of a longer computation, which goes on from what is found.
+
+        Args:
+            provider: Residuals and Jacobians.
+            theta: Start, shape ``(n_parameters,)``.
+            prior: Centre and precisions to begin with.
+
+        Returns:
+            The solution.
+
+        Raises:
+            KeyboardInterrupt: If that came: half of a start is no start, and the rest would go on as if nothing had.
+        """
+        found = self.minimise(provider, theta, prior)
+        if found.status is Status.INTERRUPTED:
+            raise KeyboardInterrupt
+        return found
+
     def resume(
         self, provider: AbstractProvider, state: State, *, first_loss: float | None = None, spent_s: float = 0.0
     ) -> Solution:

@@ -149,7 +149,7 @@ def short_run(
         return begun
     limits = Termination(max_iterations=iterations, tolerance=1e-6, patience=4)
     engine = LevenbergMarquardt(termination=limits, evidence_after=None)
-    solution = engine.minimise(provider, begun.theta, _flat_prior(len(begun.theta)))
+    solution = engine.minimise_within(provider, begun.theta, _flat_prior(len(begun.theta)))
     return Candidate(start=start, delays=delays, provider=provider, theta=solution.theta, loss=solution.at.loss)
 
 

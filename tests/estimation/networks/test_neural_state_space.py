@@ -8,6 +8,7 @@ import pytest
 
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import FitResult, Loop, Training, fit_neural_state_space
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.networks.neural import layout as neural_layout
 from sysid.estimation.networks.neural import start as neural_start
 from sysid.estimation.networks.neural.layout import NeuralLayout
@@ -369,3 +370,14 @@ def test_what_a_first_state_does_is_gone_once_it_has_died_away():
     assert moves[0] == pytest.approx(1.0)
     assert moves[BLOCK] == pytest.approx(0.9**BLOCK)
     assert np.abs(moves[8 * BLOCK :]).max() == 0.0
+
+
+def test_an_interruption_while_the_linear_start_is_fitted_ends_the_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It had ended that start alone, halfway, and all that was kept of the fit then began there."""
+
+    def pressed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(LevenbergMarquardt, "_step", pressed)
+    with pytest.raises(KeyboardInterrupt):
+        fit_neural_state_space([linear(0, 200)], MAPPING, NeuralStateSpace(states=2, neurons=2))

@@ -41,7 +41,7 @@ from tests.workbench.auto.conftest import data, record, traces
 
 pytestmark = pytest.mark.usefixtures("small")
 
-FEW = 670
+FEW = 480
 """Iterations of two linear structures and two networks, four times each, and of one network again."""
 SEVERAL = 3 * FEW
 """The same, with iterations for the best network from other starts."""

@@ -224,7 +224,7 @@ def _fitted(provider: NeuralProvider, theta: NDArray[np.float64], seconds: float
     engine = LevenbergMarquardt(termination=termination, evidence_after=None)
     everything = Group(name="all", members=np.arange(len(theta)))
     prior = Prior(centre=theta, groups=(everything,), alphas=np.array([FLAT_ALPHA]), beta=1.0)
-    return engine.minimise(provider, theta, prior).theta
+    return engine.minimise_within(provider, theta, prior).theta
 
 
 def _unit_states(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
