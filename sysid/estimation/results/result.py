@@ -33,7 +33,7 @@ class Status(enum.Enum):
     STALLED = "No step improves the loss any more although its gradient is not zero; try another start."
     NOT_IMPROVED = "The fit did not improve on where it started; try another start, or more damping."
     INTERRUPTED = "Interrupted; this is the best model up to then."
-    UNSTABLE = "The free run leaves its bounds, or settles where it should not; choose another start or fewer lags."
+    UNSTABLE = "The free run leaves its bounds, or settles where it should not; try another start or a smaller model."
 
     @property
     def usable(self) -> bool:
