@@ -286,7 +286,7 @@ def _pretraining(training: Training, task: _Task, experiments: Sequence[Experime
 def _prepared(training: Training, task: _Task, experiments: Sequence[Experiment]) -> starts.Prepared:
     """What is linear in a random start by least squares; a start that was given or pretrained stays as it is.
 
-    So does one of several outputs: over five plants of two (``several_outputs``) their fits came out worse from there.
+    So does one of several outputs: where there is little noise, their fits came out worse from there.
     """
     kept = WhileUsed(lambda: _step_samples(training, task, experiments, sys.maxsize))
 

@@ -36,7 +36,7 @@ a target that is exactly right on a trace, such as a channel held at its bound, 
 
 AS_GIVEN, IN_WINDOWS = 1, 2
 """The starts: the members as they were, and what was trained on windows first."""
-NAMES = {AS_GIVEN: "as given", IN_WINDOWS: "-1"}
+NAMES = {AS_GIVEN: "as given", IN_WINDOWS: "by windows"}
 """What their runs are kept under."""
 
 
