@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
+from sysid.ingest.cells.stamp_forms import usual_form
 from sysid.ingest.cells.zones import guess_zone, to_utc, utc_microseconds
 
 _DAY = 86_400_000_000
@@ -78,12 +79,19 @@ def is_calendar(text: str) -> bool:
     Returns:
         True if it is.
     """
-    return ("0" <= text[:1] <= "9") and _taken_apart(text) is not None
+    return _taken_apart(text) is not None
 
 
 def _taken_apart(text: str) -> _Stamp | None:
-    if len(text) > _LONGEST:
+    """A text in its parts; one that begins with a day of the week or a month, or counts days, is brought into form."""
+    digit = "0" <= text[:1] <= "9"
+    if len(text) > _LONGEST or not (digit or " " in text):
         return None
+    found = _in_parts(text) if digit else None
+    return _in_parts(usual_form(text)) if found is None and any(map(str.isalpha, text)) else found
+
+
+def _in_parts(text: str) -> _Stamp | None:
     found = _DATE.match(text)
     code = 0 if found is None else _date_code(found)
     at = 0 if found is None else found.end()

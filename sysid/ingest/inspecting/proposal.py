@@ -17,7 +17,7 @@ from sysid.ingest.tables.options import GridOptions
 from sysid.units import Reference
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_/.^-]*(?: [A-Za-z0-9_/.^-]+)*")
-_WORDS = {"true", "false", "null"}
+_WORDS = {"true", "false", "null", "yes", "no", "on", "off"}
 
 
 def propose_dataset(finding: FileFinding, *, folder: Path | None = None, split: Sequence[float] = ()) -> str:

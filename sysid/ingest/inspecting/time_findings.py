@@ -16,7 +16,7 @@ from sysid.ingest.tables.clocks import clock_of, since_1970
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, GridOptions, TimeOptions
 from sysid.ingest.tables.table import RawTable
-from sysid.ingest.tables.time_columns import is_counter, is_time_unit
+from sysid.ingest.tables.time_columns import is_counter, is_time_unit, unit_of_clock
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
@@ -46,6 +46,7 @@ def find_time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     clock = clock_of(column.values, column.name, origin=column.counted_from) if asked.unit is None else None
     said = None if clock is not None and "clock" in table.settings else column.unit
     unit = asked.unit or (said if said is not None and is_time_unit(said) else None) or unit_in_name(name)
+    unit = unit or (unit_of_clock(name) if clock is None else None)
     if unit is not None:
         return TimeOptions(column=column.name, unit=unit), by_rising and f"guessed: {by_rising}"
     if clock is not None:

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -15,7 +16,7 @@ from sysid.ingest.inspecting.findings import FileFinding, listed
 from sysid.ingest.inspecting.inspection import inspect_file
 from sysid.ingest.inspecting.proposal import propose_dataset
 from sysid.ingest.inspecting.second_clocks import without_clocks
-from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file
+from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file, typed_options
 from sysid.ingest.readers.text_source import bare_stem
 from sysid.ingest.reading import read_table, trace_of
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
@@ -47,16 +48,15 @@ def load_file(path: Path) -> TraceSet:
     Warns:
         GuessedWarning: If something was guessed or left out.
     """
-    with remedies_of_a_file(path):
-        try:
-            held = [read_table(path)]
-            several = bool(held[0].records)
-            others = [f"{column.name} ({len(column.values)} samples)" for column in held[0].others]
-            trace = trace_of(held)
-        except UserError as error:
-            return _as_proposed(path, error)
-        if several:  # of which the trace is the first, or all of them side by side
-            return _as_proposed(path)
+    try:
+        held = [read_table(path)]
+        several = bool(held[0].records)
+        others = [f"{column.name} ({len(column.values)} samples)" for column in held[0].others]
+        trace = trace_of(held)
+    except UserError as error:
+        return _as_proposed(path, error)
+    if several:  # of which the trace is the first, or all of them side by side
+        return _as_proposed(path)
     trace, clocks = without_clocks(trace)
     if left := [*clocks, *others]:
         warnings.warn(f"{path}: left out: {listed(left)}", GuessedWarning, stacklevel=3)
@@ -65,16 +65,22 @@ def load_file(path: Path) -> TraceSet:
 
 def _as_proposed(path: Path, error: UserError | None = None) -> TraceSet:
     """The traces of the description that would be proposed, but for its repairs; where that fails, the error."""
-    from sysid.ingest.datasets.dataset import load_described  # here: most files say what they hold
-    from sysid.ingest.datasets.description import DatasetDescription
-
     try:
         found = inspect_file(path)
         # A channel that never changes is no fault of the samples: those that use it say what it is worth.
         left = replace(found, needed=RepairOptions(constant=found.needed.constant))
         proposed = yaml.safe_load(propose_dataset(left))
-    except UserError as also:
-        raise error or also from None
+    except UserError as also:  # which the command that describes a file comes to as well
+        raise typed_options(also if error is None or isinstance(error, UnitError) else error, path) from None
+    with remedies_of_a_file(path):
+        return _described(path, found, proposed, error)
+
+
+def _described(path: Path, found: FileFinding, proposed: dict[str, Any], error: UserError | None) -> TraceSet:
+    """The traces of the description; where that fails, the error."""
+    from sysid.ingest.datasets.dataset import load_described  # here: most files say what they hold
+    from sysid.ingest.datasets.description import DatasetDescription
+
     # What was measured is not lost: a column in which words stand is said to be one, or to be left out, by a person.
     lost = any(column.problem and not column.unit_guessed for column in found.columns)
     if isinstance(error, ReaderError) and (lost or {"states", "missing"} & found.guessed):
@@ -88,7 +94,7 @@ def _as_proposed(path: Path, error: UserError | None = None) -> TraceSet:
         raise also if error is None or isinstance(error, UnitError) else error from None
     if guesses:
         told = f"{_told(path, guesses)}. {proposal_of(path)} writes this down, to be corrected"
-        warnings.warn(told, GuessedWarning, stacklevel=4)
+        warnings.warn(told, GuessedWarning, stacklevel=5)
     return traces
 
 

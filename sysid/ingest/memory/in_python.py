@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sysid.errors import UserError
 from sysid.ingest.readers.text_source import bare_stem
+from sysid.ingest.tables.options import FileOptions
 
 PAIRS = re.compile(r"\{\w+: [\w.]+(?:, \w+: [\w.]+)*\}")
 PAIR = re.compile(r"(\w+): ([\w.]+)")
@@ -53,6 +54,21 @@ def remedies_of_a_file(path: Path) -> Iterator[None]:
             f"describe the file once ({proposal_of(path)}), which proposes these options, and load({bare_stem(path)!r})"
         )
         raise _with(error, f"{error.remedy}. A file alone takes no options: {described}") from None
+
+
+def typed_options(error: UserError, path: Path) -> UserError:
+    """The error of a file for which no description can be proposed as it is: where its remedy is typed.
+
+    Args:
+        error: It, with a remedy that may name an option.
+        path: The file.
+
+    Returns:
+        The same error; where the remedy names an option, with the command that takes it.
+    """
+    if not any(re.search(rf"\b{name}\b[: ]", error.remedy or "") for name in FileOptions.model_fields):
+        return error
+    return _with(error, f"{error.remedy}. Options are typed behind {proposal_of(path)}; --help lists them")
 
 
 @contextmanager

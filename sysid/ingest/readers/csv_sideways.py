@@ -1,4 +1,4 @@
-"""Tables of text that lie on their side: each line is a channel, its name and then its samples."""
+"""Tables of text that lie on their side: each line is a channel, its name, if it has one, and then its samples."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from sysid.ingest.tables.time_columns import recognise_time
 
 _MOST, _LEAST = 64, 8
 """Channels at most, and samples at least."""
-_SEPARATORS = (("\t", "."), (";", ","), (";", "."), (",", "."), ("\t", ","))
-"""What stands between cells, and the decimal mark beside it."""
+_NAMELESS, _LONGER = 32, 4
+"""Samples that lines of numbers alone have at least, and how many times as many as there are lines."""
+_SEPARATORS = (("\t", "."), (";", ","), (";", "."), (",", "."), ("\t", ","), (None, "."), (None, ","))
+"""What stands between cells, nothing for a run of blanks, and the decimal mark beside it."""
 
 
 def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTable | None:
@@ -28,7 +30,8 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
         comment: Marks of a comment.
 
     Returns:
-        The table; ``None`` where the lines are not a name each, and then numbers, more of them than there are lines.
+        The table; ``None`` where the lines are not a name each, and then numbers, more of them than there are lines;
+        or numbers alone, many more of them. The first line may lack a name, as that of a turned index does.
     """
     kept = [line.strip() for line in lines if line.strip() and line.lstrip()[0] not in (comment or "#%")]
     if not 1 < len(kept) <= _MOST:
@@ -39,14 +42,25 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
         if width <= max(len(cells), _LEAST) or any(len(row) != width for row in cells):
             continue
         numbers = NumberFormat(decimal=decimal)
-        parsed = [numbers.column(row[1:]) for row in cells]
         names = [row[0].strip().strip('"') for row in cells]
-        if any(isinstance(one, int) for one in parsed) or any(numbers.parse(name) is not None for name in names):
+        bare = all(numbers.parse(name) is not None for name in names) and "" not in names
+        named = all(numbers.parse(name) is None for name in names[1:]) and (
+            not names[0] or numbers.parse(names[0]) is None
+        )
+        if not (named or (bare and width >= max(_NAMELESS, _LONGER * len(cells)))):
             continue
-        heads = [parse_header(name) for name in names]
+        parsed = [numbers.column(row if bare else row[1:]) for row in cells]
+        if any(isinstance(one, int) for one in parsed):
+            continue
+        heads = [parse_header("" if bare else name) for name in names]
         columns = [
-            RawColumn(name=head.name, values=np.asarray(values), unit=head.unit, reference=head.reference)
-            for head, values in zip(heads, parsed, strict=True)
+            RawColumn(
+                name=head.name or f"column_{number + 1}",
+                values=np.asarray(values),
+                unit=head.unit,
+                reference=head.reference,
+            )
+            for number, (head, values) in enumerate(zip(heads, parsed, strict=True))
         ]
         columns, renamed = distinct(columns)
         return RawTable(
@@ -54,6 +68,6 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
             reader="csv",
             columns=tuple(columns),
             time=recognise_time(columns),
-            notes=(f"its {len(columns)} lines are taken as channels, of {width - 1} samples", *renamed),
+            notes=(f"its {len(columns)} lines are taken as channels, of {len(columns[0].values)} samples", *renamed),
         )
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -18,6 +19,8 @@ SEPARATORS = ("\t", ";", ",", "|", BLANKS)
 
 
 MOST_COLUMNS = 4096
+_FEW = 50
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,13 +136,42 @@ def first_row(split: Split, options: FileOptions) -> int:
     if options.header is False:
         return next(i for i, row in enumerate(split.rows) if len(trimmed(row.cells, split.width)) == split.width)
     first = split.fitting.index(True)
-    if options.header and first == 0 and len(split.rows) > 1:
+    if first == 0 and len(split.rows) > 1 and (options.header or numbers_columns(split)):
         return 1
     top = first
     while top > 0 and _is_spoilt(split, top - 1):
         top -= 1
     # Below a row of words only: what else stands above the numbers may have numbers in it, too.
     return top if 0 < top < first and _numbers_in(split, top - 1) == 0 else first
+
+
+def numbers_columns(split: Split) -> bool:
+    """Whether the first row is a head of numbers, as pandas writes it for columns that nobody named.
+
+    Its cells are 0, 1, 2 ... above numbers with decimals or a clock that begins anew, or whole numbers behind an empty
+    cell that stands over the index.
+
+    Args:
+        split: The rows of a file without another head.
+
+    Returns:
+        Whether it is.
+    """
+    head, *rows = ([cell.strip() for cell in row.cells] for row in split.rows[:_FEW])
+    rows = [row for row in rows if len(row) == len(head)]
+    if len(rows) < 2 or len(head) < 2 or len(set(head)) < len(head):
+        return False
+    if not head[0]:
+        return all(map(_is_count, head[1:])) and [row[0] for row in rows] == [str(k) for k in range(len(rows))]
+    if head != [str(k) for k in range(len(head))]:
+        return False
+    anew = [row[0].replace(",", ".") for row in rows[:2]]
+    begins = all(_NUMBER.fullmatch(cell) for cell in anew) and float(anew[0]) == 0.0 < float(anew[1])
+    return begins or not any(_is_count(cell) for row in rows for cell in row[1:])
+
+
+def _is_count(cell: str) -> bool:
+    return cell.isascii() and cell.isdigit()
 
 
 def _has_decimal_commas(split: Split) -> bool:

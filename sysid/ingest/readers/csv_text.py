@@ -90,6 +90,8 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
         )
     clock = headers[time].name if time is not None else recognise_time(raw)
     raw, rows = _without_empty_rows(raw, rows, notes, stamped=clock is not None)
+    if len(raw) > WIDE * max(len(rows), 1):
+        notes.append(f"{len(raw)} columns of {len(rows)} samples: if channels stand in its rows, save it turned")
     above = [*layout.comments, *(layout.separator.join(row.cells) for row in layout.preamble)]
     step = said_step(above)
     if step is not None and clock is None:
@@ -114,6 +116,9 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
         },
     )
 
+
+WIDE = 4
+"""Columns to each sample from which on a table may lie on its side."""
 
 READER = Reader(
     name="csv",

@@ -171,7 +171,7 @@ def _table(sheet: Sheet, path: Path, options: FileOptions, repairs: RepairOption
     decimal = options.decimal or "."
     asked = options.model_copy(update={"separator": SEPARATOR, "comment": NO_COMMENT, "decimal": decimal})
     table = table_of_text(text, asked, repairs)
-    kept = {key: table.settings[key] for key in ("calendar", "zone", "decimal")}
+    kept = {key: table.settings[key] for key in ("calendar", "zone", "decimal") if key in table.settings}
     columns = tuple(_computed(column, text.path) for column in table.columns)
     return replace(
         table, source=path, reader="excel", columns=columns, notes=(*table.notes, *text.notes), settings=kept

@@ -23,7 +23,7 @@ _SECONDS = {
 
 _NAME, _SAMPLES = ("name", "label", "signalname", "channelname"), ("data", "values", "value", "samples")
 _CLOCK = ("time", "t", "raster", "timestamps", "stamps")
-_NAMED = {"InputName", "OutputName", "InputUnit", "OutputUnit"}
+_NAMED = {"InputName", "OutputName", "InputUnit", "OutputUnit", "TimeUnit"}
 
 
 def understood(node: Any, notes: list[str]) -> Any:
@@ -205,7 +205,9 @@ def _timeseries(node: Mapping[str, Any]) -> Any:
 
 
 def _is_structure_with_time(node: Mapping[str, Any]) -> bool:
-    return "time" in node and "signals" in node
+    signals = node.get("signals")
+    each = signals if isinstance(signals, list) else [signals]
+    return "time" in node and any(isinstance(one, Mapping) and "values" in one for one in each)
 
 
 def _structure_with_time(node: Mapping[str, Any]) -> Any:

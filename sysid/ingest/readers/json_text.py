@@ -103,7 +103,7 @@ def _tree(node: Any, depth: int) -> Any:
 
 
 def _mapping(node: Mapping[str, Any], depth: int) -> Any:
-    data = node.get("data")
+    data = node.get("data", node.get("values"))  # InfluxDB has columns and values
     if isinstance(data, list) and isinstance(node.get("columns"), list):
         names = [str(name) for name in node["columns"]]  # pandas, orient="split"
         if not all(isinstance(row, list) and len(row) == len(names) for row in data):
@@ -118,6 +118,9 @@ def _mapping(node: Mapping[str, Any], depth: int) -> Any:
     if series and by_row and len({tuple(part) for part in series}) == 1:  # pandas by default: by column and index
         columns = {str(key): _vector(list(part.values())) for key, part in node.items()}
         return _with_index(list(series[0]), columns)
+    if _are_named_rows(node):  # pandas, orient="index"
+        names = list(series[0])
+        return _with_index(list(node), {name: _vector([row[name] for row in series]) for name in names})
     if _is_by_row(node):
         return _vector(list(node.values()))
     signal = _signal(node)
@@ -131,6 +134,14 @@ def _is_by_row(node: Mapping[str, Any]) -> bool:
         and (all(str(key).isdigit() for key in node) or all(is_calendar(str(key)) for key in node))
         and not any(isinstance(value, list | Mapping) for value in node.values())
     )
+
+
+def _are_named_rows(node: Mapping[str, Any]) -> bool:
+    """Whether the keys are row numbers, or stamps, and each of them has the same few values by name."""
+    rows = list(node.values())
+    if not rows or not all(isinstance(row, Mapping) for row in rows) or len({tuple(row) for row in rows}) != 1:
+        return False
+    return _is_by_row(dict.fromkeys(node)) and not any(isinstance(v, list | Mapping) for v in rows[0].values())
 
 
 def _with_index(index: list[Any], columns: dict[str, Any]) -> dict[str, Any]:

@@ -76,8 +76,8 @@ def leaf_of(value: Any) -> Leaf | None:
         value: A leaf, an array, or anything else.
 
     Returns:
-        The leaf, with a matrix of one row or column as a vector; ``None`` for scalars, empty arrays and
-        whatever is no array.
+        The leaf, with a matrix of one row or column as a vector; one that is refused for an array of more than two
+        dimensions; ``None`` for scalars, empty arrays and whatever is no array.
     """
     leaf = Leaf(values=value) if isinstance(value, np.ndarray) else value
     if not isinstance(leaf, Leaf):
@@ -89,9 +89,21 @@ def leaf_of(value: Any) -> Leaf | None:
         array = array.squeeze()
     if array.ndim == 2 and 1 in array.shape:
         array = array.reshape(-1)
+    if array.ndim > 2 and array.size and array.dtype.kind in "buif":
+        return refused(_too_deep(array.shape))
     if array.size < 2 or array.ndim not in {1, 2} or array.dtype.kind not in "buifcMmUSO":
         return None
     return Leaf(**{**_fields(leaf), "values": array})
+
+
+def _too_deep(shape: tuple[int, ...]) -> ReaderError:
+    return ReaderError(
+        f"an array of {len(shape)} dimensions",
+        expected="a matrix of samples by channels, or a vector",
+        got=" x ".join(map(str, shape)),
+        remedy="save a matrix for each record, called run_1, run_2 ...: run_1 = a[0] in Python, "
+        "run_1 = a(:,:,1) in MATLAB",
+    )
 
 
 def _fields(leaf: Leaf) -> dict[str, Any]:

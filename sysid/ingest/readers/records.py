@@ -228,9 +228,16 @@ def _by_word(table: RawTable, found: list[Found]) -> list[RecordChoice]:
         differ = len({frozenset(own) for own in lengths}) > 1
         # Of like length, u and y once with each letter are two records; other names may be one of four channels.
         told = tag_of is _short_tag and any({"u", "y"} == set(members) for members in tags.values())
+        told = told or (tag_of is _number_tag and all(map(_is_numbered_matrix, tags.values())))
         if len(tags) > 1 and all(len(own) == 1 for own in lengths) and (differ or told or not needs_lengths):
             return [_column_record(table, tag, members) for tag, members in tags.items()]
     return []
+
+
+def _is_numbered_matrix(members: Mapping[str, Found]) -> bool:
+    """Whether these are the columns of one matrix that is called a run, an experiment or the like, and its number."""
+    matrices = [re.fullmatch(r"(.+)_\d+", item.stem) for item in members.values()]
+    return len(members) > 1 and all(found is not None and _NUMBERED.fullmatch(found[1]) for found in matrices)
 
 
 def _split(name: str, tag_of: Callable[[str], tuple[str, str] | None]) -> tuple[str, str] | None:

@@ -26,7 +26,7 @@ from sysid.ingest.tables.table import RawTable, by_length
 from sysid.ingest.tables.time_columns import recognise_time
 
 _DEEPEST = 40
-_NAMES = {"names", "channels", "columns", "labels", "signals", "variables", "fields", "header"}
+_NAMES = {"names", "channels", "columns", "labels", "signals", "variables", "fields", "header", "headers", "colheaders"}
 _NAMES |= {f"{one}{mark}names" for one in ("channel", "column", "signal", "variable", "var") for mark in ("", "_")}
 
 

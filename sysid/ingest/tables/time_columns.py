@@ -22,6 +22,9 @@ _TIME_NAMES = {
 }  # fmt: skip
 _TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
 
+_SPELT = {"millis": "ms", "micros": "us", "nanos": "ns", "day": "day", "days": "day", "d": "day"}
+_WORDS_IN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[^\W\d_A-Z]+")
+
 _COUNTED = r"id|idx|index|row|line|zeile|sample|frame|scan|record|point|data[ _]?point|step|messung"
 _COUNTER = re.compile(
     rf"(?:(?:lfd\.?|{_COUNTED})s?[ _.]*)?(?:#|no\.?|nr\.?|num|number|index|id|count(?:er)?)|n|k|i|{_COUNTED}",
@@ -104,6 +107,27 @@ def is_called_time(name: str) -> bool:
         if {plain, stem, plain.replace("_", " "), stem.replace("_", " ")} & _TIME_NAMES:
             return True
     return False
+
+
+def unit_of_clock(name: str) -> str | None:
+    """The unit of time that the name of a clock is, or ends with.
+
+    Args:
+        name: Of the column of time.
+
+    Returns:
+        The unit; ``None`` where the name says none.
+
+    Example:
+        >>> [unit_of_clock(name) for name in ("hours", "ElapsedMillis", "time_h", "Zeit Minuten", "t", "heights")]
+        ['hour', 'ms', 'h', 'min', None, None]
+    """
+    words = _WORDS_IN.findall(name)
+    if not words or (len(words[-1]) == 1 and not is_called_time(name)):
+        return None
+    last = words[-1].casefold()
+    unit = _SPELT.get(last) or time_unit(last)
+    return unit if unit in _TIME_UNITS and (len(words) > 1 or len(last) > 1) else None
 
 
 def is_counter(name: str) -> bool:

@@ -39,6 +39,11 @@ def seconds(*cells: str, zone: str | None = None, pattern: str | None = None) ->
         ("99:59:59", "100:00:00", 1.0),
         ("59:59.5", "60:00.0", 0.5),
         ("10:00:00:100", "10:00:00:350", 0.25),
+        ("Mon Jan  1 23:59:59.5 2024", "Tue Jan  2 00:00:00 2024", 0.5),
+        ("Fri, 01 Mar 2024 10:00:00 +0100", "Fri, 01 Mar 2024 10:00:00 +0000", 3600.0),
+        ("March 12, 2024 08:15", "March 13, 2024 08:15", 86400.0),
+        ("0 days 23:59:59.5", "1 days 00:00:00", 0.5),
+        ("0h59m59.5s", "1h00m00.0s", 0.5),
     ],
 )
 def test_what_people_write_is_read(first: str, second: str, step: float) -> None:

@@ -1,0 +1,46 @@
+"""Dates and lengths of time in the forms that C, e-mail and pandas write, brought into the usual one."""
+
+from __future__ import annotations
+
+import re
+
+_WEEKDAY = re.compile(r"(?:mon|tue|wed|thu|fri|sat|sun|mo|di|mi|do|fr|sa|so)[a-z]{0,6}\.?,?\s+(?=\S)", re.IGNORECASE)
+_MONTH_FIRST = re.compile(
+    r"(?P<month>[^\W\d_]{3,9})\.?\s+(?P<day>[0-9]{1,2}),?\s+"
+    r"(?:(?P<year>[0-9]{4})(?:,?\s+(?P<clock>\S.*))?|(?P<before>\S.*?)\s+(?P<late>[0-9]{4}))"
+)
+_DAYS = re.compile(r"(?P<days>[0-9]{1,5}) days?,? \+?(?P<h>[0-9]{1,2})(?P<rest>:[0-9]{2}:[0-9]{2}(?:[.,][0-9]+)?)")
+_LETTERED = re.compile(
+    r"(?:(?P<d>[0-9]{1,5})\s?d\s?)?(?:(?P<h>[0-9]{1,5})\s?h\s?)(?P<m>[0-9]{1,2})\s?m(?:in)?\s?"
+    r"(?:(?P<s>[0-9]{1,2}(?:[.,][0-9]+)?)\s?s(?:ec)?)?",
+    re.IGNORECASE,
+)
+
+
+def usual_form(text: str) -> str:
+    """A stamp with its day of the week left out, its day before its month, and its days as hours.
+
+    Args:
+        text: Of a cell.
+
+    Returns:
+        The same text where it is in none of these forms.
+
+    Example:
+        >>> usual_form("Mon Jan  1 23:59:50.100 2024"), usual_form("March 12, 2024 08:15")
+        ('1 Jan 2024 23:59:50.100', '12 March 2024 08:15')
+        >>> usual_form("2 days 06:00:00"), usual_form("1h02m03.5s"), usual_form("12.5 V")
+        ('54:00:00', '1:02:03.5', '12.5 V')
+    """
+    found = _DAYS.fullmatch(text)
+    if found is not None:
+        return f"{24 * int(found['days']) + int(found['h'])}{found['rest']}"
+    found = _LETTERED.fullmatch(text)
+    if found is not None:
+        return f"{24 * int(found['d'] or 0) + int(found['h'])}:{found['m']}:{found['s'] or '00'}"
+    text = _WEEKDAY.sub("", text, count=1) if _WEEKDAY.match(text) else text
+    found = _MONTH_FIRST.fullmatch(text)
+    if found is None:
+        return text
+    year, clock = found["year"] or found["late"], found["clock"] or found["before"]
+    return f"{found['day']} {found['month']} {year} {clock or ''}".rstrip()
