@@ -1,4 +1,4 @@
-"""Poles of one structure in another: which ones it contains, poles filled up, put at 1, looked at in the z plane."""
+"""Poles of one structure in another: which ones it contains, poles filled up, looked at in the z plane."""
 
 from __future__ import annotations
 
@@ -108,26 +108,3 @@ def slowness(sections: Sections, domain: Domain, sample_time: float) -> float:
         It.
     """
     return float(np.abs(_poles(sections, domain, sample_time)).max())
-
-
-def at_one(sections: Sections, domain: Domain, sample_time: float, near: float) -> Sections:
-    """Poles that are no further from 1 than records can tell, put at 1.
-
-    Args:
-        sections: For each input its sections.
-        domain: Their domain.
-        sample_time: Seconds.
-        near: How near, in the z plane.
-
-    Returns:
-        For each input its sections.
-    """
-    snapped = []
-    for part in sections:
-        poles = np.concatenate([section_poles(d, domain) for d in part])
-        if domain is Domain.DISCRETE:
-            poles = np.where(np.abs(poles - 1.0) < near, 1.0, poles)
-        else:
-            poles = np.where(np.abs(poles) * sample_time < near, 0.0, poles)
-        snapped.append(sections_of(poles.astype(np.complex128), domain))
-    return tuple(snapped)

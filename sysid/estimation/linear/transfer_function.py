@@ -248,8 +248,7 @@ class _Problem(AbstractProblem):
         separated = end.provider.separated(end.theta)
         if separated is None or separated.mirrored:
             return ()
-        ends = np.cumsum([len(record.target) for record in end.provider.records])
-        errors = [one[:, np.newaxis] for one in np.split(separated.residual, ends[:-1])]
+        errors = end.errors
         return slow_poles.notes(0.0, [len(one) for one in errors], errors)  # the search has told of slow poles itself
 
     def unbounded(self) -> _Problem:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError
 from sysid.estimation.linear.delay_search import FEW
-from sysid.estimation.linear.pole_moves import at_one
+from sysid.estimation.linear.integrators import all_at_one, with_integrators
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
@@ -196,19 +196,19 @@ class AbstractProblem(ABC):
         known = None if separated.mirrored else transfer_function_uncertainty(model, provider, separated)
         return model, known
 
-    def at_one(self, end: End) -> End:
+    def at_one(self, end: End, *, every: bool = False) -> End:
         """The end with all poles at 1 that records of this length do not tell from there.
 
         Args:
             end: The end.
+            every: Whether all that are near are put there, and who asks judges.
 
         Returns:
-            The other one, with the loss that it has.
+            The other one, with the loss that it has; see :mod:`sysid.estimation.linear.integrators`.
         """
         near = 5.0 / max(len(record.target) for record in end.provider.records)
-        moved = at_one(end.sections, self.orders.domain, self.terms.sample_time, near)
-        snapped = replace(end, theta=end.provider.poles.theta(moved))
-        return replace(snapped, curve=(*end.curve[:-1], replace(end.curve[-1], mse=2.0 * snapped.loss)))
+        put = all_at_one if every else with_integrators
+        return put(end, self.orders.domain, self.terms.sample_time, near)
 
 
 def _split(weights: NDArray[np.float64], n_zeros: tuple[int, ...]) -> tuple[NDArray[np.float64], ...]:

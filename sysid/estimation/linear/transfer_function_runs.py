@@ -96,6 +96,15 @@ class End:
         total = sum(float(np.sum((r.target * r.root_weights) ** 2)) for r in self.provider.records)
         return total / max(self.provider.n_samples, 1)
 
+    @property
+    def errors(self) -> list[NDArray[np.float64]]:
+        """Weighted, of each record, shape ``(n_rows, 1)``; none where the model runs away."""
+        separated = self.provider.separated(self.theta)
+        if separated is None:
+            return []
+        ends = np.cumsum([len(record.target) for record in self.provider.records])
+        return [one[:, np.newaxis] for one in np.split(separated.residual, ends[:-1])]
+
     def worse_than(self, other: End, *, free: int = 0) -> bool:
         """Whether the loss is significantly larger.
 
@@ -149,7 +158,7 @@ def short_run(
         return begun
     limits = Termination(max_iterations=iterations, tolerance=1e-6, patience=4)
     engine = LevenbergMarquardt(termination=limits, evidence_after=None)
-    solution = engine.minimise_within(provider, begun.theta, _flat_prior(len(begun.theta)))
+    solution = engine.minimise_within(provider, begun.theta, flat_prior(len(begun.theta)))
     return Candidate(start=start, delays=delays, provider=provider, theta=solution.theta, loss=solution.at.loss)
 
 
@@ -167,7 +176,7 @@ def long_run(candidate: Candidate, training: TransferFunctionTraining, watch: Wa
     left = training.max_time_s - (now() - watch.began)
     limits = Termination(max_iterations=training.max_iterations, max_time_s=left, tolerance=1e-7, patience=6)
     engine = LevenbergMarquardt(termination=limits, evidence_after=None, on_iteration=watch.on_iteration)
-    solution = engine.minimise(candidate.provider, candidate.theta, _flat_prior(len(candidate.theta)))
+    solution = engine.minimise(candidate.provider, candidate.theta, flat_prior(len(candidate.theta)))
     # A run that cannot improve on its start began at the minimum that the short run had reached already.
     ended = solution.status in {Status.NOT_IMPROVED, Status.STALLED}
     return End(
@@ -180,7 +189,14 @@ def long_run(candidate: Candidate, training: TransferFunctionTraining, watch: Wa
     )
 
 
-def _flat_prior(n: int) -> Prior:
-    """No prior: the loss alone is minimised."""
+def flat_prior(n: int) -> Prior:
+    """No prior: the loss alone is minimised.
+
+    Args:
+        n: Parameters.
+
+    Returns:
+        The prior.
+    """
     group = Group(name="poles", members=np.arange(n))
     return Prior(centre=np.zeros(n), groups=(group,), alphas=np.zeros(1), beta=1.0)

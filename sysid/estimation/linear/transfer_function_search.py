@@ -214,10 +214,7 @@ def _not_above(
 def _snapped(own: AbstractProblem, end: End, ceiling: float) -> End:
     """The end with poles at 1 that are no further from there than the records can tell."""
     snapped = own.at_one(end)
-    above = snapped.loss > ceiling * (1.0 + SAME) + EXACT * end.power
-    if above or snapped.worse_than(end):
-        return end
-    return snapped
+    return end if snapped.loss > ceiling * (1.0 + SAME) + EXACT * end.power else snapped
 
 
 def _free_poles(
@@ -257,7 +254,8 @@ def _free_poles(
     # pole that is off 1 by little has an equilibrium where no plant ever was.
     judge = score or own.as_scored
     if judge is not None:
-        found = min((found, free.at_one(found)), key=lambda one: judge(free.model(one)[0]))
+        there = (found, free.at_one(found), free.at_one(found, every=True))
+        found = min(there, key=lambda one: judge(free.model(one)[0]))
         if not judge(free.model(found)[0]) < judge(own.model(end)[0]):
             return own, at_end
     return free, found

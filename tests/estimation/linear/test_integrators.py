@@ -1,0 +1,48 @@
+"""Several inputs that integrate: each pole that records do not tell from 1 is held there, and others are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+import sysid
+from sysid.estimation import Status
+from sysid.traces import TraceSet
+
+T = 0.1
+
+
+def _record(rates: tuple[float, ...], *, samples: int = 400, noise: float = 5e-3) -> TraceSet:
+    """Sampled ``1/(s (s + 1))`` and its like, one an input, whose slow pole has these rates in 1/s."""
+    rng, inputs, y = np.random.default_rng(0), {}, np.zeros(samples)
+    for j, rate in enumerate(rates):
+        u = signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal(samples))
+        b, a, _ = signal.cont2discrete(([0.5 - j], np.poly([-rate, -1.0 - 0.5 * j])), T)
+        inputs[f"u{j + 1}"] = u
+        y += signal.lfilter(b.ravel(), a, u)
+    y += noise * y.std() * rng.standard_normal(samples)
+    return sysid.data({**inputs, "y": y}, sample_time=T, inputs=list(inputs), outputs=["y"])
+
+
+@pytest.mark.parametrize(
+    "structure",
+    [
+        sysid.TransferFunction(poles=2, zeros=0, delays=0),
+        sysid.OE(nb=2, nf=2, nk=1),
+    ],
+    ids=lambda one: one.label,
+)
+def test_two_inputs_that_integrate_are_held_at_one_and_are_not_called_unstable(structure: object) -> None:
+    fit = sysid.fit(_record((0.0, 0.0)), "u1+u2 -> y", structure)
+    assert fit.status is Status.CONVERGED
+    assert abs(fit.model.pole_radius - 1.0) < 1e-12
+
+
+def test_an_input_integrates_and_the_slow_pole_of_another_stays_what_it_is() -> None:
+    structure = sysid.TransferFunction(poles=2, zeros=1, delays=1, domain="discrete")
+    fit = sysid.fit(_record((0.0, 0.05)), "u1+u2 -> y", structure)  # 0.05 1/s: a time constant of 200 samples
+    assert fit.status is Status.CONVERGED
+    slow = [float(np.abs(fit.model.poles(j)).max()) for j in range(2)]
+    assert slow[0] == pytest.approx(1.0, abs=1e-12)
+    assert slow[1] == pytest.approx(np.exp(-0.05 * T), abs=2e-4)
