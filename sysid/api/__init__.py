@@ -24,13 +24,13 @@ from sysid.lazy_names import imported_when_asked
 if TYPE_CHECKING:
     from sysid.api.comparison import Comparison as Comparison
     from sysid.api.comparison import compare as compare
+    from sysid.api.estimates import frequency_response as frequency_response
+    from sysid.api.estimates import impulse_response as impulse_response
     from sysid.api.fits import Fit as Fit
     from sysid.api.fitting import fit as fit
     from sysid.api.fitting import load as load
     from sysid.api.looking import advise as advise
     from sysid.api.looking import excite as excite
-    from sysid.api.looking import frequency_response as frequency_response
-    from sysid.api.looking import impulse_response as impulse_response
     from sysid.api.orders import OrderSearch as OrderSearch
     from sysid.api.orders import search_orders as search_orders
     from sysid.api.responses import bode as bode

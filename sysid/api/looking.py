@@ -1,4 +1,4 @@
-"""The look at data first, and the estimates without a structure that it rests on, which answer and draw themselves."""
+"""The look at data first, and the signals of an experiment, which answer and draw themselves."""
 
 from __future__ import annotations
 
@@ -13,13 +13,8 @@ from typing import TYPE_CHECKING, Any
 from sysid import advice as room
 from sysid.api.given import TracesLike, traces_of
 from sysid.api.notebook import html_of
-from sysid.api.several import Several, members
+from sysid.api.per_output import PerOutput, framed
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult
-from sysid.estimation.nonparametric import impulse, response
-from sysid.estimation.nonparametric.impulse_response import ImpulseResponse as Estimated
-from sysid.estimation.nonparametric.kernels import Kernel
-from sysid.estimation.nonparametric.spectra import SpectralMethod
 from sysid.excitation import AbstractExcitation, excitation
 from sysid.ingest.tables.durations import length_of_time
 from sysid.ingest.writers import write_trace
@@ -28,13 +23,11 @@ from sysid.models.orders.typed_fields import plain_values
 from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.advice.words import lines
 from sysid.reporting.frequency import HERTZ, FrequencyUnit
-from sysid.traces import Role, TraceSet
+from sysid.traces import TraceSet
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 Given = str | Mapping | Dict[str, Any]
 """How a mapping is written."""
@@ -98,14 +91,8 @@ class Advice(room.Advice):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class SystemAdvice:
-    """What is in a record of several outputs.
-
-    Args:
-        outputs: The findings, by output.
-    """
-
-    outputs: Dict[str, Advice]
+class SystemAdvice(PerOutput[Advice]):
+    """What is in a record of several outputs; see the base class."""
 
     def to_frame(self) -> pd.DataFrame:
         """A row for each finding and each suggestion.
@@ -113,75 +100,7 @@ class SystemAdvice:
         Returns:
             Columns ``output``, ``question``, ``verdict``, ``says``, ``do``.
         """
-        import pandas as pd
-
-        frames = [one.to_frame().assign(output=name) for name, one in self.outputs.items()]
-        return pd.concat(frames, ignore_index=True)[["output", "question", "verdict", "says", "do"]]
-
-    def __str__(self) -> str:
-        return "\n\n".join(map(str, self.outputs.values()))
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return html_of(self)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ImpulseResponse(Estimated):
-    """An impulse response that draws itself; printed, it is what it says of each input."""
-
-    def __str__(self) -> str:
-        step, deviation = self.step()
-        lines = [f"impulse response, {self.mapping}: {100 * self.explained:.1f} % of the output explained"]
-        ends = zip(self.mapping.inputs, self.dead_times, self.settling(), step, deviation, strict=True)
-        for name, dead, settling, rise, error in ends:
-            acts = f"dead time {dead.best} ({dead.low} to {dead.high}) samples, settled after {settling} of them"
-            gain = f"gain {rise[-1]:.4g} +- {1.96 * error[-1]:.2g} (95 %)"
-            lines.append(f"{name}: {acts}, {gain}" if dead.acts else f"{name}: no effect that can be measured")
-        return "\n".join([*lines, *self.notes])
-
-    __repr__ = __str__
-
-    def plot(self) -> Figure:
-        """The response of every input with its 95 % band.
-
-        Returns:
-            A figure of matplotlib's.
-        """
-        from sysid.reporting.figures.response_figure import impulse_figure
-
-        return impulse_figure(self)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class FrequencyResponse(response.FrequencyResponse):
-    """A frequency response that draws itself, beside models if asked; printed, it says what it is."""
-
-    def __str__(self) -> str:
-        low, high = HERTZ.told(self.frequency[[0, -1]])
-        head = f"frequency response, {self.mapping}: {self.method.value}, {len(self.frequency)} points"
-        return "\n".join([f"{head} from {low:.4g} to {high:.4g} Hz, averages {self.averages:.3g}", *self.notes])
-
-    __repr__ = __str__
-
-    def plot(self, *fits: FitResult | Several, unit: str = HERTZ.value) -> Figure:
-        """Gain, phase and coherence with 95 % bands, and the responses of linear models over them.
-
-        Args:
-            fits: Of this output, or of several among which it is; networks are left out, as they have no response.
-            unit: Of the frequencies that are drawn: ``"Hz"``, or ``"rad/s"``, as ``frequency`` has them.
-
-        Returns:
-            A figure of matplotlib's.
-
-        Raises:
-            ConfigError: If it is another unit.
-        """
-        from sysid.reporting.figures.response_figure import response_figure
-
-        parts = [part for one in fits for part in members(one)]
-        return response_figure(self, parts, FrequencyUnit.of(unit))
+        return framed(self.outputs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -211,10 +130,6 @@ class Excitation(excitation.Excitation):
         from sysid.reporting.figures.excitation_figure import excitation_figure
 
         return excitation_figure(self)
-
-
-def _estimation(traces: TraceSet) -> tuple[Any, ...]:
-    return traces.with_role(Role.ESTIMATION) or traces.traces
 
 
 def advise(traces: TracesLike, mapping: Given | None = None) -> Advice | SystemAdvice:
@@ -276,94 +191,6 @@ def mapping_of(traces: TraceSet, mapping: Given | None, *, option: str = "mappin
         got=", ".join(names),
         remedy=f'write for example {option}"{example}"',
     )
-
-
-def impulse_response(
-    traces: TracesLike,
-    mapping: Given | None = None,
-    *,
-    lags: int | None = None,
-    dead_times: Sequence[int] | None = None,
-    kernel: str | Kernel | None = None,
-    noise_order: int | None = None,
-) -> ImpulseResponse:
-    """The impulse response of every input, regularised, with bands; no structure is chosen.
-
-    Args:
-        traces: The data set; its estimation traces, all where there are none.
-        mapping: As for :func:`advise`.
-        lags: Length in samples; as long as it takes to settle by default.
-        dead_times: Of each input, in samples; found by default.
-        kernel: ``"TC"`` or ``"DC"``; the one with the larger evidence by default.
-        noise_order: Order of the noise's autoregression; chosen by default, 0 for white noise.
-
-    Returns:
-        The response.
-
-    Raises:
-        ConfigError: If an option is out of range.
-        TraceError: If the record is too short, or an input never changes.
-    """
-    traces = traces_of(traces, word="impulse_response")
-    found = impulse.estimate_impulse_response(
-        _estimation(traces),
-        mapping_of(traces, mapping),
-        lags=lags,
-        dead_times=dead_times,
-        kernel=None if kernel is None else _choice(kernel, Kernel, "kernel"),
-        noise_order=noise_order,
-    )
-    return ImpulseResponse(**{field.name: getattr(found, field.name) for field in dataclasses.fields(Estimated)})
-
-
-def frequency_response(
-    traces: TracesLike,
-    mapping: Given | None = None,
-    *,
-    method: str | SpectralMethod = "SPA",
-    resolution: float | None = None,
-    frequency: NDArray[np.float64] | None = None,
-    period: int | None = None,
-) -> FrequencyResponse:
-    """The frequency response of every input, and the coherence, with bands; no structure is chosen.
-
-    Args:
-        traces: The data set; its estimation traces, all where there are none.
-        mapping: As for :func:`advise`.
-        method: ``"SPA"`` (Blackman and Tukey), ``"Welch"`` or ``"ETFE"``.
-        resolution: In rad/s; finer costs wider bands.
-        frequency: In rad/s, for SPA.
-        period: Of a periodic input, in samples, for ETFE.
-
-    Returns:
-        The response.
-
-    Raises:
-        ConfigError: If an option is out of range.
-        TraceError: If the record is too short.
-    """
-    traces = traces_of(traces, word="frequency_response")
-    found = response.estimate_frequency_response(
-        _estimation(traces),
-        mapping_of(traces, mapping),
-        method=_choice(method, SpectralMethod, "method"),
-        resolution=resolution,
-        frequency=frequency,
-        period=period,
-    )
-    return FrequencyResponse(
-        **{field.name: getattr(found, field.name) for field in dataclasses.fields(response.FrequencyResponse)}
-    )
-
-
-def _choice(value: Any, choices: type[Any], what: str) -> Any:
-    if isinstance(value, choices):
-        return value
-    known = {str(one.value).lower(): one for one in choices}
-    if str(value).lower() not in known:
-        names = ", ".join(str(one.value) for one in choices)
-        raise ConfigError(f"there is no such {what}", expected=names, got=repr(value), remedy=f"give one of {names}")
-    return known[str(value).lower()]
 
 
 def excite(

@@ -12,6 +12,7 @@ import numpy as np
 
 from sysid.api.fits import Fit
 from sysid.api.given import ESTIMATED, TracesLike, traces_of
+from sysid.api.per_output import PerOutput, framed
 from sysid.errors import ConfigError, shortened
 from sysid.estimation import StabilityOptions, estimators
 from sysid.estimation.least_squares.threads import one_blas_thread
@@ -232,6 +233,19 @@ class OrderSearch:
         return f"<pre>{escape(str(self))}</pre>"
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class SystemOrderSearch(PerOutput[OrderSearch]):
+    """The searches of a record of several outputs, as an ARX model an output is fitted; see the base class."""
+
+    def to_frame(self) -> pd.DataFrame:
+        """The shortlists as a table, best first for each output.
+
+        Returns:
+            ``output``, and the columns of :meth:`OrderSearch.to_frame`.
+        """
+        return framed(self.outputs)
+
+
 @one_blas_thread()
 def search_orders(
     traces: TracesLike,
@@ -245,7 +259,7 @@ def search_orders(
     most: int = MOST,
     selection: Sequence[Trace] | None = None,
     workers: int = 2,
-) -> OrderSearch:
+) -> OrderSearch | SystemOrderSearch:
     """Search the orders of an ARX model: the exact loss of every candidate, and the free run of the best of each size.
 
     Other structures are fitted beside it where they are asked for, with orders from 1 on and the dead times of the ARX
@@ -253,7 +267,7 @@ def search_orders(
 
     Args:
         traces: The data set; its selection traces choose where there are some.
-        mapping: Which channels go in, which comes out.
+        mapping: Which channels go in, which come out; of several outputs each is searched by itself.
         max_na: Largest number of past outputs; by default as large as the record and the number of inputs allow, ten
             at most.
         max_nb: Largest number of past values of each input, likewise.
@@ -266,7 +280,7 @@ def search_orders(
         workers: Threads.
 
     Returns:
-        The search: its best structure, its table, its picture.
+        The search: its best structure, its table, its picture. Of several outputs, that of each, ``found["y1"]``.
 
     Raises:
         ConfigError: If no trace is for estimation, or the grid has more candidates than memory.
@@ -283,19 +297,38 @@ def search_orders(
         'ARX [2; 1; 3]'
     """
     traces, chosen, start = traces_of(traces, word="search_orders"), Mapping.of(mapping), Start.of(start)
-    chosen.check_single("an order search")
-    estimation = traces.estimation
-    grid, losses = _searched(estimation, chosen, {"max_na": max_na, "max_nb": max_nb, "max_nk": max_nk}, start, workers)
     selection = traces.with_role(Role.SELECTION) if selection is None else tuple(selection)
+    asked, kinds = {"max_na": max_na, "max_nb": max_nb, "max_nk": max_nk}, check_kinds(structures)
+    found = {
+        one.output: _of_output(traces, one, asked, start, kinds=kinds, most=most, selection=selection, workers=workers)
+        for one in chosen.each
+    }
+    return SystemOrderSearch(outputs=found) if len(found) > 1 else next(iter(found.values()))
+
+
+def _of_output(
+    traces: TraceSet,
+    chosen: Mapping,
+    asked: Dict[str, int | None],
+    start: Start,
+    *,
+    kinds: Sequence[str],
+    most: int,
+    selection: tuple[Trace, ...],
+    workers: int,
+) -> OrderSearch:
+    """The search of one output."""
+    estimation = traces.estimation
+    grid, losses = _searched(estimation, chosen, asked, start, workers)
     found = run_finalists(
         losses, estimation, chosen, selection or estimation, count=FINALISTS, start=start, workers=workers
     ).ranked
-    kinds, others, states = [kind for kind in check_kinds(structures) if kind != ARX_KIND], None, None
-    if kinds:
+    beside, others, states = [kind for kind in kinds if kind != ARX_KIND], None, None
+    if beside:
         others = run_structures(
-            kinds, estimation, chosen, selection or estimation, dead_times=losses.best().nk, start=start, most=most
+            beside, estimation, chosen, selection or estimation, dead_times=losses.best().nk, start=start, most=most
         )
-    if "SS" in kinds:
+    if "SS" in beside:
         states = state_orders(estimation, chosen, most=most)
     if selection:
         found, said = smallest_first(found), BY_SELECTION

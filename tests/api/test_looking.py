@@ -43,6 +43,20 @@ def test_several_outputs_are_looked_at_one_by_one() -> None:
     assert "u -> y2" in str(found)
 
 
+def test_estimates_of_several_outputs_are_one_an_output() -> None:
+    """MATLAB's ``impulseest``, ``spa`` and ``etfe`` take records of several outputs; here they were refused."""
+    data = traces(2)
+    pulse, response = sysid.impulse_response(data, "u -> y1+y2"), sysid.frequency_response(data, "u -> y1+y2")
+    assert list(pulse.outputs) == list(response.outputs) == ["y1", "y2"]
+    one = sysid.impulse_response(data, "u -> y2")
+    assert np.array_equal(pulse["y2"].step(), one.step()) and str(one) in str(pulse)
+    assert str(sysid.frequency_response(data, "u -> y1")) in str(response)
+    assert list(pulse.plot()) == list(response.plot(unit="rad/s")) == ["y1", "y2"]
+    with pytest.raises(ConfigError, match="no output y3") as refused:
+        pulse["y3"]
+    assert "y1, y2" in str(refused.value)
+
+
 def test_a_record_with_nothing_to_draw_says_so() -> None:
     found = sysid.advise(sysid.data((np.ones(50), np.arange(50.0)), sample_time=1.0))
     with pytest.raises(ConfigError, match="nothing to draw"):

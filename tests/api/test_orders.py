@@ -71,6 +71,16 @@ def test_the_picture_and_the_table_are_there(found: OrderSearch) -> None:
     assert found._repr_html_().startswith("<pre>")
 
 
+def test_several_outputs_are_searched_one_by_one() -> None:
+    u, y = record(200)
+    traces = sysid.data((u, np.column_stack([y, np.r_[0.0, y[:-1]]])), sample_time=1.0)
+    found = sysid.search_orders(traces, "u -> y1+y2", max_na=1, max_nb=1, max_nk=4)
+    alone = sysid.search_orders(traces, "u -> y2", max_na=1, max_nb=1, max_nk=4)
+    assert found["y2"].best().label == alone.best().label != found["y1"].best().label
+    assert set(found.to_frame()["output"]) == {"y1", "y2"}
+    assert str(alone) in str(found)
+
+
 @pytest.mark.parametrize("inputs", [1, 2, 3, 5])
 @pytest.mark.parametrize("samples", [20, 100, 10_000])
 def test_what_is_not_asked_for_is_bounded_by_record_and_patience(samples: int, inputs: int) -> None:

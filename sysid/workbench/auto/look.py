@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from sysid.advice import Advice, Verdict, advise, looked_at
 from sysid.advice.dynamics import INTEGRATES
-from sysid.api.orders import search_orders
+from sysid.api.orders import OrderSearch, search_orders
 from sysid.errors import UserError
 from sysid.estimation.linear.state_space.orders import state_orders
 from sysid.estimation.records.output_ends import found_ends
@@ -249,7 +250,7 @@ def _shown(traces: Sequence[Trace], mapping: Mapping) -> int:
 
 def _orders_of(traces: TraceSet, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
     try:
-        found = search_orders(traces, mapping, start=start, workers=1)
+        found = cast("OrderSearch", search_orders(traces, mapping, start=start, workers=1))  # of one output
     except UserError:
         return ()  # too short for any: what is tried then says so itself
     structures = [one.fit.model.structure for one in found.finalists if np.isfinite(one.mean_fit)]

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from sysid.api.fitting import load
 from sysid.api.looking import mapping_of
-from sysid.api.orders import OrderSearch, search_orders
+from sysid.api.orders import OrderSearch, SystemOrderSearch, search_orders
 from sysid.estimation.linear.order_search import Criterion
 from sysid.models import AbstractStructure
 from sysid.names import slug
@@ -39,12 +39,19 @@ def orders_command(
     )
     asked: dict[str, Any] = {**ranges, "structures": kinds, "most": most}
     found = search_orders(traces, chosen, **asked)
+    several = found.outputs.items() if isinstance(found, SystemOrderSearch) else [("", found)]
+    for name, one in several:
+        _show(one, f"{slug(traces.name)}.{slug(name)}" if name else slug(traces.name), most)
+
+
+def _show(found: OrderSearch, stem: str, most: int) -> None:
+    """The search of one output, its picture beside."""
     console().print(_table(found))
     for note in found.notes:
         console().print(f"note: {note}", soft_wrap=True)
     with styled():
-        drawing = svg(found.plot(), title="Orders", description=f"Loss against size, {chosen}", name="orders")
-    picture = kept_picture(Path(f"{slug(traces.name)}.orders.svg"), drawing)
+        drawing = svg(found.plot(), title="Orders", description=f"Loss against size, {found.mapping}", name="orders")
+    picture = kept_picture(Path(f"{stem}.orders.svg"), drawing)
     console().print(f"picture: {picture}", soft_wrap=True, markup=False)
     if found.states is not None:
         sizes = ", ".join(f"{size:.3f}" for size in found.states.correlations[: most + 3])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
 from pydantic import BaseModel, Field
 
@@ -87,7 +87,10 @@ def search(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
     criterion = None if asked.criterion == FREE_RUN else asked.criterion
     return [
         _record(
-            search_orders(data.traces, one, **ranges, start=config.start, selection=data.selection, workers=1),
+            cast(
+                "OrderSearch",  # of one output
+                search_orders(data.traces, one, **ranges, start=config.start, selection=data.selection, workers=1),
+            ),
             criterion,
         )
         for one in config.mapping.each
