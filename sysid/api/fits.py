@@ -17,11 +17,11 @@ from sysid.errors import TraceError, shortened
 from sysid.estimation import FitResult
 from sysid.estimation.records.experiment import Experiment
 from sysid.ingest.memory.run_inputs import inputs_of
-from sysid.ingest.memory.run_records import before_a_run, check_past, levels_of, measured_of
+from sysid.ingest.memory.run_records import before_a_run, check_past, levels_of, measured_of, past_of
 from sysid.models import History, Start
 from sysid.models.blocks.curve_values import curve_values
 from sysid.models.contract.form import unheeded
-from sysid.traces import Role, TraceSet
+from sysid.traces import Role, Trace, TraceSet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from sysid.estimation.grey_box.profile import Profile
     from sysid.validation.residuals import ResidualAnalysis
 
-Initial = float | Dict[str, float] | History | tuple[Any, Any] | None
+Initial = float | Dict[str, float] | History | tuple[Any, Any] | Trace | TraceSet | None
 """What stands before a run; see :meth:`Fit.simulate`."""
 
 
@@ -56,11 +56,12 @@ class Fit(FitResult, AbstractFit):
 
         Args:
             u: Inputs: an array of shape ``(n_samples,)`` or ``(n_samples, n_inputs)`` in the mapping's order, a frame
-                or dict with columns by name, or a trace; for a model without input the number of samples. Measured
+                or dict with columns by name, a trace, or a data set of one; for a model without input the number of
+                samples. Measured
                 outputs beside them are not read: :func:`sysid.compare` begins by them, and scores.
             initial: What stands before the first sample: nothing for the system at rest; a number, the output that it
-                has stood at, or numbers by name of several outputs; a pair ``(u, y)`` of the samples before, oldest
-                first; or a history.
+                has stood at, or numbers by name of several outputs; the samples before, oldest first, as a record or a
+                pair ``(u, y)``; or a history.
 
         Returns:
             The output, shape ``(n_samples,)``, in its unit; of a model of several outputs ``(n_samples, n_outputs)``.
@@ -115,12 +116,13 @@ class Fit(FitResult, AbstractFit):
             )
         return self.model.predict(inputs, output, self._history(inputs, initial), steps=steps)
 
-    def forecast(self, u: Any, *, initial: tuple[Any, Any] | History) -> NDArray[np.float64]:
+    def forecast(self, u: Any, *, initial: tuple[Any, Any] | History | Trace | TraceSet) -> NDArray[np.float64]:
         """What is to be expected after measured samples: the free run, with what is known of the noise carried on.
 
         Args:
             u: Inputs to come, as for :meth:`simulate`.
-            initial: The samples before: a pair ``(u, y)``, oldest first, or a history.
+            initial: The samples before, oldest first: a record (a trace, a data set of one, a frame), a pair
+                ``(u, y)``, or a history.
 
         Returns:
             As :meth:`simulate`. A model without a model of its noise (OE, TF, equations) runs freely from the state
@@ -131,7 +133,7 @@ class Fit(FitResult, AbstractFit):
             ConfigError: If no samples are given.
             TraceError: If both have not as many samples, or one is missing.
         """
-        inputs = self._inputs(u)
+        inputs, initial = self._inputs(u), past_of(initial)
         check_past(initial)
         history = self._history(inputs, initial)
         assert history is not None  # noqa: S101 - asked before
@@ -249,7 +251,7 @@ class Fit(FitResult, AbstractFit):
         return found if model.structure.several_outputs else found[:, 0]
 
     def _history(self, inputs: NDArray[np.float64], initial: Initial) -> History | None:
-        model = self.model
+        model, initial = self.model, past_of(initial)
         if initial is None or isinstance(initial, History):
             return initial
         if isinstance(initial, tuple):

@@ -13,15 +13,15 @@ from sysid.api.abstract_fit import AbstractFit
 from sysid.api.fits import Fit
 from sysid.errors import ChannelError
 from sysid.estimation.results.result import Status
-from sysid.ingest.memory.run_records import before_a_run, check_past, levels_of, measured_of
+from sysid.ingest.memory.run_records import before_a_run, check_past, levels_of, measured_of, past_of
 from sysid.models import Cascade, Start
-from sysid.traces import TraceSet
+from sysid.traces import Trace, TraceSet
 
 if TYPE_CHECKING:
     from sysid.api.given import TracesLike
     from sysid.validation.residuals import ResidualAnalysis
 
-Initial = float | Dict[str, float] | tuple[Any, Any] | None
+Initial = float | Dict[str, float] | tuple[Any, Any] | Trace | TraceSet | None
 """What stands before a run; see :meth:`SystemFit.simulate`."""
 
 TRUSTED_LEAST = (
@@ -86,16 +86,14 @@ class SystemFit(AbstractFit):
             raise ChannelError([output], self.outputs, where="the outputs of a fit")
         return self.fits[output]
 
-    def simulate(
-        self, u: Any, *, initial: float | Dict[str, float] | tuple[Any, Any] | None = None
-    ) -> NDArray[np.float64]:
+    def simulate(self, u: Any, *, initial: Initial = None) -> NDArray[np.float64]:
         """Free run of all outputs.
 
         Args:
             u: Inputs, as for :meth:`Fit.simulate`, in the order of the first output's mapping.
-            initial: The levels that the outputs have stood at, by name, or a number for every one; or a pair
-                ``(u, y)`` of the samples before, oldest first, with a column of ``y`` for each output. The rest values
-                where nothing is said.
+            initial: The levels that the outputs have stood at, by name, or a number for every one; or the
+                samples before, oldest first, as a record or a pair ``(u, y)`` with a column of ``y`` for each output.
+                The rest values where nothing is said.
 
         Returns:
             Shape ``(n_samples, n_outputs)``, in the outputs' units.
@@ -124,22 +122,25 @@ class SystemFit(AbstractFit):
         found = [fit.predict(column, u, steps=steps, initial=given.get(name)) for (name, fit), column in runs]
         return np.column_stack(found)
 
-    def forecast(self, u: Any, *, initial: tuple[Any, Any]) -> NDArray[np.float64]:
+    def forecast(self, u: Any, *, initial: tuple[Any, Any] | Trace | TraceSet) -> NDArray[np.float64]:
         """What is to be expected of all outputs after measured samples; see :meth:`Fit.forecast`.
 
         Args:
             u: Inputs to come, as for :meth:`Fit.simulate`.
-            initial: The samples before: a pair ``(u, y)``, oldest first, with a column of ``y`` for each output.
+            initial: The samples before, oldest first: a record, or a pair ``(u, y)`` with a column of ``y`` for each
+                output.
 
         Returns:
             Shape ``(n_samples, n_outputs)``, in the outputs' units.
         """
+        initial = past_of(initial)
         check_past(initial)
         given = self._begun(initial)
         return np.column_stack([fit.forecast(u, initial=given[name]) for name, fit in self.fits.items()])
 
     def _begun(self, initial: Initial) -> Dict[str, Any]:
         """What stands before the first sample, output by output."""
+        initial = past_of(initial)
         if not isinstance(initial, tuple):
             return levels_of(initial, self.outputs)
         inputs = self[self.outputs[0]].model.mapping.inputs

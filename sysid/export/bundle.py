@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.export.forecast import check_forecasts, forecast
 from sysid.export.measured_run import Initial, check_able, check_one_start, run_measured, run_with
 from sysid.export.ranges import taking_rounding
 from sysid.export.surrogate import Surrogate
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.memory.run_inputs import inputs_of
-from sysid.ingest.memory.run_records import record_of
+from sysid.ingest.memory.run_records import before_a_run, check_past, past_of, record_of
 from sysid.ingest.tables.frames import columns_by_name
 from sysid.models import AbstractModel, Cascade, Start, StartKind, StartLike
 from sysid.traces import Channel, Trace, check_units
@@ -133,6 +134,35 @@ class Bundle:
         if hasattr(u, "columns") and hasattr(u, "index") and not isinstance(u, Trace):
             return type(u)(found, index=u.index, columns=list(names))
         return found[:, 0] if len(names) == 1 else found
+
+    def forecast(self, u: Any, *, initial: Any) -> NDArray[np.float64]:
+        """What is to be expected after measured samples: the free run, with what is known of the noise carried on.
+
+        Args:
+            u: Inputs to come, as for :meth:`simulate`.
+            initial: The samples before, oldest first: a record (a trace, a data set of one, a frame), or a pair
+                ``(u, y)``.
+
+        Returns:
+            Shape ``(n_samples,)``, or ``(n_samples, n_outputs)`` where there are several.
+
+        Raises:
+            ChannelError: If an input or an output is missing.
+            ConfigError: If no samples are given, samples are at another distance than the model's, or the bundle is a
+                whole of models that read each other.
+            TraceError: If inputs and outputs have not as many samples, or one is missing.
+        """
+        models, past = check_forecasts(self.model), past_of(initial)
+        check_past(past)
+        units = {str(entry["name"]): str(entry["unit"]) for entry in self.inputs} if self.model.inputs else {}
+        outputs = {str(entry["name"]): str(entry["unit"]) for entry in self.outputs}
+        step = self.model.sample_time
+        inputs = inputs_of(u, tuple(units), sample_time=step, units=units)
+        before, output = before_a_run(past, tuple(units), tuple(outputs), units | outputs, sample_time=step)
+        known = {**dict(zip(units, before.T, strict=True)), **dict(zip(outputs, output.T, strict=True))}
+        to_come = dict(zip(units, inputs.T, strict=True)) or {"": np.zeros(len(inputs))}
+        found = forecast(models, tuple(outputs), known, to_come)
+        return found[:, 0] if len(outputs) == 1 else found
 
     def _measured(self, u: Any) -> tuple[str, ...]:
         """The outputs that stand beside the inputs."""

@@ -83,8 +83,8 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "no stability": (lambda: sysid.fit(SET, "u -> y", ARX, stability=False), "count=0 asks nothing"),
     "a set to run over": (
-        lambda: sysid.fit(SET, "u -> y", ARX).simulate(sysid.data((SET["u"], SET["y"]), sample_time=0.1)),
-        r'write traces\["record"\]',
+        lambda: sysid.fit(SET, "u -> y", ARX).simulate(sysid.data([(SET["u"], SET["y"])] * 2, sample_time=0.1)),
+        r"write traces\[",
     ),
     "a frame to load": (lambda: sysid.load({"u": [1.0]}), "sysid.data"),
     "a fit to read": (lambda: sysid.read_bundle(None), "takes a name or a path"),

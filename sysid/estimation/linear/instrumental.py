@@ -25,15 +25,15 @@ from sysid.estimation.clock import now
 from sysid.estimation.linear.arx import arx_experiments, arx_model, arx_uncertainty, first_output, stability_note
 from sysid.estimation.linear.regression import Solution, regress, regressor_matrix, solve
 from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.records.given import Given, Records, given
 from sysid.estimation.records.operating_point import OperatingPoint
 from sysid.estimation.results.result import FitResult, Loop, Status
-from sysid.models import ARX, ARXModel, Mapping, Start
-from sysid.traces import Trace
+from sysid.models import ARX, ARXModel, Start
 
 
 def fit_iv4(
-    traces: Sequence[Trace],
-    mapping: Mapping,
+    traces: Records,
+    mapping: Given,
     orders: ARX,
     *,
     start: Start | None = None,
@@ -43,8 +43,8 @@ def fit_iv4(
     """Fit an ARX model by the four-step instrumental-variable method.
 
     Args:
-        traces: Estimation traces.
-        mapping: Which channels go in, which comes out.
+        traces: A data set, whose records for estimation are taken; a record, or several.
+        mapping: Which channels go in, which comes out: ``"u -> y"``.
         orders: The structure, with at least one past output or one past input.
         start: What stands before each trace; at rest by default.
         rest_output: Output at rest in its unit; the mean of the traces' first samples by default.
@@ -58,6 +58,7 @@ def fit_iv4(
         ConfigError: If the orders do not fit the inputs.
         TraceError: If there are fewer samples than parameters.
     """
+    traces, mapping = given(traces, mapping)
     began, orders = now(), orders.for_inputs(len(mapping.inputs))
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     experiments = arx_experiments(

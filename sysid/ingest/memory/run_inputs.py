@@ -36,7 +36,8 @@ def inputs_of(
     """Inputs, or outputs that were measured, as a matrix in a mapping's order.
 
     Args:
-        values: An array, a frame, a dict of columns, or a trace; for a model without input the number of samples.
+        values: An array, a frame, a dict of columns, a trace, or a data set of one; for a model without input the
+            number of samples.
         names: The inputs.
         sample_time: Of the model, in seconds: a trace, and a frame whose index or column is time, must have it.
         units: Of the model's channels: a trace, whose channels have units, must be in them; columns whose names say
@@ -54,6 +55,7 @@ def inputs_of(
     """
     if not names and isinstance(values, int):
         return np.zeros((values, 0))
+    values = only_record(values)
     if isinstance(values, TraceSet):
         raise ConfigError(
             "a run is over one record",
@@ -79,6 +81,18 @@ def inputs_of(
         raise no_samples(where)
     _check_finite(found, names, where=where)
     return found
+
+
+def only_record(values: Any) -> Any:
+    """The record of a data set that has no other; anything else as it is.
+
+    Args:
+        values: What was given as a record.
+
+    Returns:
+        The record.
+    """
+    return values.traces[0] if isinstance(values, TraceSet) and len(values.traces) == 1 else values
 
 
 def _of_array(values: Any, names: tuple[str, ...], *, where: str) -> NDArray[np.float64]:

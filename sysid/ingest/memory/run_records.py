@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from sysid.errors import ChannelError, ConfigError, TraceError, shortened
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.memory.arrays import data
-from sysid.ingest.memory.run_inputs import inputs_of
+from sysid.ingest.memory.run_inputs import inputs_of, only_record
 from sysid.ingest.tables.frames import check_labels, columns_by_name
-from sysid.traces import Channel, Trace
+from sysid.traces import Channel, Trace, TraceSet
 
 MEASURED, BEFORE = "the measured outputs", "initial, the samples before a run"
 
@@ -39,7 +39,7 @@ def measured_of(
         ConfigError: If rows have other labels than those of the inputs, or columns are not as many as the outputs.
         TraceError: If a sample is missing.
     """
-    if not isinstance(y, Trace) and not isinstance(u, Trace):
+    if not isinstance(y, Trace | TraceSet) and not isinstance(u, Trace | TraceSet):
         check_labels((u, y), ("u", "y"), where=where)
     return inputs_of(y, outputs, sample_time=sample_time, units=units, where=where)
 
@@ -91,13 +91,26 @@ def _not_before(got: str, outputs: tuple[str, ...]) -> TraceError:
     )
 
 
+def past_of(initial: Any) -> Any:
+    """The samples before a run as the pair ``(u, y)``: a record, or a frame with columns by name, is both.
+
+    Args:
+        initial: What was given.
+
+    Returns:
+        The pair; anything else as it is.
+    """
+    framed = hasattr(initial, "columns") and hasattr(initial, "index")
+    return (initial, initial) if isinstance(initial, Trace | TraceSet) or framed else initial
+
+
 def check_past(initial: Any) -> None:
     """Refuse what is neither the samples before a run nor a history of them."""
     if not isinstance(initial, tuple) and not hasattr(initial, "output"):
         raise ConfigError(
             "a forecast goes on from measured samples",
             where="initial",
-            expected="a pair (u, y) of the samples before",
+            expected="a record of the samples before, or a pair (u, y)",
             got=shortened(initial),
             remedy="give them, as in initial=(u_before, y_before); simulate() begins at a level, or at rest",
         )
@@ -164,6 +177,7 @@ def record_of(values: Any, inputs: Sequence[Channel], outputs: Sequence[Channel]
         ConfigError: If the samples are at another distance, or an array has another number of columns.
         TraceError: If an input has a sample that is none.
     """
+    values = only_record(values)
     if isinstance(values, Trace):
         return values
     names = tuple(channel.name for channel in inputs)

@@ -85,6 +85,28 @@ def simulate(
     simulate_line_command(wish, positions)
 
 
+@commands.command(epilog="Example: sysid forecast runs/dryer past.csv to-come.csv", cls=RecordCommand)
+def forecast(
+    ctx: typer.Context,
+    bundle: Annotated[Path, typer.Argument(help="Folder or zip of an exported model, or a run folder.")],
+    past: Annotated[Path, typer.Argument(help="File of the samples before: inputs and measured outputs.")],
+    inputs: Annotated[Path, typer.Argument(help="File of the inputs to come.")],
+    *,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write, .csv or .parquet; NAME.forecast.csv by default.")
+    ] = None,
+    constant: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=NUMBER", help="An input that is a number and no column; repeated.")
+    ] = None,
+) -> None:
+    """Say what is to be expected after measured samples: the free run, with what is known of the noise carried on."""
+    from sysid.workbench.commands.forecast import ForecastWish, forecast_command
+
+    forecast_command(
+        ForecastWish(bundle=bundle, past=past, inputs=inputs, out=out, constants=constant or [], reading=ctx.meta[META])
+    )
+
+
 @commands.command(
     epilog="Example: sysid worst runs/tank/bundle --like tank-random --seeds 1000:1999 --output h2 --keep 100 "
     "--into datasets/found"

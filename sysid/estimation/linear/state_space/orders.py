@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +10,8 @@ from numpy.typing import NDArray
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.state_space.fit import records_of
 from sysid.estimation.linear.subspace.starts import Subspace
-from sysid.models import LinearStateSpace, Mapping, Start, StartKind
-from sysid.traces import Trace
+from sysid.estimation.records.given import Given, Records, given
+from sysid.models import LinearStateSpace, Start, StartKind
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,13 +37,13 @@ class StateOrders:
 
 
 def state_orders(
-    traces: Sequence[Trace], mapping: Mapping, *, most: int = 10, feedthrough: bool = False, horizon: int | None = None
+    traces: Records, mapping: Given, *, most: int = 10, feedthrough: bool = False, horizon: int | None = None
 ) -> StateOrders:
     """Canonical correlations of some records, and how many states they ask for.
 
     Args:
-        traces: The records; never concatenated.
-        mapping: Which channels go in, which come out.
+        traces: A data set, whose records for estimation are taken; a record, or several. Never concatenated.
+        mapping: Which channels go in, which come out: ``"u -> y1+y2"``.
         most: States at most.
         feedthrough: Whether outputs depend on inputs of the same sample.
         horizon: Samples of past and of future; the order of a long ARX model by default.
@@ -56,6 +55,7 @@ def state_orders(
         ChannelError: If a trace lacks a channel of the mapping.
         TraceError: If no record is long enough.
     """
+    traces, mapping = given(traces, mapping)
     structure = LinearStateSpace(states=most, feedthrough=feedthrough)
     _, segments, _ = records_of(
         traces, mapping, structure, start=Start(kind=StartKind.ESTIMATED), rests=(0.0,) * len(mapping.outputs)

@@ -1,0 +1,72 @@
+"""What is to be expected after measured samples, by a bundle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ConfigError
+from sysid.models import AbstractModel, Cascade, History
+
+if TYPE_CHECKING:
+    Array = NDArray[np.float64]
+
+
+def check_forecasts(model: AbstractModel | Cascade) -> tuple[AbstractModel, ...]:
+    """The models that go on from what was measured, each by itself.
+
+    Args:
+        model: Of a bundle.
+
+    Returns:
+        The models, one an output, or one of all.
+
+    Raises:
+        ConfigError: If one reads what another computes, whose own past was not measured.
+    """
+    if isinstance(model, AbstractModel):
+        return (model,)
+    computed = {name for one in model.models for name in one.mapping.outputs}
+    reading = [one for one in model.models if computed & set(one.mapping.inputs)]
+    if reading or model.limits:
+        raise ConfigError(
+            "a whole of models that read each other, or with limits, has no forecast",
+            where=", ".join(str(one.mapping) for one in reading) or "limits",
+            expected="one model, or one an output that reads inputs alone",
+            got=f"{len(model.models)} models",
+            remedy="sysid simulate begins by the measured outputs, without what is known of the noise",
+        )
+    return tuple(model.models)
+
+
+def forecast(
+    models: Sequence[AbstractModel], outputs: Sequence[str], before: dict[str, Array], inputs: dict[str, Array]
+) -> Array:
+    """Outputs to come.
+
+    Args:
+        models: From :func:`check_forecasts`.
+        outputs: In which order.
+        before: The samples before, oldest first, by channel.
+        inputs: Inputs to come, by channel.
+
+    Returns:
+        Shape ``(n_samples, n_outputs)``.
+    """
+    n, past = (len(next(iter(one.values()))) for one in (inputs, before))
+    found: dict[str, Array] = {}
+    for model in models:
+        read, names = model.mapping.inputs, model.mapping.outputs
+        output = np.column_stack([before[name] for name in names])
+        output = output if model.structure.several_outputs else output[:, 0]
+        history = History(inputs=_columns(before, read, past), output=output)
+        run = model.forecast(_columns(inputs, read, n), history).reshape(n, -1)
+        found |= dict(zip(names, run.T, strict=True))
+    return np.column_stack([found[name] for name in outputs])
+
+
+def _columns(channels: dict[str, Array], names: Sequence[str], samples: int) -> Array:
+    return np.column_stack([channels[name] for name in names]) if names else np.zeros((samples, 0))
