@@ -62,5 +62,16 @@ class FrequencyUnit(StrEnum):
         """
         return frequency / (2.0 * np.pi) if self is FrequencyUnit.HERTZ else frequency
 
+    def radians(self, frequency: Told) -> Told:
+        """Frequencies that are given in this unit, in rad/s.
+
+        Args:
+            frequency: In this unit.
+
+        Returns:
+            They in rad/s.
+        """
+        return frequency * (2.0 * np.pi) if self is FrequencyUnit.HERTZ else frequency
+
 
 HERTZ = FrequencyUnit.HERTZ

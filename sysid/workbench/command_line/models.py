@@ -137,11 +137,15 @@ def response(
         Path | None, typer.Option(help="Folder for pictures and tables; the current one by default.")
     ] = None,
     frequency: Annotated[str, typer.Option(help="Unit of the frequencies that are drawn: Hz or rad/s.")] = "Hz",
+    frequencies: Annotated[
+        str | None,
+        typer.Option(help="Of the Bode diagram, in that unit: 0.1,1,10 or low:high:points; four decades by default."),
+    ] = None,
 ) -> None:
     """Step response, Bode diagram and poles of a linear model: numbers, tables and pictures, with intervals."""
     from sysid.workbench.commands.response import response_command
 
-    response_command(model, fit=fit, seconds=seconds, out=out, frequency=frequency)
+    response_command(model, fit=fit, seconds=seconds, out=out, frequency=frequency, frequencies=frequencies)
 
 
 @commands.command(epilog='Example: sysid export service-brake --fit "open loop" --out open-loop')

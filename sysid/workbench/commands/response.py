@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sysid.api.responses import bode, poles, step
 from sysid.atomic import write_bytes
 from sysid.errors import ConfigError
@@ -22,15 +25,26 @@ from sysid.workbench.runner.naming import meant, nearby
 from sysid.workbench.runner.store import RunFolder
 
 RESULTS = "results.json"
+POINTS = 200
+"""Between two ends, where no number is said."""
 
 
-def response_command(model: Path, *, fit: str | None, seconds: float | None, out: Path | None, frequency: str) -> None:
+def response_command(
+    model: Path,
+    *,
+    fit: str | None,
+    seconds: float | None,
+    out: Path | None,
+    frequency: str,
+    frequencies: str | None = None,
+) -> None:
     """Print poles, gains and times, and write tables and pictures."""
     unit, model = FrequencyUnit.of(frequency), meant(model)
+    at = None if frequencies is None else parse_frequencies(frequencies, unit)
     run = (model / RESULTS).is_file()
     asked, title = (_fits(model, fit), fit or model.name) if run else (_bundle(model, fit), model.stem)
     # What has no response at all is told before anything is written.
-    shown: dict[str, StepResponse | Bode] = {"step": step(asked, seconds=seconds), "bode": bode(asked)}
+    shown: dict[str, StepResponse | Bode] = {"step": step(asked, seconds=seconds), "bode": bode(asked, frequency=at)}
     target = console()
     target.print(f"Poles\n{poles(asked)}", soft_wrap=True)
     folder = out or Path()
@@ -44,6 +58,42 @@ def response_command(model: Path, *, fit: str | None, seconds: float | None, out
         write_bytes(picture, as_file(drawing))
         write_bytes(table, found.to_frame().to_csv(index=False).encode())
         target.print(f"written: {nearby(table)}, {nearby(picture)}", soft_wrap=True)
+
+
+def parse_frequencies(words: str, unit: FrequencyUnit) -> NDArray[np.float64]:
+    """Frequencies as they are typed.
+
+    Args:
+        words: Numbers with commas, or ``low:high`` or ``low:high:points``, spaced evenly by ratio.
+        unit: In which they are.
+
+    Returns:
+        Shape ``(n,)``, in rad/s.
+
+    Raises:
+        ConfigError: If they cannot be read.
+
+    Example:
+        >>> parse_frequencies("0.5,1", FrequencyUnit.RADIANS).tolist()
+        [0.5, 1.0]
+        >>> parse_frequencies("1:100:3", FrequencyUnit.RADIANS).tolist()
+        [1.0, 10.0, 100.0]
+    """
+    try:
+        if ":" in words:
+            low, high, *more = words.split(":")
+            (points,) = [int(one) for one in more] or [POINTS]
+            at = np.geomspace(float(low), float(high), points)
+        else:
+            at = np.array([float(one) for one in words.split(",")])
+        if not (np.isfinite(at).all() and (at >= 0.0).all() and len(at)):
+            raise ValueError
+    except (TypeError, ValueError):
+        raise ConfigError(
+            "these are no frequencies", where="option --frequencies", expected="numbers from 0 on, or low:high:points",
+            got=words, remedy=f"write for example --frequencies 0.1,1,10 or --frequencies 0.01:10:50, in {unit.value}",
+        ) from None  # fmt: skip
+    return unit.radians(at)
 
 
 def _fits(folder: Path, name: str | None) -> list[FitResult]:
