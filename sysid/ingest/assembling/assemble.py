@@ -18,6 +18,7 @@ from sysid.ingest.assembling.in_units import check_units_said, clock_by_its_step
 from sysid.ingest.assembling.record import Record
 from sysid.ingest.assembling.stamp_repairs import STEPS
 from sysid.ingest.assembling.timing import Timing, survey
+from sysid.ingest.cells.began import Began
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import ColumnOptions, FileOptions, GridOptions, RepairOptions
 from sysid.ingest.tables.table import RawTable
@@ -137,6 +138,7 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions, repairs: Repair
         span=wanted.span(stamps),
         sample_time=wanted.sample_time,
         source=table.source,
+        began=_began(table, files),
     )
     notes += masked
     columns = []
@@ -157,6 +159,12 @@ def _select(table: RawTable, wanted: Wanted, files: FileOptions, repairs: Repair
         marked=_marked(table, names) | hidden,
         notes=tuple(notes),
     )
+
+
+def _began(table: RawTable, files: FileOptions) -> Began | None:
+    """When second 0 is, where the stamps are calendar time."""
+    name = files.time.column or table.time
+    return None if name is None or files.time.step is not None else table.find(name).began
 
 
 def _read_from(source: Path) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
+from sysid.ingest.cells.began import Began
 from sysid.ingest.tables.options import MaskOptions, RepairOptions
 from sysid.traces import Trace
 
@@ -22,6 +23,7 @@ def hidden(
     span: tuple[float, float],
     sample_time: float,
     source: Path,
+    began: Began | None = None,
 ) -> tuple[NDArray[np.bool_], list[str]]:
     """Which cells of a file the stretches of ``repairs: {mask: ...}`` empty.
 
@@ -33,6 +35,7 @@ def hidden(
         span: What is left of it, in seconds: its ``start`` and ``stop``.
         sample_time: Seconds.
         source: The file, for errors.
+        began: When its second 0 is, of calendar time.
 
     Returns:
         Shape ``(n_rows, n_channels)``, and one sentence for each stretch.
@@ -52,8 +55,9 @@ def hidden(
             )
         if mask.cases and case not in mask.cases:
             continue
-        low, high = mask.stretch.span(sample_time)
-        inside = mask.stretch.holds(stamps, sample_time) & (stamps >= span[0]) & (stamps <= span[1])
+        stretch = mask.stretch(began, where=f"the description of {source}, repairs.mask[{number}]")
+        low, high = stretch.span(sample_time)
+        inside = stretch.holds(stamps, sample_time) & (stamps >= span[0]) & (stamps <= span[1])
         left = stamps[(stamps >= span[0]) & (stamps <= span[1])]
         if not inside.any():
             if len(left) and (mask.cases or (low <= left.max() and high >= left.min())):
@@ -83,8 +87,9 @@ def masked(trace: Trace, repairs: RepairOptions, where: str) -> Trace:
     for number, mask in enumerate(repairs.mask or ()):
         if mask.cases and trace.name not in mask.cases:
             continue
-        if mask.stretch.holds(trace.time, trace.sample_time).any():
-            trace = trace.masked(mask.channel, start=mask.start, stop=mask.stop)
+        stretch = mask.stretch(where=f"{where}, repairs.mask[{number}]")
+        if stretch.holds(trace.time, trace.sample_time).any():
+            trace = trace.masked(mask.channel, start=stretch.start, stop=stretch.stop)
         elif mask.cases:
             raise _empty(mask, number, where, [(trace.name, float(trace.time[0]), float(trace.time[-1]))])
     return trace
@@ -92,7 +97,7 @@ def masked(trace: Trace, repairs: RepairOptions, where: str) -> Trace:
 
 def _sentence(mask: MaskOptions) -> tuple[str, str]:
     """What is noted of a stretch, before the number of samples and behind it."""
-    return f"{mask.channel or 'all channels'}: ", f" samples masked, {mask.stretch.told}"
+    return f"{mask.channel or 'all channels'}: ", f" samples masked, {mask.told}"
 
 
 def check_masks(
@@ -135,7 +140,7 @@ def _empty(mask: MaskOptions, number: int, where: str, ends: Sequence[tuple[str,
         "a stretch to be masked holds no sample",
         where=f"{where}, repairs.mask[{number}]",
         expected=f"a stretch of {there}" + (" ..." if len(ends) > 5 else ""),
-        got=mask.stretch.told,
-        remedy="correct start and stop; they are seconds in the file's own time, and calendar time counts from its "
-        "first row" + (", or name the cases it is for" if not mask.cases else ""),
+        got=mask.told,
+        remedy="correct start and stop; they are seconds in the file's own time, of calendar time from its first row "
+        "on, or dates" + (", or name the cases it is for" if not mask.cases else ""),
     )

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
+from sysid.ingest.cells.began import Began
 from sysid.ingest.cells.stamp_forms import usual_form
 from sysid.ingest.cells.zones import guess_zone, to_utc, utc_microseconds
 
@@ -216,6 +217,8 @@ class Calendar:
     where: str
     pattern: str | None = None
     zone: str | None = None
+    began: Began | None = field(default=None, init=False)
+    """When the first stamp is, once the column is finished; ``None`` of times of day."""
     _dates: list[NDArray[np.int64]] = field(default_factory=list)
     _micros: list[NDArray[np.int64]] = field(default_factory=list)
     _offsets: list[NDArray[np.int64]] = field(default_factory=list)
@@ -329,6 +332,13 @@ class Calendar:
             local = to_utc(local, self.zone, where=self.where)
         elif dates.any():
             guess, notes = _told_zone(local, notes)
+        if dates.any():
+            inside = zoned.all()
+            self.began = Began(
+                micros=int(local[0]),
+                zoned=bool(inside) or self.zone is not None,
+                zone=None if inside else self.zone,
+            )
         seconds[known] = (local - local[0]) / 1e6
         return seconds, notes, guess
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
+from sysid.ingest.cells.began import Began
 from sysid.ingest.cells.calendar import Calendar, is_calendar
 from sysid.ingest.cells.numbers import MISSING, NumberFormat
 from sysid.ingest.cells.words import WordCollector, Words
@@ -28,12 +29,14 @@ class Meaning:
         unit: Of time since the first stamp, where they are dates or times of day.
         words: The texts, where they are words.
         problem: Why they are no numbers.
+        began: When the first stamp is, of dates.
     """
 
     values: NDArray[np.float64]
     unit: str | None = None
     words: Words | None = None
     problem: ReaderError | None = None
+    began: Began | None = None
 
 
 def meaning_of(array: NDArray[Any], where: str) -> Meaning | None:
@@ -55,7 +58,7 @@ def meaning_of(array: NDArray[Any], where: str) -> Meaning | None:
         calendar = Calendar(where=where)
         try:
             calendar.add(["" if text.casefold() in MISSING else text for text in texts], np.arange(len(texts)))
-            return Meaning(values=calendar.finish()[0], unit="s")
+            return Meaning(values=calendar.finish()[0], unit="s", began=calendar.began)
         except ReaderError as error:
             return Meaning(values=np.full(len(texts), np.nan), problem=error)
     return _numbers(texts) or _words(texts, where)

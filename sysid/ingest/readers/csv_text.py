@@ -321,7 +321,8 @@ def _stamps(header: Header, column: Stamps, where: str, *, is_time: bool) -> tup
             seconds, told, zone = column.calendar.finish()
         except ReaderError as error:
             problem = error
-    return RawColumn(name=header.name, values=seconds, unit="s", problem=problem), told, zone
+    raw = RawColumn(name=header.name, values=seconds, unit="s", problem=problem, began=column.calendar.began)
+    return raw, told, zone
 
 
 def _numbers(header: Header, column: Numbers | Counts, layout: Layout, path: Path) -> RawColumn:

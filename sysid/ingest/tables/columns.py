@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
+from sysid.ingest.cells.began import Began
 from sysid.ingest.cells.headers import split_reference
 from sysid.ingest.cells.texts import meaning_of
 from sysid.ingest.cells.words import Words
@@ -34,6 +35,7 @@ class RawColumn:
         words: The texts of a column of words.
         strange: Texts in a column of numbers that are none.
         counted_from: What the values are counted from: a clock that counts further than float64 can.
+        began: When second 0 of calendar time is.
     """
 
     name: str
@@ -45,6 +47,7 @@ class RawColumn:
     words: Words | None = None
     strange: tuple[str, ...] = ()
     counted_from: int = 0
+    began: Began | None = None
     aside: str = ""
 
 
@@ -72,7 +75,7 @@ def array_column(
         The column; one that is not numeric carries its ``problem``.
     """
     unit, found = split_reference(unit) if unit else (None, None)
-    origin = 0
+    origin, began = 0, None
     if array.dtype.kind in "USO" and (meaning := meaning_of(array, f"{where}, column {name}")) is not None:
         return RawColumn(
             name=name,
@@ -82,10 +85,11 @@ def array_column(
             description=description,
             problem=meaning.problem,
             words=meaning.words,
+            began=meaning.began,
         )
     try:
         if array.dtype.kind == "M":
-            array, unit = _seconds(array), "s"
+            (array, began), unit = _seconds(array), "s"
         if array.dtype.kind == "m":
             array, unit = np.where(np.isnat(array), np.nan, array.astype("timedelta64[ns]").astype(np.int64) / 1e9), "s"
         if array.dtype.kind == "c" and not array.imag.any():
@@ -103,6 +107,7 @@ def array_column(
         description=description,
         problem=problem,
         counted_from=origin,
+        began=began,
     )
 
 
@@ -128,14 +133,14 @@ def distinct(columns: Sequence[RawColumn]) -> tuple[list[RawColumn], list[str]]:
     return named, notes
 
 
-def _seconds(stamps: NDArray[np.datetime64]) -> NDArray[np.float64]:
+def _seconds(stamps: NDArray[np.datetime64]) -> tuple[NDArray[np.float64], Began | None]:
     known = stamps[~np.isnat(stamps)]
     if not len(known):
-        return np.full(len(stamps), np.nan)
+        return np.full(len(stamps), np.nan), None
     nanoseconds = (stamps - known[0]).astype("timedelta64[ns]")
     seconds: NDArray[np.float64] = nanoseconds.astype(np.int64) / 1e9
     seconds[np.isnat(nanoseconds)] = np.nan
-    return seconds
+    return seconds, Began(micros=int(known[0].astype("datetime64[us]").astype(np.int64)))
 
 
 def _beyond_float64(array: NDArray[Any]) -> tuple[int, NDArray[Any]] | None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
-from datetime import date
+from datetime import date, datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from sysid.errors import ConfigError
 from sysid.field_checks import FieldError
+from sysid.ingest.cells.began import Began
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.tables.durations import seconds
 from sysid.ingest.tables.time_columns import is_time_unit
@@ -263,19 +265,26 @@ class GridOptions(Options):
 NanRepair = Literal["interpolate", "hold", "mask"]
 
 
-def _seconds_only(value: Any) -> Any:
-    if isinstance(value, date | str | bool):
+def _end(value: Any) -> Any:
+    """Seconds, or a date and time."""
+    try:
+        if isinstance(value, str):
+            return datetime.fromisoformat(value.strip())
+        if isinstance(value, date):
+            return value if isinstance(value, datetime) else datetime(value.year, value.month, value.day)
+    except ValueError:
+        pass
+    if isinstance(value, str | bool):
         raise FieldError(
-            "the ends of a masked stretch are seconds",
-            expected="a number: seconds in the file's own time; calendar time counts from the first row",
+            "the ends of a masked stretch are seconds, or dates",
+            expected="a number: seconds in the file's own time; or a date and time, where it is calendar time",
             got=str(value),
-            remedy="write a number; of calendar time how many seconds after the first row it is: 90 for "
-            "10:01:30 where the first row is of 10:00:00",
+            remedy="write 90, or 2024-05-01 10:01:30",
         )
     return seconds(value)
 
 
-Seconds = Annotated[float, BeforeValidator(_seconds_only, json_schema_input_type=float)]
+End = Annotated[float | datetime, BeforeValidator(_end, json_schema_input_type=float | datetime)]
 
 
 class MaskOptions(Options):
@@ -283,14 +292,15 @@ class MaskOptions(Options):
 
     Args:
         channel: The channel; all of them where none is named.
-        start: Seconds, in the file's time: its first sample; from the first one on where it is left out.
-        stop: Seconds, in the file's time: its last sample; up to the last one where it is left out.
+        start: Its first sample: seconds in the file's time, or a date and time where that is calendar time; from the
+            first one on where it is left out.
+        stop: Its last sample, likewise; up to the last one where it is left out.
         cases: The cases it is for; all of them where none is named.
     """
 
     channel: str | None = None
-    start: Seconds | None = None
-    stop: Seconds | None = None
+    start: End | None = None
+    stop: End | None = None
     cases: tuple[str, ...] = ()
 
     @model_validator(mode="after")
@@ -302,19 +312,64 @@ class MaskOptions(Options):
                 got="neither",
                 remedy="write when it was, in seconds; a channel that is of no use at all is left out of channels",
             )
-        if self.start is not None and self.stop is not None and self.stop < self.start:
+        if self.start is None or self.stop is None:
+            return self
+        try:
+            behind = self.stop < self.start  # type: ignore[operator]
+        except TypeError:
+            raise FieldError(
+                "start and stop are of two kinds",
+                expected="two numbers of seconds, or two dates, both with a zone or without one",
+                got=f"{_told(self.start)} and {_told(self.stop)}",
+                remedy="write both alike",
+            ) from None
+        if behind:
             raise FieldError(
                 "stop is before start",
-                expected=f"a stop from {self.start:g} s on",
-                got=f"{self.stop:g} s",
+                expected=f"a stop from {_told(self.start)} on",
+                got=_told(self.stop),
                 remedy="correct start or stop; both belong to the stretch",
             )
         return self
 
+    def stretch(self, began: Began | None = None, *, where: str = "repairs.mask") -> Stretch:
+        """When it is.
+
+        Args:
+            began: When the record began, where its time is calendar time.
+            where: Named in errors.
+
+        Returns:
+            The stretch, in seconds of the record's own time.
+
+        Raises:
+            ConfigError: If an end is a date, and the record's time is none.
+        """
+        return Stretch(start=_seconds_of(self.start, began, where), stop=_seconds_of(self.stop, began, where))
+
     @property
-    def stretch(self) -> Stretch:
-        """When it is."""
-        return Stretch(start=self.start, stop=self.stop)
+    def told(self) -> str:
+        """Its ends in words, as they were written."""
+        ends = (("from", self.start), ("to", self.stop))
+        return " ".join(f"{word} {_told(end)}" for word, end in ends if end is not None)
+
+
+def _told(end: float | datetime) -> str:
+    return end.isoformat(" ") if isinstance(end, datetime) else f"{end:.15g} s"
+
+
+def _seconds_of(end: float | datetime | None, began: Began | None, where: str) -> float | None:
+    if not isinstance(end, datetime):
+        return end
+    if began is None:
+        raise ConfigError(
+            "a mask has a date, and the record's time is no calendar time",
+            where=where,
+            expected="seconds in the record's own time",
+            got=_told(end),
+            remedy="write how many seconds after the first sample it is",
+        )
+    return began.seconds(end, where=where)
 
 
 def _one_mask(value: Any) -> Any:

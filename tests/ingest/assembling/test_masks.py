@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import sysid
 from sysid.errors import ConfigError, TraceError, UserError
-from sysid.ingest import RepairOptions, load_dataset, read_trace, write_csv
+from sysid.ingest import FileOptions, RepairOptions, load_dataset, read_trace, write_csv
 from sysid.traces import Trace
 from sysid.workbench.commands.reader_options import reading_options, take_options
 
@@ -169,6 +169,57 @@ def test_a_file_of_ours_is_masked_too(tmp_path: Path) -> None:
     assert np.flatnonzero(~masked.usable_samples).tolist() == [0, 1, 2]
 
 
+def dated(folder: Path, zone: str = "") -> Path:
+    """The same record a quarter of a minute a row, from 5 March 2024 on."""
+    rows = zip(*signals().values(), strict=True)
+    stamps = [f"2024-03-05 {10 + k // 240}:{k // 4 % 60:02d}:{15 * (k % 4):02d}{zone}" for k in range(N)]
+    lines = [f"{stamp},{u:g},{y:g}" for stamp, (u, y) in zip(stamps, rows, strict=True)]
+    path = folder / "run.csv"
+    path.write_text("\n".join(["time,u [V],y [V]", *lines]) + "\n")
+    return path
+
+
+ENDS = {"start": "2024-03-05 10:01:15", "stop": "2024-03-05T10:01:45"}
+"""Rows 5 to 7 of :func:`dated`."""
+
+
+def test_dates_end_a_mask_of_calendar_time_by_every_door(tmp_path: Path) -> None:
+    path = dated(tmp_path)
+    mask = {"channel": "y", **ENDS}
+    shown = ", ".join(f"{key}: {value}" for key, value in mask.items())
+    described(tmp_path, f"{{mask: [{{{shown}}}]}}")
+    yaml = (tmp_path / "dataset.yaml").read_text().replace("sample_time: 0.25", "sample_time: 15")
+    (tmp_path / "dataset.yaml").write_text(yaml)
+    import pandas as pd
+
+    frame = pd.read_csv(path, index_col="time", parse_dates=True)
+    options = reading_options(take_options([f"--repairs=mask={{{shown}}}"], whole=True)[0])
+    read = [
+        load_dataset(tmp_path / "dataset.yaml").traces[0],
+        read_trace(path, repairs=RepairOptions.model_validate({"mask": [mask]})),
+        read_trace(path, repairs=options["repairs"]),
+        sysid.data(frame, inputs=["u [V]"], outputs=["y [V]"], repairs={"mask": mask}).traces[0],
+    ]
+    for trace in read:
+        assert np.flatnonzero(~trace.usable_of(["y"])).tolist() == [5, 6, 7]
+        assert trace.usable_of(["u"]).all()
+        assert any("y: 3 samples masked, from 2024-03-05 10:01:15" in note for note in trace.provenance)
+
+
+def test_a_date_is_of_the_zone_of_its_file_or_refused(tmp_path: Path) -> None:
+    path = dated(tmp_path, "+02:00")
+    utc = {"start": "2024-03-05 08:01:15+00:00", "stop": "2024-03-05 10:01:45+02:00"}
+    trace = read_trace(path, repairs=RepairOptions.model_validate({"mask": utc}))
+    assert np.flatnonzero(~trace.usable_samples).tolist() == [5, 6, 7]
+    with pytest.raises(ConfigError, match="the file's time has a zone and the date has none"):
+        read_trace(path, repairs=RepairOptions.model_validate({"mask": ENDS}))
+    with pytest.raises(ConfigError, match="a date has a zone, the file none"):
+        read_trace(dated(tmp_path), repairs=RepairOptions.model_validate({"mask": utc}))
+    files = FileOptions.model_validate({"time": {"unit": "datetime", "column": "time", "zone": "Europe/Berlin"}})
+    berlin = read_trace(dated(tmp_path), files=files, repairs=RepairOptions.model_validate({"mask": ENDS}))
+    assert np.flatnonzero(~berlin.usable_samples).tolist() == [5, 6, 7]
+
+
 REFUSED: dict[str, tuple[Any, type[UserError], str]] = {
     "an unknown channel": ({"channel": "Y", "stop": 1}, ConfigError, r"(?s)names Y, which is not a channel.*mask\[0\]"),
     "an unknown case": ({"stop": 1, "cases": ["b"]}, ConfigError, "(?s)names the case b, which is not there"),
@@ -178,7 +229,9 @@ REFUSED: dict[str, tuple[Any, type[UserError], str]] = {
     "everything": ({"channel": "u", "start": 0}, TraceError, "(?s)leaves a channel no value.*channel u.*60 of 60"),
     "stop before start": ({"start": 2, "stop": 1}, ConfigError, "stop is before start"),
     "no ends": ({"channel": "u"}, ConfigError, "a masked stretch has no ends"),
-    "a date": ({"start": "2024-03-05 10:00"}, ConfigError, "(?s)are seconds.*calendar time counts from the first row"),
+    "a date": ({"start": "2024-03-05 10:00"}, ConfigError, "(?s)a date, and the record's time is no calendar time"),
+    "no date": ({"start": "2024-13-05"}, ConfigError, "are seconds, or dates"),
+    "two kinds": ({"start": 1, "stop": "2024-03-05"}, ConfigError, "start and stop are of two kinds"),
     "a truth value": ({"start": True}, ConfigError, "the ends of a masked stretch are seconds"),
     "another word": ({"from": 1}, ConfigError, "unknown field 'from'"),
 }
