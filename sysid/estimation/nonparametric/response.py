@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.least_squares.threads import one_blas_thread
+from sysid.estimation.nonparametric.phase import unwrapped
 from sysid.estimation.nonparametric.segments import Segment, segments_of
 from sysid.estimation.nonparametric.spectra import Spectra, SpectralMethod, etfe, spa, welch
 from sysid.models import Mapping
@@ -54,6 +55,7 @@ class FrequencyResponse:
         averages: How many independent averages there are.
         resolution: In rad/s: finer structure cannot be seen.
         notes: What a reader has to know.
+        unwrapped: The phase in radians with every turn, where it is known between the frequencies; see :attr:`phase`.
     """
 
     mapping: Mapping
@@ -71,6 +73,7 @@ class FrequencyResponse:
     averages: float
     resolution: float
     notes: tuple[str, ...] = ()
+    unwrapped: NDArray[np.float64] | None = None
 
     @property
     def gain(self) -> NDArray[np.float64]:
@@ -84,7 +87,9 @@ class FrequencyResponse:
 
     @property
     def phase(self) -> NDArray[np.float64]:
-        """In radians, unwrapped over frequency, likewise."""
+        """In radians, unwrapped over frequency, likewise; of SPA with every turn, at any frequencies."""
+        if self.unwrapped is not None:
+            return self.unwrapped
         found = np.full(self.values.shape, np.nan)
         for j, column in enumerate(self.values.T):
             seen = np.isfinite(column)
@@ -215,11 +220,65 @@ def _spectra(
 
 
 def _response(spectra: Spectra, method: SpectralMethod, trace: Trace, mapping: Mapping) -> FrequencyResponse:
+    m, nu = len(mapping.inputs), spectra.averages
+    solved = _solved(spectra.matrices, nu)
+    n, judged = len(spectra.matrices), nu > m + 0.5
+    notes = [] if judged else [f"{nu:.3g} averages for {m} inputs: nothing tells noise from response, so no bands"]
+    if not solved.seen.all():
+        notes.append(
+            f"{np.count_nonzero(~solved.seen)} of {n} frequencies are not in the inputs, or not in each by itself"
+        )
+    return FrequencyResponse(
+        mapping=mapping,
+        sample_time=trace.sample_time,
+        input_units=tuple(trace.channel(name).unit for name in mapping.inputs),
+        output_unit=trace.channel(mapping.output).unit,
+        method=method,
+        frequency=spectra.frequency,
+        values=solved.values,
+        deviation=solved.spread,
+        radius=solved.radius,
+        coherence=np.clip(solved.coherence, 0.0, 1.0),
+        noise=solved.rest,
+        inputs=solved.own,
+        averages=nu,
+        resolution=spectra.resolution,
+        notes=tuple(notes),
+        unwrapped=_unwrapped(solved.values, spectra, trace.sample_time),
+    )
+
+
+def _unwrapped(values: NDArray[np.complex128], spectra: Spectra, T: float) -> NDArray[np.float64] | None:
+    """The phase with every turn, where the spectra are known at every frequency."""
+    if spectra.every is None:
+        return None
+    whole = _solved(spectra.every, spectra.averages)
+    size = np.abs(whole.values)
+    known = np.isfinite(size) & (size > np.nan_to_num(whole.radius))
+    return np.column_stack(
+        [unwrapped(values[:, j], spectra.frequency, whole.values[:, j], known[:, j], T) for j in range(values.shape[1])]
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Solved:
+    """What spectra say of a response at every frequency; see :class:`FrequencyResponse`."""
+
+    values: NDArray[np.complex128]
+    spread: NDArray[np.float64]
+    radius: NDArray[np.float64]
+    rest: NDArray[np.float64]
+    coherence: NDArray[np.float64]
+    own: NDArray[np.float64]
+    seen: NDArray[np.bool_]
+
+
+def _solved(matrices: NDArray[np.complex128], nu: float) -> _Solved:
     from scipy import stats
 
-    m, nu = len(mapping.inputs), spectra.averages
-    U, cross = spectra.matrices[:, :m, :m], spectra.matrices[:, m, :m]
-    Y = np.real(spectra.matrices[:, m, m])
+    m = matrices.shape[1] - 1
+    U, cross = matrices[:, :m, :m], matrices[:, m, :m]
+    Y = np.real(matrices[:, m, m])
     own = np.real(np.einsum("fjj->fj", U))
     seen = np.all(own > UNSEEN * np.maximum(own.max(axis=0), np.finfo(np.float64).tiny), axis=1)
     if m > 1 and seen.any():
@@ -240,23 +299,4 @@ def _response(spectra: Spectra, method: SpectralMethod, trace: Trace, mapping: M
             variance = rest[seen, None] * np.real(np.einsum("fjj->fj", inverse)) / nu
             spread[seen] = np.sqrt(np.maximum(variance, 0.0))
             radius[seen] = spread[seen] * np.sqrt(stats.f.ppf(0.95, 2.0, 2.0 * (nu - m)))
-    notes = [] if judged else [f"{nu:.3g} averages for {m} inputs: nothing tells noise from response, so no bands"]
-    if not seen.all():
-        notes.append(f"{np.count_nonzero(~seen)} of {n} frequencies are not in the inputs, or not in each by itself")
-    return FrequencyResponse(
-        mapping=mapping,
-        sample_time=trace.sample_time,
-        input_units=tuple(trace.channel(name).unit for name in mapping.inputs),
-        output_unit=trace.channel(mapping.output).unit,
-        method=method,
-        frequency=spectra.frequency,
-        values=G,
-        deviation=spread,
-        radius=radius,
-        coherence=np.clip(coherence, 0.0, 1.0),
-        noise=rest,
-        inputs=own,
-        averages=nu,
-        resolution=spectra.resolution,
-        notes=tuple(notes),
-    )
+    return _Solved(values=G, spread=spread, radius=radius, rest=rest, coherence=coherence, own=own, seen=seen)

@@ -39,12 +39,15 @@ class Spectra:
         matrices: Shape ``(n_points, n_channels, n_channels)``, output last.
         averages: How many independent periodograms each value is the mean of.
         resolution: Width of the window, in rad/s: finer structure cannot be seen.
+        every: The same on an even grid from 0 to the Nyquist frequency, both with it, that shows every lag; ``None``
+            where ``frequency`` is such a grid.
     """
 
     frequency: NDArray[np.float64]
     matrices: NDArray[np.complex128]
     averages: float
     resolution: float
+    every: NDArray[np.complex128] | None = None
 
 
 def _channels(segment: Segment) -> NDArray[np.float64]:
@@ -82,14 +85,18 @@ def spa(segments: Sequence[Segment], M: int, frequency: NDArray[np.float64], sam
     covariance /= total
     w = _hann(M)
     window = np.concatenate([w[:0:-1], w])
+    covariance *= window[:, np.newaxis, np.newaxis]
     turn = np.exp(-1j * np.outer(frequency * sample_time, np.arange(-M, M + 1)))
-    matrices = sample_time * np.einsum("fk,k,kij->fij", turn, window, covariance)
+    matrices = sample_time * np.einsum("fk,kij->fij", turn, covariance)
+    around = np.zeros((4 * M, m, m))  # half a turn of the longest lag, from one point to the next
+    around[: M + 1], around[-M:] = covariance[M:], covariance[:M]
     width = 2.0 * np.pi / sample_time / float(np.sum(window))
     return Spectra(
         frequency=frequency,
         matrices=matrices,
         averages=max(total / float(np.sum(window**2)), 1.0),
         resolution=width,
+        every=sample_time * scipy.fft.fft(around, axis=0)[: 2 * M + 1],
     )
 
 

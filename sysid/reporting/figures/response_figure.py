@@ -110,8 +110,7 @@ def _model(
         if not response.any():  # an input that does nothing in the model
             continue
         above.loglog(unit.told(w), np.abs(response), label=fit.model.label, **look)
-        # Unwrapped between the same points as what was measured: of far points both lose the same turns.
-        phase = np.degrees(np.unwrap(np.angle(response)))
+        phase = np.degrees(view.phase(w))
         measured = np.degrees(found.phase[found.frequency > 0.0, j])
         seen = np.flatnonzero(np.isfinite(measured))[:1]
         turns = 360.0 * float(np.round((measured[seen] - phase[seen]) / 360.0).sum())
