@@ -21,6 +21,7 @@ from sysid.estimation.linear.segments import delayed_inputs, scaling_of
 from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.transfer_function_delays import DelaySearch
+from sysid.estimation.linear.transfer_function_level import integrating, standing
 from sysid.estimation.linear.transfer_function_problem import AbstractProblem, Score
 from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_search import solve
@@ -258,6 +259,22 @@ class _Problem(AbstractProblem):
         return replace(
             self, scaling=scaling, experiments=unknown, training=replace(self.training, stable=False)
         )  # fmt: skip
+
+    def levelled(self, end: End) -> _Problem | None:
+        """With inputs from the value at which the first that integrates stands; see the base class."""
+        separated = end.provider.separated(end.theta) if self.orders.intercept else None
+        j = None if separated is None else integrating(separated, self.orders.domain, self.terms.sample_time)
+        if j is None:
+            return None
+        raised = self._from(j, -1.0).provider(end.delays)
+        level = standing(end.provider, raised, end.theta, j)
+        return None if level is None or not np.isfinite(level) else self._from(j, level)
+
+    def _from(self, j: int, level: float) -> _Problem:
+        """With an input counted from another level, in scaled numbers."""
+        offset = list(self.scaling.input_offset)
+        offset[j] += level * self.scaling.input_scale[j]
+        return replace(self, scaling=replace(self.scaling, input_offset=tuple(offset)))
 
     def free_starts(self, provider: SeparableProvider) -> list[PoleStart]:
         """ARX as it is, and integrators; see the base class."""

@@ -116,6 +116,17 @@ class AbstractProblem(ABC):
         """The same problem with poles anywhere; ``None`` where that means nothing."""
         return None
 
+    def levelled(self, end: End) -> Self | None:  # noqa: ARG002 - a spectrum has no level
+        """The same problem about the input at which what integrates stands.
+
+        Args:
+            end: With its poles at 1 where they are those of integrators.
+
+        Returns:
+            It; ``None`` where nothing integrates, or that means nothing.
+        """
+        return None
+
     def free_starts(self, provider: SeparableProvider) -> list[PoleStart]:  # noqa: ARG002 - see the base class
         """Starts whose poles need not be stable.
 

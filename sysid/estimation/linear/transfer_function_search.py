@@ -21,7 +21,7 @@ from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_delays import delays_of_least_error, found_delays
 from sysid.estimation.linear.transfer_function_problem import AbstractProblem, Score
 from sysid.estimation.linear.transfer_function_runs import EXACT, Candidate, End, Watch, long_run, short_run, tried
-from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_speed, of_stability, of_starts
+from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_level, of_speed, of_stability, of_starts
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.estimation.nonparametric.dead_time import descend
 from sysid.estimation.results.result import FitResult, Loop
@@ -97,6 +97,7 @@ def solve(own: AbstractProblem, began: float, on_iteration: Callable[[Iteration]
             *(told if reached.problem is own else ()),
             *end.notes,
             *own.told(end),
+            *of_level(model),
             of_stability(model),
             *fast,
         ),
@@ -246,6 +247,7 @@ def _free_poles(
     if not np.isfinite(best.loss):
         return own, at_end
     found = replace(long_run(best, free.training, watch), notes=told)
+    free, found = _about_its_level(free, found, watch)
     # Poles may be anywhere in a plant that few samples say much of, but not for the sake of their noise: beyond
     # chance, the gain must be one that as many parameters as there are, fitted to it, could not have.
     if not at_end.worse_than(found, free=sum(own.orders.poles) + provider.n_taps):
@@ -259,6 +261,26 @@ def _free_poles(
         if not judge(free.model(found)[0]) < judge(own.model(end)[0]):
             return own, at_end
     return free, found
+
+
+def _about_its_level(free: AbstractProblem, found: End, watch: Watch) -> tuple[AbstractProblem, End]:
+    """The same with the input at which the plant stands fitted too, where it is another than zero.
+
+    Without it a pole a little off 1 makes the ramp, from a state as far away: a plant that grows, or one that settles.
+    """
+    plain = free.at_one(found)
+    level = free.levelled(plain)
+    if level is None:
+        return free, found
+    begun = tried(PoleStart(name="level", sections=plain.sections), found.delays, level.provider(found.delays))
+    if not np.isfinite(begun.loss):
+        return free, found
+    other = level.at_one(long_run(begun, free.training, watch))
+    # Each pole that leaves 1 brings a state of its own to bend a ramp by.
+    bent = int(np.count_nonzero(found.theta != plain.theta)) - 1
+    if not plain.worse_than(other) or other.worse_than(found, free=max(bent, 0)):
+        return free, found
+    return level, replace(other, notes=found.notes)
 
 
 def _chosen(

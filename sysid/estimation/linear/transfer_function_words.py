@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.linear import slow_poles
+from sysid.estimation.linear.transfer_function_level import at_edge
 from sysid.estimation.linear.transfer_function_runs import Candidate
 from sysid.models import TransferFunctionModel
 from sysid.models.converting.orthonormal_basis import Domain
+from sysid.units import in_unit
 
 AT_EDGE = (
     "The slowest pole stands at the end of its range, a time constant of five records: the plant may integrate, and "
@@ -66,6 +68,23 @@ def of_stability(model: TransferFunctionModel) -> str:
     return (
         f"The transfer function is not stable: the pole {complex(largest):.6g} lies outside; its free run grows "
         "without bound, and it is of use in a loop only."
+    )
+
+
+def of_level(model: TransferFunctionModel) -> tuple[str, ...]:
+    """At which input a plant that integrates stands, where that is another than zero.
+
+    Args:
+        model: The model.
+
+    Returns:
+        One sentence for each such input.
+    """
+    names = zip(model.mapping.inputs, model.input_units, model.scaling.input_offset, strict=True)
+    return tuple(
+        f"The output stands at {name} = {in_unit(f'{level:.6g}', unit)}; what is above or below adds up."
+        for j, (name, unit, level) in enumerate(names)
+        if level and at_edge(model.poles(j), model.orders.domain, model.sample_time).any()
     )
 
 

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UserError
+from sysid.estimation.linear.slow_poles import INTEGRATES
 from sysid.estimation.nonparametric.remembered import remembered_response
 from sysid.estimation.remarks.fitted_run import FreeRun
-from sysid.models import AbstractModel, Mapping
+from sysid.models import AbstractModel, Mapping, TransferFunctionModel
 from sysid.traces import Trace
 from sysid.units import in_unit
 
@@ -140,7 +141,7 @@ def drifts_told(model: AbstractModel, traces: Sequence[Trace], runs: Sequence[Fr
         spread = float(np.concatenate(outputs).std()) if outputs else 0.0
         slow = (model.pole_radius or 0.0) > SLOW and not getattr(model.structure, "integrated", False)
         asked = [j for j, run in enumerate(runs) if spread > 0.0 and _may_drift(run, i, spread, slow=slow)]
-        found = _drifts([traces[j] for j in asked], mapping, spread) if asked else []
+        found = _drifts([traces[j] for j in asked], mapping, spread, model) if asked else []
         if found:
             most = max(found, key=abs)
             size = in_unit(f"{abs(most):.3g}", model.ends.output_units[i])
@@ -168,7 +169,16 @@ def _may_drift(run: FreeRun, i: int, spread: float, *, slow: bool) -> bool:
     return abs(slope) > BY_LINE * SHARE * spread
 
 
-def _drifts(traces: Sequence[Trace], mapping: Mapping, spread: float) -> list[float]:
+def _added(model: AbstractModel, trace: Trace, mapping: Mapping) -> Array:
+    """What a plant adds up: its inputs; for a model with a pole at 1 from where nothing is added, and as late."""
+    inputs = trace.columns(mapping.inputs)
+    if not isinstance(model, TransferFunctionModel) or abs(model.pole_radius - 1.0) > INTEGRATES:
+        return inputs
+    late = [np.concatenate([np.full(k, u[0]), u])[: len(u)] for u, k in zip(inputs.T, model.delays, strict=True)]
+    return np.asarray(np.column_stack(late) - np.asarray(model.scaling.input_offset))
+
+
+def _drifts(traces: Sequence[Trace], mapping: Mapping, spread: float, model: AbstractModel) -> list[float]:
     """How far each record that drifts does, beside a response to its inputs that has settled."""
     try:
         response = remembered_response(traces, mapping, longest=LAGS)
@@ -181,6 +191,6 @@ def _drifts(traces: Sequence[Trace], mapping: Mapping, spread: float) -> list[fl
         left = trace[mapping.output] - response.simulate(trace.columns(mapping.inputs))
         seen = trace.usable_samples & (np.arange(len(trace)) >= response.lags[-1])
         found = trend_of(left[seen], spread)
-        if found is not None and found.at is None and sums_up(left[seen], trace.columns(mapping.inputs)[seen]) is None:
+        if found is not None and found.at is None and sums_up(left[seen], _added(model, trace, mapping)[seen]) is None:
             sizes.append(found.size)
     return sizes

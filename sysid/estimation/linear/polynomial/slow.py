@@ -153,8 +153,8 @@ def of_transfer_function(
 
     Returns:
         The problem with the bound that its poles keep, the coefficients, and their scaling: beyond the bound inputs
-        are as they are, as the offset of one adds up in an integrator, and no constant undoes it. ``None`` where there
-        is no such transfer function, or it runs away.
+        are counted from where the transfer function stands, as the offset of one adds up in an integrator. ``None``
+        where there is no such transfer function, or it runs away.
     """
     zeros = tuple(nb - 1 for nb in orders.nb)
     if any(z > n or not n for z, n in zip(zeros, orders.denominators, strict=True)) or seconds <= 0.0:
@@ -174,7 +174,7 @@ def of_transfer_function(
     largest = 1.0 - 1.0 / (SLOWEST * longest)
     problem = replace(errors, stable=model.pole_radius <= largest + ROUNDED, largest=largest)
     if not problem.stable:
-        scaling = replace(scaling, input_offset=(0.0,) * len(zeros))
+        scaling = replace(scaling, input_offset=model.scaling.input_offset)
         problem = replace(problem, segments=segments_of([one.begun_anywhere for one in experiments], scaling))
     theta = _coefficients(model, orders, scaling, problem)
     linear = [*range(sum(orders.nb)), *range(len(theta) - orders.level, len(theta))]
