@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from sysid.reporting.figures.style import PALETTE, TARGET, new_figure, styled
@@ -27,6 +28,8 @@ NAME_SIZE = np.array([62.0, 12.0])
 
 MAX_LINES = 600
 """Lines of parallel coordinates: beyond these they are one grey."""
+FEW, LAST_COLOUR = 40, 0.75
+"""Trials up to which each can be drawn large; and the share of the colour map that can be seen on white."""
 
 
 def over_trials_figure(
@@ -65,6 +68,7 @@ def over_trials_figure(
             axes.plot(at, values, linestyle="none", color=PALETTE[2], marker="D", markersize=4.5, label=label)
         _log(axes, [_value(record, trial, name) for trial in record.trials])
         axes.set_xlabel("trial")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_ylabel(record.words(name))
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.1)
         return figure
@@ -189,9 +193,10 @@ def parallel_figure(record: SweepRecord) -> Figure | None:
         axes = figure.subplots()
         paint = _colours(np.array([record.choice(trial) for trial in trials]))
         lines = np.stack([column[1] for column in columns])
+        thin = 1.4 if len(trials) <= FEW else 0.6
         for i in range(len(trials)):
             last = i == len(trials) - 1
-            axes.plot(lines[:, i], color=PALETTE[1] if last else paint[i], linewidth=2.0 if last else 0.6)
+            axes.plot(lines[:, i], color=PALETTE[1] if last else paint[i], linewidth=2.2 if last else thin)
         for number, (_, _, texts, places) in enumerate(columns):
             axes.axvline(number, color=TARGET, linewidth=0.8)
             for text, place in zip(texts, places, strict=True):
@@ -211,12 +216,14 @@ def _value(record: SweepRecord, trial: Trial, name: str) -> float:
 
 def _dots(axes: Axes, record: SweepRecord, trials: Sequence[Trial], name: str, **style: Any) -> None:
     values = [_value(record, trial, name) for trial in trials]
-    axes.plot([trial.number for trial in trials], values, **{"linestyle": "none", "markersize": 3.0, **style})
+    look = {"linestyle": "none", "markersize": 7.0 if len(record.trials) <= FEW else 3.0, **style}
+    axes.plot([trial.number for trial in trials], values, **look)
 
 
 def _pairs(axes: Axes, record: SweepRecord, trials: Sequence[Trial], names: tuple[str, str], **style: Any) -> None:
     x, y = ([_value(record, trial, name) for trial in trials] for name in names)
-    axes.plot(x, y, **{"linestyle": "none", "markersize": 4.0, "linewidth": 1.0, **style})
+    size = 7.0 if len(record.trials) <= FEW else 4.0
+    axes.plot(x, y, **{"linestyle": "none", "markersize": size, "linewidth": 1.0, **style})
 
 
 def _log(axes: Axes, values: Sequence[float]) -> None:
@@ -286,4 +293,5 @@ def _colours(values: NDArray[np.float64]) -> list[tuple[float, float, float, flo
     import matplotlib as mpl
 
     order = np.argsort(np.argsort(values)) / max(1, len(values) - 1)
-    return [tuple(colour) for colour in mpl.colormaps[COLOURS](order, alpha=0.5)]
+    # The far end of the map is a yellow that nobody sees on white.
+    return [tuple(colour) for colour in mpl.colormaps[COLOURS](LAST_COLOUR * order, alpha=0.6)]

@@ -171,6 +171,17 @@ def test_maps_are_over_the_two_longest_ranges() -> None:
     assert heat_maps(record(trials=[trial(n, 1, n) for n in range(1, 7)]), "free_run_mse") is None
 
 
+def test_a_few_trials_are_counted_in_whole_numbers_and_drawn_so_that_they_are_seen() -> None:
+    few = record(trials=[trial(n, 1, n) for n in range(1, 4)], winner=1, beside=[])
+    axes = over_trials_figure(few, "run_time", title="t").axes[0]
+    assert all(float(tick).is_integer() for tick in axes.get_xticks())
+    assert axes.lines[0].get_markersize() > 6.0
+    parallel = parallel_figure(few)
+    assert parallel is not None
+    colours = [line.get_color() for line in parallel.axes[0].lines]
+    assert max(sum(one[:3]) for one in colours if not isinstance(one, str)) < 2.0, "no pale yellow on white"
+
+
 @pytest.mark.parametrize(
     "draw", [pareto_figure, parallel_figure, lambda r: over_trials_figure(r, "run_time", title="t")]
 )
