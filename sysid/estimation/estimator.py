@@ -67,7 +67,8 @@ class Estimator:
         joins: Whether its models can be members of a whole that are trained together.
         of_residuals: What a reader of its residuals should know; empty for nothing.
         starts: Starts of a network's fit that asks for none.
-        unites: Whether an ensemble is of starts that are trained to their end.
+        unites: Whether several starts can be one model, each of them trained to its end.
+        twice: Whether a short record is fitted a second time, cautiously.
         each: Whether a sample counts for one output where another lacks it; else it counts for none.
     """
 
@@ -85,6 +86,7 @@ class Estimator:
     of_residuals: str = ""
     starts: int = 1
     unites: bool = False
+    twice: bool = False
     each: bool = False
 
     @cached_property

@@ -96,6 +96,8 @@ ESTIMATORS: dict[str, Estimator] = {
                 check_training=partial(check_lagged, name),
                 initial=check_initial,
                 joins=structure is NARX,
+                unites=True,
+                twice=True,
             )
             for structure, name in ((NARX, "a NARX network"), (VectorNARX, "a NARX network of several outputs"))
         ),

@@ -121,6 +121,10 @@ class AttemptRecord(Record):
     selection_mse: Number = Field(description="Geometric mean over the selection traces.")
     log_evidence: Number = Field(description="Null where none was computed.")
     effective_parameters: Number = Field(description="Parameters that the data determine.")
+    away: Number = Field(
+        default=math.nan,
+        description="Distance from the middle of all starts on the inputs backwards, over half of the output's range.",
+    )
     stable: bool | None = Field(default=None, description="What the check of its free run said, where it was asked.")
     chosen: bool = Field(default=False, description="Whether it is the result.")
     members: list[int] = Field(default=[], description="Of an ensemble, the starts that it unites, once for each pick.")

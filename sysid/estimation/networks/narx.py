@@ -16,7 +16,7 @@ from sysid.estimation.clock import now
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.least_squares.checkpoints import checkpoints_of
 from sysid.estimation.linear.arx import rests_of
-from sysid.estimation.networks import ensemble
+from sysid.estimation.networks import ensemble, middle
 from sysid.estimation.networks.basis import RegressorBasis
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.input_subsets import PartLayout, embedding, part_of, views
@@ -31,8 +31,9 @@ from sysid.estimation.networks.starts.choosing import Choice, choose
 from sysid.estimation.networks.starts.output_weights import reweighted
 from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
+from sysid.estimation.networks.starts.united import ends_of
 from sysid.estimation.networks.template import held_told, layout_of, template_of
-from sysid.estimation.networks.training import FitProgress, Training
+from sysid.estimation.networks.training import FitProgress, Training, check_members
 from sysid.estimation.networks.warm_start import check_initial, grown
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.records.experiment import Experiment, experiments_of
@@ -90,7 +91,9 @@ def fit_narx(
     """
     began = now()
     training, start = training or Training(), start or Start()
-    ensemble.check(training, selection)
+    training, elected = training.with_starts(1), training.choose_by == "selection" and bool(selection)
+    if not elected:
+        check_members(training)
     lags = Layout.of(network, len(mapping.inputs), len(mapping.outputs)).columns
     rests = rests_of(traces, mapping, rest_output)
     rest = np.array(rests) if network.several_outputs else rests[0]
@@ -116,14 +119,19 @@ def fit_narx(
         prepared=_prepared(training, task, seen),
         until=starts.deadline(began, training, on_progress),
         again=True,
+        # Selection traces elect among all looks at all starts; where there are none, members are starts at their ends.
+        least=1 if elected else training.ensemble,
     )
+    multistart = middle.compared(multistart)
     tasks = _started(multistart, task, seen)
     # A cautious fit is made anew, so that a fit that goes on ends where one in a single run would.
     raced = [one for one in tasks if not one.cautious]
     on_checkpoint(Checkpoint.of(choose(raced, training.choose_by).chosen.solution.state))
     tasks |= _by_noise(multistart, tasks)
-    tasks |= _with_ensemble(multistart, list(tasks), experiments, vet)
-    choice, tasks = _chosen(multistart, windows, tasks, vet)
+    becomes = middle.placed(multistart, list(tasks), experiments)
+    tasks = {becomes[one]: task for one, task in tasks.items()}
+    whole = _ensemble_of(multistart, list(tasks), experiments, vet)
+    choice, tasks = _chosen(multistart, windows, tasks, vet, whole)
     chosen = choice.chosen
     runs: list[tuple[NDArray[np.float64], History | None]] = [(e.inputs, e.history) for e in experiments]
     runs += [(t.columns(mapping.inputs), None) for t in selection]
@@ -136,7 +144,8 @@ def fit_narx(
     fit = with_note(multistart_result(choice, list(tasks), training, status, seconds, left=left), windows)
     held = held_told(template)
     twice = cautious.told(choice, list(tasks), tasks[chosen].provider.n_samples)
-    return replace(fit, posterior=posterior, notes=(*fit.notes, *twice, *held))
+    made = () if whole is None else whole[0].notes(choice)
+    return replace(fit, posterior=posterior, notes=(*fit.notes, *twice, *made, *held))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -180,9 +189,15 @@ def _chosen(
     windows: Windows,
     tasks: dict[starts.Candidate, _Task],
     vet: Callable[[starts.Network], bool] | None,
+    whole: tuple[ensemble.United, _Task] | None,
 ) -> tuple[Choice, dict[starts.Candidate, _Task]]:
     """The choice, trained on over whole records, and with the evidence where it was looked at before that spoke."""
-    choice = choose(list(tasks), multistart.training.choose_by, vet)
+    by = multistart.training.choose_by
+    if whole is None:
+        choice = choose(list(tasks), by, vet)
+    else:
+        choice = whole[0].choice(list(tasks), by, vet)
+        tasks = tasks | {whole[0].candidate: whole[1]}
     before = after = choice.chosen
     if windows.samples:
         choice = _over_all(multistart, windows, choice, tasks[before])
@@ -250,31 +265,35 @@ def _started(
 
 
 def _by_noise(multistart: starts.Multistart, tasks: Dict[starts.Candidate, _Task]) -> dict[starts.Candidate, _Task]:
-    """The best candidate of several outputs, trained on with each over what is left of it; none of one output."""
-    best = choose(list(tasks), multistart.training.choose_by).chosen
-    task = tasks[best]
-    found = reweighted(replace(multistart, to_plain=task.to_plain), task.provider, best)
-    return {one: replace(task, provider=provider) for one, provider in found}
+    """The best start of several outputs, or all that came to their end, trained on with each over what is left."""
+    found, by = dict[starts.Candidate, _Task](), multistart.training.choose_by
+    for one in [choose(list(tasks), by).chosen] if multistart.least == 1 else ends_of(list(tasks), by):
+        own = replace(multistart, to_plain=tasks[one].to_plain)
+        found |= {
+            again: replace(tasks[one], provider=provider)
+            for again, provider in reweighted(own, tasks[one].provider, one)
+        }
+    return found
 
 
-def _with_ensemble(
+def _ensemble_of(
     multistart: starts.Multistart,
     candidates: Sequence[starts.Candidate],
     experiments: Sequence[Experiment],
     vet: Callable[[starts.Network], bool] | None,
-) -> dict[starts.Candidate, _Task]:
-    """The ensemble as one more candidate, with its task; none where no second pick helps, or nobody waits for it."""
+) -> tuple[ensemble.United, _Task] | None:
+    """The ensemble, with its task; none where no second pick helps, or nobody waits for it."""
     if multistart.training.ensemble == 1 or multistart.stop.is_set():
-        return {}
+        return None
     try:
-        found = ensemble.selected(multistart, candidates, vet)
+        members = ensemble.members_of(multistart, candidates, experiments, vet)
     except KeyboardInterrupt:  # the starts are there, and the best of them stands
         multistart.stop.set()
-        return {}
-    if found is None:
-        return {}
-    task = _Task.of(found[0].model, experiments, multistart.training)
-    return {ensemble.as_candidate(multistart, *found, task): task}
+        return None
+    if members is None:
+        return None
+    task = _Task.of(members.model, experiments, multistart.training)
+    return ensemble.as_start(multistart, members, task), task
 
 
 def _pretraining(training: Training, task: _Task, experiments: Sequence[Experiment]) -> StepSamples | None:

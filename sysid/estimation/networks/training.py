@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -101,10 +102,11 @@ class Training(TypedFields):
         stable: Whether the linear part of a neural state space has to die away without its neurons: where these are
             bounded nothing runs away then, whatever drives it. By default where starts are raced on thinned records,
             as of structures that swing; elsewhere the check of the free run tells (``StabilityOptions``).
-        ensemble: Picks that unite candidates of the multistart into one network whose one-step map is the mean of
-            theirs (``ensemble.py``), selected on the selection traces; 1 for none. Each member adds its neurons. Of
-            hidden states so many starts at most as one model whose free run is the mean of theirs
-            (``neural_ensemble.py``); each adds its states.
+        ensemble: So many starts at most as one model; 1 for none. Of a NARX its map one step ahead is the mean of
+            theirs (``ensemble.py``), and each adds its neurons; of hidden states its free run is
+            (``neural/ensemble.py``), and each adds its states. Selection traces elect the members, of a NARX also the
+            same start at an earlier look, or twice; without them the best starts count alike, less those that stand
+            alone (``starts/united.py``).
         input_subsets: Sets of inputs, such as ``[[ER]]``: the starts are shared out between networks over all inputs
             and networks that do without each of the sets (``input_subsets.py``), for an ensemble whose members differ
             in what they rely on. All see everything by default.
@@ -197,7 +199,7 @@ class Training(TypedFields):
         return self.starts or 1
 
     def with_starts(self, n: int) -> Training:
-        """The same training, with so many starts where none are asked for.
+        """The same training, with so many starts where none are asked for, and some to spare for an ensemble.
 
         Args:
             n: Starts that the structure needs.
@@ -205,7 +207,8 @@ class Training(TypedFields):
         Returns:
             The training.
         """
-        return self if self.starts is not None else replace(self, starts=n)
+        spare = math.ceil(SPARE * self.ensemble) if self.ensemble > 1 else 0
+        return self if self.starts is not None else replace(self, starts=max(n, spare))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,6 +236,8 @@ class FitProgress:
     fraction: float
 
 
+SPARE = 1.5
+"""Starts of a fit that asks for none, for each member of an ensemble: not all will be among them."""
 LAGGED_ONLY = ("basis", "offsets", "pretraining", "stride", "ensemble", "input_subsets")
 """Options of a training that concern lagged regressors."""
 
@@ -260,12 +265,31 @@ def check_lagged(name: str, training: Training) -> None:
         ConfigError: If it says how to shoot, or asks for an ensemble of a single start.
     """
     _check_shooting(name, training)
-    if training.ensemble > 1 and training.n_starts < 2:
+    if training.ensemble > 1 and training.starts == 1:
         raise ConfigError(
             "an ensemble of a single start is that start", where="ensemble", expected="starts of 2 or more beside it",
             got=f"ensemble {training.ensemble} of {training.n_starts} start",
             remedy=f"write starts: {2 * training.ensemble}, or leave ensemble out",
         )  # fmt: skip
+
+
+def check_members(training: Training) -> None:
+    """Refuse an ensemble of more members than there are starts, where each start is one member at most.
+
+    Args:
+        training: How to train.
+
+    Raises:
+        ConfigError: If it asks for one.
+    """
+    if training.starts is not None and training.starts < training.ensemble:
+        raise ConfigError(
+            "an ensemble has more members than there are starts",
+            where="ensemble",
+            expected=f"at most starts: {training.starts}",
+            got=training.ensemble,
+            remedy="raise starts, or leave it out for as many as are needed",
+        )
 
 
 def check_hidden_states(name: str, training: Training, *, unites: bool = False, shoots: bool = False) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping as Dict
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -20,6 +21,8 @@ class Attempt:
         selection_mse: Geometric mean over the selection traces; NaN without any.
         log_evidence: Minus infinity where none was computed.
         effective_parameters: Parameters that the data determine; NaN where the evidence was not computed.
+        away: How far it is from the middle of all starts on the records' inputs backwards, in scaled numbers; NaN where
+            that was not asked.
         stable: Whether its free run passed the check over random sequences, and what else was asked of it; ``None``
             where nobody asked.
         chosen: Whether it is the result.
@@ -37,6 +40,7 @@ class Attempt:
     selection_mse: float
     log_evidence: float
     effective_parameters: float
+    away: float = math.nan
     stable: bool | None = None
     chosen: bool = False
     members: tuple[int, ...] = ()
@@ -60,5 +64,7 @@ class Attempt:
         """
         numbers = ("estimation_mse", "selection_mse", "log_evidence", "effective_parameters")
         read = {name: float("nan" if fields[name] is None else fields[name]) for name in numbers}
+        away = fields.get("away")  # not there before starts were compared
+        read["away"] = math.nan if away is None else float(away)
         lists = {name: tuple(fields.get(name, ())) for name in ("members", "without")}
         return cls(**{**fields, **read, **lists})

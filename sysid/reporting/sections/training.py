@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -180,10 +181,15 @@ def attempts_table(fit: FitRecord) -> Table:
     Returns:
         The table.
     """
-    last = list({attempt.start: attempt for attempt in sorted(fit.attempts, key=lambda a: a.iterations)}.values())
-    shown = {(a.start, a.iterations): a for a in [*last, *(a for a in fit.attempts if a.chosen)]}.values()
-    ranked = sorted(shown, key=lambda a: (np.isnan(a.selection_mse), a.selection_mse, -a.log_evidence))
-    rows = tuple(_attempt_row(attempt) for attempt in ranked[:ROWS])
+    by_iterations = sorted(fit.attempts, key=lambda a: a.iterations)
+    last = {(a.start, a.cautious): a for a in by_iterations}.values()
+    shown = {(a.start, a.cautious, a.iterations): a for a in [*last, *(a for a in fit.attempts if a.chosen)]}.values()
+    compared = any(np.isfinite(a.away) for a in shown)
+    ranked = sorted(
+        shown,
+        key=lambda a: (_or_last(a.selection_mse), not a.members, _or_last(a.away), _or_last(-a.log_evidence)),
+    )
+    rows = tuple(_attempt_row(attempt, compared) for attempt in ranked[:ROWS])
     return Table(
         caption=f"{fit.name}: every start where its training ended, and the one that was chosen.",
         head=(
@@ -193,6 +199,7 @@ def attempts_table(fit: FitRecord) -> Table:
             ("selection mse", f"{error_unit(fit)}, geometric mean"),
             ("log evidence", ""),
             ("effective parameters", ""),
+            *((("from the middle", "of half the range, backwards"),) if compared else ()),
             ("free run", ""),
         ),
         rows=rows,
@@ -200,7 +207,12 @@ def attempts_table(fit: FitRecord) -> Table:
     )
 
 
-def _attempt_row(attempt: AttemptRecord) -> tuple[Cell, ...]:
+def _or_last(value: float) -> float:
+    """A figure to sort by; what has none comes last."""
+    return math.inf if math.isnan(value) else value
+
+
+def _attempt_row(attempt: AttemptRecord, compared: bool) -> tuple[Cell, ...]:
     name, origin = f"{attempt.start}", "from the initial fit" if attempt.seed is None else f"seed {attempt.seed}"
     if attempt.without:
         origin += f", without {' and '.join(attempt.without)}"
@@ -216,6 +228,7 @@ def _attempt_row(attempt: AttemptRecord) -> tuple[Cell, ...]:
         figure_cell(attempt.selection_mse, missing="none"),
         figure_cell(attempt.log_evidence, missing="none", digits=6),
         figure_cell(attempt.effective_parameters, missing="none"),
+        *((figure_cell(attempt.away, missing="none"),) if compared else ()),
         Cell(text=words),
     )
 

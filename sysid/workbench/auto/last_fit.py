@@ -9,6 +9,7 @@ from typing import Any
 
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
+from sysid.estimation.networks.starts.multistart import is_short
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.beyond import Beyond
@@ -88,10 +89,11 @@ class LastFit:
             return slowed * trial.cpu_s * more / len(self.parts.folds)
         if estimator_of(structure).training is not Training:
             return math.nan
-        point = plan.points[trial.number]
+        point, samples = plan.points[trial.number], sum(map(len, self.data.estimation))
+        fits = 2 if estimator_of(structure).twice and is_short(samples, trial.parameters) else 1
         models = 1 if structure.for_outputs(self._n_outputs).several_outputs else self._n_outputs
         longer = replace(point, training={**point.training, **way})
-        return slowed * trial.iteration_s * price(longer) * more * models
+        return slowed * trial.iteration_s * price(longer) * fits * more * models
 
     def kept(self, plan: Plan) -> float:
         """Share of the time that is kept for it: no more than those of the best take, and as much again.

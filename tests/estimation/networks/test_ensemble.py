@@ -1,6 +1,5 @@
 """Ensembles: one network that is the mean of several, selected where a pick helps."""
 
-from collections import Counter
 from dataclasses import replace
 from functools import partial
 
@@ -11,12 +10,14 @@ from hypothesis import strategies as st
 
 from sysid.errors import ConfigError
 from sysid.estimation import Loop, Status, Training, fit_narx
-from sysid.estimation.networks.ensemble import ELIGIBLE, WORTH, elect, united
-from sysid.models import NARX, Mapping, NARXModel, Scaling
+from sysid.estimation.networks.ensemble import united
+from sysid.estimation.networks.starts.election import WORTH
+from sysid.models import NARX, Mapping, NARXModel, Scaling, VectorNARX
 from sysid.models.lagged.recursion import parameter_count
 from sysid.validation import predict_interval
 from tests.estimation.tank import TANK
 from tests.estimation.tank import tank as record
+from tests.traces.made import trace_of
 
 MAPPING = Mapping(inputs=("u", "w"), output="y")
 NETWORKS = {
@@ -63,97 +64,6 @@ def test_a_network_united_with_itself_runs_as_it_does_alone():
     inputs = np.random.default_rng(0).uniform(0.0, 2.0, (200, 2))
     np.testing.assert_allclose(united([alone, alone], [1, 2]).simulate(inputs), alone.simulate(inputs), atol=1e-12)
     assert united([alone], [7]) is alone
-
-
-def linear(level: float) -> NARXModel:
-    """A network that says the same whatever it is asked."""
-    network = NETWORKS["plain"]
-    theta = np.zeros(parameter_count(network.lags(2), network.neurons, linear=True))
-    theta[network.neurons * (network.lags(2).n_regressors + 2)] = level
-    return replace(member(network, 0), theta=theta)
-
-
-def distance(target: float):
-    return lambda model: abs(float(model.recursion.constant) - target) + 1e-6
-
-
-def test_picks_go_to_whoever_helps_most_and_more_than_once_if_need_be():
-    models = [linear(0.0), linear(4.0), linear(9.0)]
-    score = distance(4.0 / 3.0)  # (0 + 0 + 4) / 3
-    ensemble = elect(models, [score(m) for m in models], score, unite=united, picks=4)
-    assert Counter(ensemble.picks) == Counter({0: 2, 1: 1})
-    assert ensemble.score == pytest.approx(score(ensemble.model))
-    assert ensemble.score < min(score(m) for m in models)
-
-
-def test_no_pick_is_cast_that_brings_too_little():
-    models = [linear(0.0), linear(0.01)]
-    score = distance(0.5)
-    ensemble = elect(models, [score(m) for m in models], score, unite=united, picks=6)
-    assert ensemble.score > (1.0 - WORTH) * score(models[1])
-    assert ensemble.picks == {1: 1}
-
-
-def test_no_more_picks_are_cast_than_there_are():
-    models = [linear(0.0), linear(1.0)]
-    score = distance(np.pi / 6.0)
-    seen = []
-    ensemble = elect(models, [score(m) for m in models], score, unite=united, picks=3, on_pick=seen.append)
-    assert sum(ensemble.picks.values()) <= 3
-    assert seen == list(range(1, 1 + len(seen)))
-
-
-def test_whoever_makes_it_unstable_is_passed_over_with_all_of_his_start():
-    models = [linear(0.0), linear(4.0), linear(4.2), linear(3.0)]
-    score = distance(2.0)
-    seen = []
-
-    def accept(model):
-        seen.append(float(model.recursion.constant))
-        return seen[-1] not in {2.0, 2.1}  # with either of the second start
-
-    ensemble = elect(models, [1.0, 2.0, 2.0, 3.0], score, unite=united, picks=2, origins=[0, 1, 1, 2], accept=accept)
-    assert ensemble.picks == {0: 1, 3: 1}
-    assert 2.1 not in seen  # one refusal is enough
-    assert elect(models, [1.0, 2.0, 2.0, 3.0], score, unite=united, picks=2, accept=lambda _: False) is None
-
-
-def test_a_ensemble_that_passes_is_checked_once():
-    models, asked = [linear(0.0), linear(4.0), linear(9.0)], []
-    score = distance(4.0 / 3.0)
-
-    def accept(model):
-        asked.append(model)
-        return True
-
-    ensemble = elect(models, [score(m) for m in models], score, unite=united, picks=3, accept=accept)
-    assert sum(ensemble.picks.values()) == 3
-    assert asked == [ensemble.model]
-
-
-def test_the_network_that_was_accepted_is_the_one_that_comes_back():
-    models, accepted = [linear(0.0), linear(4.0)], []
-    score = distance(2.0)
-    ensemble = elect(
-        models, [1.0, 2.0], score, unite=united, picks=2, accept=lambda model: accepted.append(model) is None
-    )
-    assert ensemble.picks == {0: 1, 1: 1}
-    assert ensemble.model is accepted[-1]
-
-
-def test_whoever_diverged_or_is_far_behind_is_not_eligible():
-    models = [linear(100.0), *(linear(-float(k)) for k in range(1, ELIGIBLE + 2))]
-    scores = [np.nan, *(float(k) for k in range(1, ELIGIBLE + 2))]
-    asked = []
-
-    def score(model):
-        asked.append(model.recursion.constant)
-        return 1.0
-
-    elect(models, scores, score, unite=united, picks=2, workers=2)
-    assert len(asked) == ELIGIBLE
-    assert min(asked) > -(ELIGIBLE + 1)
-    assert max(asked) < 0.0
 
 
 @pytest.fixture(scope="module")
@@ -218,11 +128,76 @@ def test_a_fixed_regularisation_leaves_a_ensemble_without_evidence():
     assert (fit.evidence, fit.posterior) == (None, None)
 
 
-@pytest.mark.parametrize("fields", [{}, {"choose_by": "evidence"}], ids=["nothing to choose by", "by the evidence"])
-def test_a_ensemble_needs_traces_that_elect_it(fields):
-    selection = [tank(2)] if fields else []
-    with pytest.raises(ConfigError, match="nothing can choose the members of an ensemble"):
-        fit_narx([tank(1)], TANK, SMALL, Training(ensemble=2, **fields), selection=selection)
+@pytest.fixture(scope="module")
+def unelected():
+    return fit_narx([tank(9)], TANK, PLAIN, Training(max_iterations=60, ensemble=4, workers=1))
+
+
+def test_without_selection_traces_the_starts_that_stand_together_are_united_alike(unelected):
+    (whole,) = (attempt for attempt in unelected.attempts if attempt.members)
+    assert whole.chosen
+    assert len(set(whole.members)) == len(whole.members) >= 2
+    assert unelected.model.network.neurons == len(whole.members) * PLAIN.neurons
+    assert {attempt.start for attempt in unelected.attempts if not attempt.members} == set(range(1, 7))  # two to spare
+    (told,) = (note for note in unelected.notes if "An ensemble: the mean of" in note)
+    assert f"{len(whole.members)} times the neurons of one" in told
+    inputs, output = tank(3).columns(["pump"]), tank(3)["level"]
+    assert np.sqrt(np.mean((unelected.model.simulate(inputs) - output) ** 2)) < 0.1 * np.std(output)
+
+
+def test_every_start_that_it_may_unite_is_trained_to_its_end(unelected):
+    ends = {}
+    for attempt in unelected.attempts:
+        if not attempt.members and not attempt.cautious:
+            ends[attempt.start] = (attempt.status, attempt.iterations)
+    assert sum(status == "CONVERGED" or iterations == 60 for status, iterations in ends.values()) >= 4
+
+
+def test_the_same_ensemble_is_united_again_whatever_the_number_of_workers(unelected):
+    again = fit_narx([tank(9)], TANK, PLAIN, Training(max_iterations=60, ensemble=4, workers=2))
+    np.testing.assert_array_equal(again.model.theta, unelected.model.theta)
+
+
+def test_by_the_evidence_it_is_united_beside_selection_traces_too():
+    training = Training(max_iterations=15, starts=3, ensemble=3, choose_by="evidence")
+    fit = fit_narx([tank(1)], TANK, SMALL, training, selection=[tank(2)])
+    (whole,) = (attempt for attempt in fit.attempts if attempt.members)
+    assert whole.chosen
+    assert len(set(whole.members)) == len(whole.members)
+
+
+def test_a_start_that_runs_away_by_itself_is_no_member():
+    refused = []
+
+    def vet(model) -> bool:
+        refused.append(model) if not refused else None
+        return model is not refused[0]
+
+    training = Training(max_iterations=15, starts=4, ensemble=3)
+    fit = fit_narx([tank(1)], TANK, SMALL, training, vet=vet)
+    (whole,) = (attempt for attempt in fit.attempts if attempt.members)
+    (told,) = (note for note in fit.notes if "An ensemble: the mean of" in note)
+    assert "as their own free run" in told
+    assert len(whole.members) < 4
+
+
+def test_more_members_than_starts_are_refused_where_nobody_is_elected_twice():
+    with pytest.raises(ConfigError, match="more members than there are starts"):
+        fit_narx([tank(1)], TANK, SMALL, Training(starts=2, ensemble=3))
+
+
+def test_of_several_outputs_there_is_one_too():
+    rng = np.random.default_rng(2)
+    u, y, z = np.repeat(rng.uniform(-1.0, 1.0, 60), 10), np.zeros(600), np.zeros(600)
+    for k in range(1, 600):
+        y[k] = 0.8 * y[k - 1] + 0.2 * np.tanh(2.0 * u[k - 1]) + 0.05 * z[k - 1]
+        z[k] = 0.9 * z[k - 1] + 0.1 * y[k - 1]
+    trace = trace_of({"u": u, "y": y, "z": z})
+    network = VectorNARX(input_delays=1, output_delays=1, neurons=3)
+    fit = fit_narx([trace], Mapping.parse("u -> y+z"), network, Training(max_iterations=30, ensemble=3))
+    (whole,) = (attempt for attempt in fit.attempts if attempt.members)
+    assert fit.model.network.neurons == 3 * len(whole.members)
+    assert np.abs(fit.model.simulate(trace.columns(["u"])) - trace.columns(["y", "z"])).max() < 0.2
 
 
 def test_one_step_ahead_a_ensemble_is_scored_one_step_ahead():

@@ -1,15 +1,12 @@
 """Ensembles of neural state spaces: who sits in them, what they compute, and how well they say they know."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
 from sysid.estimation import Training, fit_neural_state_space
-from sysid.estimation.networks.neural import ensemble as neural_ensemble
-from sysid.estimation.networks.neural.ensemble import ALONE, BEHIND, Member, _together
 from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import Loop
@@ -162,29 +159,6 @@ def test_of_several_outputs_there_is_one_too():
     assert len(runs) > 1
     np.testing.assert_allclose(fit.model.simulate(u), np.mean(runs, axis=0), atol=1e-12)
     assert fit.posterior is None or fit.posterior.factor.shape[0] == fit.model.n_parameters
-
-
-def member(number: int, level: float, backwards: float) -> Member:
-    candidate = SimpleNamespace(number=number)
-    return Member(candidate=candidate, signs=np.ones(1), runs=(np.array([[level], [backwards]]),))
-
-
-def test_who_stands_alone_or_far_behind_is_left_out():
-    provider = SimpleNamespace(loss_of=lambda runs: float(runs[0][0, 0]) ** 2)
-    some = [
-        member(0, 1.0, 0.0), member(1, 1.0, 1.0), member(2, 1.0, -1.0), member(3, 1.0, -1.1 * ALONE),
-        member(4, 1.01 * BEHIND, 0.0), member(5, 0.99 * BEHIND, 0.9 * ALONE),
-    ]  # fmt: skip
-    kept, left = _together(provider, some)
-    assert [one.candidate.number for one in kept] == [0, 1, 2, 5]
-    assert [one.candidate.number for one in left] == [3, 4]
-
-
-def test_of_two_nobody_stands_alone():
-    provider = SimpleNamespace(loss_of=lambda _: 1.0)
-    kept, left = _together(provider, [member(0, 1.0, 0.0), member(1, 1.0, 100.0)])
-    assert (len(kept), left) == (2, [])
-    assert neural_ensemble.FEWEST > 2
 
 
 def test_more_members_than_starts_are_refused():

@@ -5,17 +5,12 @@ coordinates, so that no parameter can be averaged; their outputs can:
 
 .. math:: \bar y(t) = \sum_m \tfrac{n_m}{n} y_m(t), \qquad n = \sum_m n_m.
 
-The error of the mean is never above the mean of the errors (its square; Krogh and Vedelsby 1995, "Neural network
-ensembles, cross validation, and active learning": by as much as the members differ). With the members' states side by
+With the members' states side by
 side it is one neural state space (:class:`~sysid.models.NeuralEnsemble`), which is exported, checked and timed as any.
 Where a sensor takes the absolute value, members are averaged before it: each is turned so that it has the sign of the
 best. What an absolute value hides is then hidden once.
 
-Who sits in it is found by what chooses between starts. Selection traces elect as for networks over lagged samples
-(``ensemble.py``), from the starts as they were at every look. Where the evidence chooses, the best starts at their ends
-count alike, without those who stand alone: the members are run on over the records' inputs *backwards*, which nobody
-measured, and whoever is there :data:`ALONE` times as far from the median of all as they are in the median is left out.
-So is who leaves :data:`BEHIND` times the error of the best on the records themselves.
+Who sits in it, by selection traces or by who stands alone, is found as for every structure (``starts/united.py``).
 
 The posterior is that of the mixture: the mean of the members' own, and their spread. To scale one member's output up
 and all others' down moves the whole by what lies between them, so that the spread is a direction of the parameters.
@@ -32,26 +27,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.least_squares.state import Iteration, Solution
-from sysid.estimation.networks.ensemble import elect
 from sysid.estimation.networks.neural.provider import NeuralProvider
 from sysid.estimation.networks.posterior import Posterior, laplace
 from sysid.estimation.networks.starts import multistart as starts
 from sysid.estimation.networks.starts.advancing import judged
-from sysid.estimation.networks.starts.choosing import Choice, choose, rank, refusal
+from sysid.estimation.networks.starts.choosing import rank
+from sysid.estimation.networks.starts.election import elect
+from sysid.estimation.networks.starts.united import BEHIND, AbstractUnited, elects, ends_of, stable_of, stand_together
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import NeuralEnsemble, NeuralStateSpaceModel, VectorNeuralStateSpaceModel, beginning
 from sysid.models.networks.neural_sizes import Sizes
 from sysid.traces import Trace
-
-ALONE = 1.5
-"""Times the median distance from the median of all members beyond which one stands alone. On three simulated plants
-with 3 % of noise, two structures and three seeds each, the mean of eight starts less these has 13 % less error on
-unseen records than the best start by the evidence (geometric mean); 1.2 and 2 do nearly as well, 3 has 3 % less, all
-eight have 20 % more."""
-FEWEST = 3
-"""Members without which there is no median to stand apart from."""
-BEHIND = 2.0
-"""Times the least error on the records, as a root of a mean square, beyond which a start is left out."""
 
 Runs = tuple[NDArray[np.float64], ...]
 """Outputs in scaled numbers, one array of shape ``(n_samples, n_outputs)`` a record."""
@@ -80,65 +66,20 @@ class Member:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class United:
-    """The ensemble as one more candidate of its multistart.
+class United(AbstractUnited):
+    """The ensemble of neural state spaces; see the base class.
 
     Args:
-        candidate: It.
         members: Whom it unites, the first pick first.
-        left_out: Starts that stand alone, or far behind.
-        unstable: Starts that were refused, as a rule as their own free run is not stable.
-        elected: Whether selection traces found it, and tell what it is worth; it is asked for, and taken, elsewhere.
     """
 
-    candidate: starts.Candidate
     members: tuple[Member, ...]
-    left_out: tuple[int, ...]
-    unstable: tuple[int, ...]
-    elected: bool
 
-    def choice(
-        self, candidates: Sequence[starts.Candidate], by: str, vet: Callable[[starts.Network], bool] | None
-    ) -> Choice:
-        """The choice between it and all starts.
-
-        Args:
-            candidates: All starts, at every look.
-            by: As for :func:`~sysid.estimation.networks.starts.choosing.rank`.
-            vet: Whether a model's free run is stable; an ensemble must be.
-
-        Returns:
-            The choice.
-        """
-        everyone = (*candidates, self.candidate)
-        if self.elected:
-            return choose(everyone, by, vet)
-        stable = None if vet is None else vet(self.candidate.model)
-        if stable is False:
-            found = choose(candidates, by, vet)
-            return replace(found, stable=(*found.stable, False))
-        looked = (*(None for _ in candidates), stable)
-        return Choice(chosen=self.candidate, stable=looked, by=by, refusal=refusal(vet))
-
-    def notes(self, choice: Choice) -> tuple[str, ...]:
-        """What is said of it.
-
-        Args:
-            choice: What was chosen in the end.
-
-        Returns:
-            Sentences.
-        """
+    @property
+    def made(self) -> str:
+        """See the base class."""
         n = len(self.members)
-        if choice.chosen is not self.candidate:
-            why = (
-                choice.refusal.replace("their", "its") if choice.stable[-1] is False else "a single start does as well"
-            )
-            return (f"The ensemble of {n} starts was not taken: {why}.",)
-        price = f"it has {n} times the states and parameters of one"
-        left = _left_out("they stand alone or far behind", self.left_out)
-        left += _left_out(choice.refusal.replace("their", "their own"), self.unstable)
-        return (f"An ensemble: the mean of {n} free runs as one model; {price}.{left}",)
+        return f"the mean of {n} free runs as one model; it has {n} times the states and parameters of one"
 
     def posterior(self, runs: Sequence[Experiment], unread: NDArray[np.int64]) -> Posterior | None:
         """The posterior of the mixture, not calibrated.
@@ -186,13 +127,10 @@ def united(
     Returns:
         It; ``None`` where fewer than two remain, or no second pick helps.
     """
-    by, most = multistart.training.choose_by, multistart.training.ensemble
-    usable = sorted((c for c in candidates if c.solution.status.usable), key=lambda c: rank(c, by))
-    elected = by == "selection" and bool(multistart.selection)
-    if not elected:
-        ends = {c.number: c for c in sorted(usable, key=lambda c: c.solution.state.iteration)}
-        usable = [c for c in usable if ends[c.number] is c]
-    usable, unstable = _stable(usable, None if elected else vet, len(usable) if elected else most)
+    by, most, elected = multistart.training.choose_by, multistart.training.ensemble, elects(multistart)
+    usable = sorted((one for one in candidates if one.solution.status.usable), key=lambda one: rank(one, by))
+    usable = usable if elected else ends_of(candidates, by)
+    usable, unstable = stable_of(usable, None if elected else vet, len(usable) if elected else most)
     members = [one for one in _turned(provider, usable) if all(np.isfinite(run).all() for run in one.runs)]
     if elected:
         picked, left = _elected(multistart, provider, members), list[Member]()
@@ -205,26 +143,6 @@ def united(
     left_out = tuple(one.candidate.number for one in left)
     members = [one for one, _ in picked]
     return United(candidate=found, members=tuple(members), left_out=left_out, unstable=unstable, elected=elected)
-
-
-def _stable(
-    candidates: Sequence[starts.Candidate], vet: Callable[[starts.Network], bool] | None, most: int
-) -> tuple[list[starts.Candidate], tuple[int, ...]]:
-    """The first candidates whose free runs are stable, and the numbers of those that were passed over."""
-    kept, left = list[starts.Candidate](), list[int]()
-    for one in candidates:
-        if len(kept) == most:
-            break
-        if vet is None or vet(one.model):
-            kept.append(one)
-        else:
-            left.append(one.number)
-    return kept, tuple(left)
-
-
-def _left_out(why: str, numbers: Sequence[int]) -> str:
-    """Who was left out, as a sentence; nothing where nobody was."""
-    return f" Left out, as {why}: start {', '.join(str(number + 1) for number in numbers)}." if numbers else ""
 
 
 def _turned(provider: NeuralProvider, candidates: Sequence[starts.Candidate]) -> list[Member]:
@@ -242,13 +160,8 @@ def _turned(provider: NeuralProvider, candidates: Sequence[starts.Candidate]) ->
 def _together(provider: NeuralProvider, members: Sequence[Member]) -> tuple[list[Member], list[Member]]:
     """Those who stand together, and the others."""
     losses = [provider.loss_of(_forward(one.runs)) for one in members]
-    near = [loss <= BEHIND**2 * min(losses) for loss in losses]
-    backwards = [np.concatenate([run[len(run) // 2 :] for run in one.runs]) for one in members]
-    if sum(near) >= FEWEST:
-        middle = np.median([run for run, one in zip(backwards, near, strict=True) if one], axis=0)
-        away = np.array([np.sqrt(np.mean((run - middle) ** 2)) for run in backwards])
-        limit = ALONE * np.median(away[near])
-        near = [one and bool(distance <= limit) for one, distance in zip(near, away, strict=True)]
+    close = [loss <= BEHIND**2 * min(losses) for loss in losses]
+    near = stand_together(close, [np.concatenate([run[len(run) // 2 :] for run in one.runs]) for one in members])
     kept = [member for member, one in zip(members, near, strict=True) if one]
     return kept, [member for member, one in zip(members, near, strict=True) if not one]
 

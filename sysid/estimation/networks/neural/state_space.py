@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, replace
@@ -30,7 +29,7 @@ from sysid.estimation.networks.starts.choosing import Choice, choose
 from sysid.estimation.networks.starts.output_weights import reweighted, weighed
 from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
-from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states
+from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states, check_members
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range, unit_ranges
 from sysid.estimation.records.first_samples import other_note, shown_note
@@ -53,10 +52,6 @@ STARTS = 6
 checkpoint, all of them take some 1.6 times the iterations of one."""
 
 
-SPARE = 1.5
-"""Starts of a fit that asks for none, for each member of an ensemble: not all will be among them."""
-
-
 def check_training(training: Training) -> None:
     """Refuse options that do not apply to hidden states.
 
@@ -67,14 +62,7 @@ def check_training(training: Training) -> None:
         ConfigError: If there are some, or an ensemble has more members than there are starts.
     """
     check_hidden_states("a neural state space", training, unites=True)
-    if training.starts is not None and training.starts < training.ensemble:
-        raise ConfigError(
-            "an ensemble has more members than there are starts",
-            where="ensemble",
-            expected=f"at most starts: {training.starts}",
-            got=training.ensemble,
-            remedy="raise starts, or leave it out for as many as are needed",
-        )
+    check_members(training)
 
 
 LINEAR_SHARE, LINEAR_SHARE_GIVEN = 0.3, 0.1
@@ -192,7 +180,7 @@ def _fit(
     began = now()
     training = training or Training()
     check_training(training)
-    training = training.with_starts(max(STARTS, math.ceil(SPARE * training.ensemble) if training.ensemble > 1 else 0))
+    training = training.with_starts(STARTS)
     experiments, windows = records.experiments, Windows.of(records.experiments, training)
     provider = NeuralProvider(
         template=template.recursion, experiments=windows.experiments, stable=bool(training.stable)

@@ -33,12 +33,15 @@ TINY = 1e-300
 """A loss in the place of none."""
 
 
-def begun(multistart: Multistart, seen: Sequence[Candidate]) -> tuple[Multistart, int] | None:
-    """What a cautious fit has in common with the others, and the start that it begins with.
+def begun(
+    multistart: Multistart, seen: Sequence[Candidate], ends: Sequence[int]
+) -> tuple[Multistart, Sequence[int]] | None:
+    """What cautious fits have in common with the others, and the starts that they begin with.
 
     Args:
         multistart: The multistart.
         seen: Its candidates.
+        ends: Starts that came to their end.
 
     Returns:
         Both; ``None`` where none is wanted: the record is long enough, or the fit goes on from a given one.
@@ -48,7 +51,21 @@ def begun(multistart: Multistart, seen: Sequence[Candidate]) -> tuple[Multistart
     best = min(seen, key=lambda one: rank(one, multistart.training.choose_by))
     done = {-1: sum(multistart.iterations.values())}
     own = replace(multistart, cautious=True, resume=None, name=f"{multistart.name}cautious ", iterations=done)
-    return own, best.number
+    return own, [best.number] if multistart.least == 1 else ends
+
+
+def beside(cautious: Candidate, seen: Sequence[Candidate], multistart: Multistart) -> list[Candidate]:
+    """The candidates that a cautious fit is set against.
+
+    Args:
+        cautious: The fit.
+        seen: The other candidates.
+        multistart: The multistart.
+
+    Returns:
+        All of them, or where several are fitted cautiously those of the same start.
+    """
+    return [one for one in seen if multistart.least == 1 or one.number == cautious.number]
 
 
 def placed(cautious: Candidate, seen: Sequence[Candidate], n_samples: int) -> Candidate:
@@ -63,13 +80,28 @@ def placed(cautious: Candidate, seen: Sequence[Candidate], n_samples: int) -> Ca
         The candidate, before all others or after them.
     """
     best = min(seen, key=lambda one: rank(one, "evidence"))
-    ours, others = cautious.solution.evidence, best.solution.evidence
-    if ours is None or others is None:
+    if cautious.solution.evidence is None or best.solution.evidence is None:
         return replace(cautious, place=Place.LAST)
+    return replace(cautious, place=Place.LAST if pays(best, cautious, n_samples) else Place.FIRST)
+
+
+def pays(closer: Candidate, other: Candidate, n_samples: int) -> bool:
+    """Whether the smaller error of a fit pays for the parameters that it has more.
+
+    Args:
+        closer: The fit that is closer to the records.
+        other: The other one; where it is cautious, its correlation time counts samples.
+        n_samples: Samples that count.
+
+    Returns:
+        Whether, by the criterion above; where evidence is missing, it does.
+    """
+    theirs, ours = closer.solution.evidence, other.solution.evidence
+    if theirs is None or ours is None:
+        return True
     independent = max(n_samples / ours.correlation_time, math.e)
-    gained = independent * (math.log(max(cautious.loss, TINY)) - math.log(max(best.loss, TINY)))
-    paid = (others.total_effective_parameters - ours.total_effective_parameters) * math.log(independent)
-    return replace(cautious, place=Place.LAST if gained > paid else Place.FIRST)
+    gained = independent * (math.log(max(other.loss, TINY)) - math.log(max(closer.loss, TINY)))
+    return gained > (theirs.total_effective_parameters - ours.total_effective_parameters) * math.log(independent)
 
 
 WHY = {
@@ -91,13 +123,18 @@ def told(choice: Choice, candidates: Sequence[Candidate], n_samples: int) -> tup
     Returns:
         None, or a sentence.
     """
-    if not any(one.cautious for one in candidates):
+    fits = {one.number: one for one in candidates if one.cautious}
+    if not fits:
         return ()
+    short = f"The record is short: {n_samples:,} samples for {len(min(fits.items())[1].solution.theta)} parameters."
+    what = "cautious fit was made, which counts errors that persist as fewer samples"
+    if choice.by_distance or choice.chosen.members:
+        taken = sum(one.place is Place.FIRST for one in fits.values())
+        return (
+            f"{short} So of {len(fits)} starts a second, {what}; of {taken} of them it was taken, {WHY[Place.FIRST]}.",
+        )
     chosen, end = choice.chosen, "it was not taken"
     if chosen.cautious:
         why = "by its error on the selection traces" if choice.by_selection else WHY[chosen.place]
         end = f"it was taken, {why}"
-    return (
-        f"The record is short: {n_samples:,} samples for {len(chosen.solution.theta)} parameters. So a second, "
-        f"cautious fit was made, which counts errors that persist as fewer samples; {end}.",
-    )
+    return (f"{short} So a second, {what}; {end}.",)

@@ -18,8 +18,9 @@ def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, int, float]:
     Args:
         candidate: The candidate.
         choose_by: ``selection``, where a tolerance is declared by the traces on which it is left first, or
-            ``evidence``; without selection traces the evidence, without evidence the loss. Or
-            ``loss``, which comes after selection traces too, and before the evidence.
+            ``evidence``; without selection traces the distance from the middle of all starts where that was asked, the
+            evidence where it was not, without evidence the loss. Or ``loss``, which comes after selection traces too,
+            and before the evidence.
 
     Returns:
         The key.
@@ -27,6 +28,8 @@ def rank(candidate: Candidate, choose_by: str) -> tuple[bool, int, int, float]:
     place = candidate.place
     if choose_by != "evidence" and np.isfinite(candidate.score):
         value, place = candidate.score, Place.BY_EVIDENCE
+    elif choose_by == "selection" and np.isfinite(candidate.away):
+        value, place = candidate.away, Place.FIRST
     elif choose_by != "loss" and candidate.solution.evidence is not None:
         value = -candidate.log_evidence
     else:
@@ -72,6 +75,11 @@ class Choice:
     def by_selection(self) -> bool:
         """Whether selection traces chose."""
         return self.by != "evidence" and bool(np.isfinite(self.chosen.score))
+
+    @property
+    def by_distance(self) -> bool:
+        """Whether a start in the middle of all was chosen."""
+        return self.by == "selection" and not self.by_selection and bool(np.isfinite(self.chosen.away))
 
 
 def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Network], bool] | None = None) -> Choice:

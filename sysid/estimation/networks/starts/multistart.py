@@ -118,7 +118,8 @@ class Multistart:
     cautious: bool = False
     """Whether this is that fit."""
     least: int = 1
-    """Starts that are trained to their end, whoever is ahead: those that an ensemble unites."""
+    """Starts that are trained to their end, whoever is ahead: those that an ensemble unites, or that are compared on
+    inputs that nobody measured."""
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
     """Where the runs of this multistart, and of others of the same fit, are kept."""
     name: str = ""
@@ -135,7 +136,7 @@ class Multistart:
     def twice(self) -> bool:
         """Whether the record is short, and what is short is fitted once more."""
         found = self.again and self.training.regularisation is None and self.training.loop is Loop.CLOSED
-        return found and self.initial is None and self.provider.n_samples < SHORT * len(self.layout.centre())
+        return found and self.initial is None and is_short(self.provider.n_samples, len(self.layout.centre()))
 
     def left(self, run: str) -> float:
         """Seconds that a run may take, what earlier sessions have spent on it included."""
@@ -155,7 +156,7 @@ class Multistart:
             The engine.
         """
         training, scale = self.training, self.template.scaling.error_unit
-        planned = planned_iterations(training, self.least) + (training.max_iterations if self.twice else 0)
+        planned = planned_iterations(training, self.least) + (training.max_iterations * self.least if self.twice else 0)
         own = "free run" if training.loop is Loop.CLOSED else "one step ahead"
         own += ", cautious" if self.cautious else ""
 
@@ -212,6 +213,8 @@ class Candidate:
         members: Starts that an ensemble unites, once for each pick; empty for a single start.
         without: Inputs that it does without.
         place: Where it stands among the others if no selection traces choose.
+        away: How far it is from the middle of all starts on inputs that nobody measured (``united.py``), in scaled
+            numbers; NaN where that does not choose.
     """
 
     number: int
@@ -223,6 +226,7 @@ class Candidate:
     members: tuple[int, ...] = ()
     without: tuple[str, ...] = ()
     place: Place = Place.BY_EVIDENCE
+    away: float = math.nan
 
     @property
     def cautious(self) -> bool:
@@ -239,6 +243,19 @@ class Candidate:
     def loss(self) -> float:
         """Loss on the estimation traces."""
         return self.solution.at.loss
+
+
+def is_short(n_samples: int, n_parameters: int) -> bool:
+    """Whether a record is short, so that a network of lagged regressors is fitted a second time, cautiously.
+
+    Args:
+        n_samples: Samples that count.
+        n_parameters: Parameters of the network.
+
+    Returns:
+        Whether there are fewer than :data:`SHORT` samples for each.
+    """
+    return n_samples < SHORT * n_parameters
 
 
 def deadline(began: float, training: Training, on_progress: Callable[[FitProgress], None]) -> float:

@@ -27,7 +27,7 @@ def run_race(multistart: Multistart) -> list[Candidate]:
         multistart: What they have in common.
 
     Returns:
-        Every start at every rung that it reached; before them the cautious fit of a short record.
+        Every start at every rung that it reached; before them the cautious fits of a short record.
 
     Raises:
         TraceError: If no sample counts.
@@ -60,18 +60,19 @@ def run_race(multistart: Multistart) -> list[Candidate]:
             latest = reached
             order = sorted(reached.values(), key=lambda c: (not c.solution.status.usable, c.loss))
             numbers = [candidate.number for candidate in better_half(order, multistart.least)]
-        return [*_cautious(multistart, seen), *seen]
+        return [*_cautious(multistart, seen, list(latest)), *seen]
 
 
-def _cautious(multistart: Multistart, seen: Sequence[Candidate]) -> list[Candidate]:
-    """One more fit of a short record, with its place among the others."""
-    begun = cautious.begun(multistart, seen)
+def _cautious(multistart: Multistart, seen: Sequence[Candidate], ends: Sequence[int]) -> list[Candidate]:
+    """Starts of a short record fitted once more, each with its place among the others."""
+    begun = cautious.begun(multistart, seen, ends)
     if begun is None:
         return []
-    own, number = begun
+    own, numbers = begun
     reached: dict[int, Candidate] = {}
-    _rung(own, [number], {}, (1.0, math.inf), reached)
-    return [cautious.placed(one, seen, multistart.provider.n_samples) for one in reached.values()]
+    _rung(own, numbers, {}, (1.0, math.inf), reached)
+    n_samples = multistart.provider.n_samples
+    return [cautious.placed(one, cautious.beside(one, seen, multistart), n_samples) for one in reached.values()]
 
 
 def _one_by_one(multistart: Multistart, numbers: Sequence[int]) -> list[Sequence[int]]:

@@ -14,6 +14,11 @@ from sysid.estimation.results.attempts import Attempt
 from sysid.estimation.results.result import FitResult, Status
 from sysid.models import History
 
+MIDDLE = (
+    "the least distance from the middle of all on the records' inputs backwards (of a short record neither the error "
+    "nor the evidence tells which start is right elsewhere)"
+)
+"""How a start of a short record is chosen, in words."""
 MOST_NAMES = 3
 """Records that a sentence names."""
 
@@ -143,6 +148,7 @@ def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[A
             estimation_mse=candidate.solution.curve[-1].mse * scale,
             selection_mse=candidate.score,
             log_evidence=candidate.log_evidence,
+            away=candidate.away,
             effective_parameters=candidate.solution.curve[-1].effective_parameters,
             stable=stable,
             chosen=candidate is choice.chosen,
@@ -159,11 +165,14 @@ def _attempts(choice: Choice, candidates: Sequence[starts.Candidate]) -> tuple[A
 def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Training) -> tuple[str, ...]:
     notes = []
     if training.n_starts > 1:
-        raced = [c for c in candidates if choice.by_selection or not c.cautious]
+        compared = choice.by == "selection" and any(np.isfinite(c.away) for c in candidates)
+        raced = [c for c in candidates if choice.by_selection or compared or not c.cautious]
         one = min((c for c in raced if not c.members), key=lambda c: rank(c, choice.by))
         by_evidence = choice.by != "loss" and one.solution.evidence is not None
         how = "the largest evidence" if by_evidence else "the least error on the estimation traces"
         how = "the least error on the selection traces (geometric mean)" if choice.by_selection else how
+        if compared:
+            how = MIDDLE
         begun = len({one.number for one in candidates if not one.members})
         taken = "Chosen" if choice.chosen in raced else "Ranked"
         notes.append(f"{taken} by {how} among {begun} starts looked at {len(raced)} times.")
