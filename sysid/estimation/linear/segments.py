@@ -90,12 +90,13 @@ TORN = 0.05
 """Part of the samples that first states of stretches between masked samples may take before it is told."""
 
 
-def torn(segments: Sequence[Segment], states: int) -> tuple[str, ...]:
-    """What many masked samples do to a model of the noise, each stretch between them having a first state of its own.
+def torn(segments: Sequence[Segment], states: int, *, records: int) -> tuple[str, ...]:
+    """What many first states do to a model of the noise: one of each record or unmasked stretch.
 
     Args:
         segments: The stretches.
         states: Of the model.
+        records: How many records they are parts of.
 
     Returns:
         One sentence where these states are many beside the samples; none elsewhere.
@@ -103,11 +104,13 @@ def torn(segments: Sequence[Segment], states: int) -> tuple[str, ...]:
     count, free = sum(map(len, segments)), sum(one.rest is None for one in segments)
     if free < 2 or free * states <= TORN * count * segments[0].outputs.shape[1]:
         return ()
+    each = f"of some {count / free:.3g} samples, and each has {states} numbers of its own for its first state"
+    if len(segments) <= records:
+        return (f"These are {free} records {each}: coefficients lean by more than their intervals say. Record longer.",)
     return (
-        f"Masked samples part these records into {free} stretches of some {count / free:.3g} samples, and each has "
-        f"{states} numbers of its own for its first state: coefficients lean by more than their intervals say. Fill "
-        "single samples (repairs: {nan: interpolate}), or fit a structure without a model of the noise (OE, TF), whose "
-        "run goes on through masked samples.",
+        f"Masked samples part these records into {free} stretches {each}: coefficients lean by more than their "
+        "intervals say. Fill single samples (repairs: {nan: interpolate}), or fit a structure without a model of the "
+        "noise (OE, TF), whose run goes on through masked samples.",
     )
 
 

@@ -20,6 +20,8 @@ BENT = 2
 """Of these, those that are bent and multiplied with each other: behind a filter of two poles a curve is another."""
 AT = (0.2, 0.4, 0.6, 0.8)
 """Quantiles at which a curve bends."""
+LATE = (2, 3, 4, 6, 8, 12, 16, 24)
+"""Samples by which an input may act later than the next one: no row of filters makes a dead time."""
 WIDTHS = (0.1, 0.2, 0.35)
 """Half the play, in ranges."""
 MOST_INPUTS = 4
@@ -43,6 +45,7 @@ def features(inputs: Array, simulated: Array) -> dict[str, list[Array]]:
         memories.append(memories[-1] * STEP)
     # An integrator's output, but for the level from which it integrates.
     linear, curves, plays = [u, _late(u), np.cumsum(_late(u), axis=0) / len(u)], list[Array](), list[Array]()
+    linear += [_late(u, lag) for lag in LATE if lag <= memories[-1]]
     bent = np.column_stack([*(_curves(one) for one in u.T), *_products(u)])
     held = np.column_stack([_play(one, width * float(np.ptp(one))) for one in u.T for width in WIDTHS])
     curves += [bent, _curves(simulated)]
@@ -66,8 +69,8 @@ def features(inputs: Array, simulated: Array) -> dict[str, list[Array]]:
     return kinds
 
 
-def _late(x: Array) -> Array:
-    return np.concatenate([x[:1], x[:-1]])
+def _late(x: Array, lag: int = 1) -> Array:
+    return np.concatenate([np.repeat(x[:1], lag, axis=0), x[:-lag]])
 
 
 def _slowed(x: Array, memory: float) -> Array:

@@ -171,6 +171,19 @@ def test_a_dead_time_is_told_as_it_is_where_levels_are_held(held: int) -> None:
     assert [note for note in fit.notes if "Begin there (nk: 41)" in note]
 
 
+@pytest.mark.parametrize("seed", [1, 2, 11])
+def test_a_dead_time_beside_a_slow_input_is_no_curve(seed: int) -> None:
+    """No row of filters made it, and products of them did: a network was recommended for a linear plant."""
+    rng = np.random.default_rng(seed)
+    u, v = np.repeat(rng.choice([0.0, 1.0], 60), 10), np.repeat(rng.uniform(0.0, 5.0, 40), 15)
+    y = lfilter([0.0] * 4 + [0.3], [1.0, -0.85], u) + lfilter([0.0, 0.05], [1.0, -0.95], v)
+    y += 20.0 + 0.02 * rng.standard_normal(600)
+    traces = sysid.data({"u": u, "v": v, "y": y}, inputs=["u", "v"], outputs="y", sample_time=1.0)
+    fit = sysid.fit(traces, "u+v -> y", sysid.ARX(na=2, nb=2, nk=1))
+    assert any("too little memory, or not the right one" in warning for warning in fit.warnings)
+    assert not any("curve" in warning for warning in fit.warnings)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_an_output_behind_a_curve_and_filters_moves_with_its_inputs(seed: int) -> None:
     """An even curve of what two inputs do slowly, followed once more: it was said that nothing moves it with them."""

@@ -154,7 +154,7 @@ def fit_polynomial(
         uncertainty=_uncertainty(model, at, hang, errors.n_samples, variance * unit),
         notes=(
             *slow_poles.notes(model.pole_radius, lengths, told),
-            *(torn(errors.segments, system.n_state) if orders.noise else ()),
+            *(torn(errors.segments, system.n_state, records=len(traces)) if orders.noise else ()),
             *((told_of(part),) if part and from_part else ()),
             slow_poles.stability(model.pole_radius),
         ),

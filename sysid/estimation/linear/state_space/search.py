@@ -66,7 +66,7 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
         if iterations:
             found = problem.with_colour(found)
     told = slow_poles.notes(found.system.radius, problem.lengths, errors)
-    told = (*told, *(torn(problem.segments, orders.states) if orders.noise else ()))
+    told = (*told, *(torn(problem.segments, orders.states, records=len(segments)) if orders.noise else ()))
     return replace(found, singular_values=subspace.singular_values(), notes=told)
 
 
