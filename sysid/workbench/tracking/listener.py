@@ -41,6 +41,10 @@ from sysid.workbench.tracking.sweep_run import experiment_name, log_sweep
 
 KEY_TAG = "sysid.key"
 """Tag that holds the digest of everything a fit and its figures depend on."""
+ABOUT_FITS = "Fits of one output, by every pipeline and search of this mapping: a run each."
+ABOUT_TRIALS = "What a sweep or a search tried: a run each, and one of the whole."
+ABOUT_JUDGEMENTS = "Judgements of finished models by the consequences of their errors: a run each."
+"""What the list of experiments says of them."""
 
 
 def _in_words(error: Exception) -> str:
@@ -119,7 +123,7 @@ class Tracker:
     def _log_fit(self, ready: FitReady) -> None:
         if self.client is None or self.run is None or self.data is None:
             return
-        experiment = tracking.experiment_of(self.client, str(ready.pipeline.mapping), self.artifacts)
+        experiment = tracking.experiment_of(self.client, str(ready.pipeline.mapping), self.artifacts, about=ABOUT_FITS)
         known = tracked_fit.known_run(self.client, experiment, ready, key_tag=KEY_TAG)
         if known is not None and ready.stored:
             self.run_ids[ready.config.name] = known
@@ -174,14 +178,16 @@ class Tracker:
     def _log_judgement(self, ready: JudgementReady) -> None:
         if self.client is None:
             self.client = tracking.connect(self.uri)
-        experiment = tracking.experiment_of(self.client, ready.pipeline, self.artifacts)
+        experiment = tracking.experiment_of(self.client, ready.pipeline, self.artifacts, about=ABOUT_JUDGEMENTS)
         metric = tracking.entities().metric
         log_judgement(self.client, ready, key_tag=KEY_TAG, experiment=experiment, metric=metric)
 
     def _log_sweep(self, ready: SweepReady) -> None:
         if self.client is None:
             self.client = tracking.connect(self.uri)
-        experiment = tracking.experiment_of(self.client, experiment_name(ready.record), self.artifacts)
+        experiment = tracking.experiment_of(
+            self.client, experiment_name(ready.record), self.artifacts, about=ABOUT_TRIALS
+        )
         log_sweep(self.client, ready, key_tag=KEY_TAG, experiment=experiment, entities=tracking.entities())
 
     def _log_report(self, ready: ReportReady) -> None:

@@ -142,13 +142,14 @@ def entities() -> Entities:
     return Entities(metric=Metric, param=Param)
 
 
-def experiment_of(client: Any, name: str, artifacts: Path | None) -> str:
+def experiment_of(client: Any, name: str, artifacts: Path | None, *, about: str) -> str:
     """The experiment of a mapping, a pipeline or a sweep, made or brought back if need be.
 
     Args:
         client: An ``MlflowClient``.
         name: Its name.
         artifacts: Where a new one keeps its files; ``None`` leaves it to a server.
+        about: What is in it, as the list of experiments says it.
 
     Returns:
         Its identifier.
@@ -164,7 +165,7 @@ def experiment_of(client: Any, name: str, artifacts: Path | None) -> str:
             location = (artifacts / told_apart(slug(name), names)).resolve().as_uri()
         try:
             # Otherwise MLflow asks every visitor what kind of experiment it is.
-            tags = {"mlflow.experimentKind": "custom_model_development"}
+            tags = {"mlflow.experimentKind": "custom_model_development", "mlflow.note.content": about}
             return str(client.create_experiment(name, artifact_location=location, tags=tags))
         except MlflowException:
             # Another process has just made it.
@@ -255,7 +256,7 @@ def log_model(
             source=logged.model_uri,
             run_id=run_id,
             model_id=logged.model_id,
-            fit=ready.config.name,
+            fit=(ready.system if mapping else None) or ready.config.name,
             description=markdown_inline(in_short(read_json(bundle / MANIFEST))),
         )
     finally:

@@ -11,7 +11,10 @@ import subprocess
 import sys
 import warnings
 import zlib
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -190,6 +193,35 @@ def test_the_experiment_shows_first_what_matters_first(tracked_once) -> None:
     assert {chart["lineSmoothness"] for chart in charts if chart["type"] == "LINE"} == {0}
     pictures = [chart["imageKeys"] for chart in charts if chart["type"] == "IMAGE"]
     assert pictures == [[f"target and output/run-{n}"] for n in (1, 2, 3)]
+
+
+def test_the_list_of_experiments_says_what_is_in_one(tracked_once) -> None:
+    _, client, _ = tracked_once
+    told = {one.name: one.tags.get("mlflow.note.content", "") for one in client.search_experiments()}
+    assert all(text for name, text in told.items() if name != "Default"), told
+
+
+@pytest.mark.parametrize(
+    ("mapping", "fit"), [pytest.param("u -> y1+y2", "NARX", id="all"), pytest.param("", "NARX, y1", id="one")]
+)
+def test_a_version_of_several_outputs_is_of_the_whole_fit(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, mapping: str, fit: str
+) -> None:
+    """It was tagged with the fit of its first output alone."""
+    import mlflow.models
+
+    seen: dict[str, Any] = {}
+    ready = SimpleNamespace(
+        system="NARX", config=SimpleNamespace(name="NARX, y1"), pipeline=SimpleNamespace(mapping="u -> y1")
+    )
+    monkeypatch.setattr(mlflow, "start_run", lambda **_: nullcontext())
+    monkeypatch.setattr(mlflow.models.Model, "log", lambda *_, **__: SimpleNamespace(model_uri="m", model_id="1"))
+    monkeypatch.setattr(tracking.tracked, "run_name", lambda _: "narx")
+    monkeypatch.setattr(tracking, "in_short", lambda _: "")
+    monkeypatch.setattr(tracking, "read_json", lambda _: {})
+    monkeypatch.setattr(tracking, "register", lambda *_, **named: seen.update(named))
+    tracking.log_model(None, tmp_path, ready, mapping, uri=store_uri(tmp_path), run_id="r", traces=None)
+    assert seen["fit"] == fit
 
 
 def test_a_view_of_many_cases_fits_into_a_tag() -> None:

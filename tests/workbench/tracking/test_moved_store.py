@@ -24,7 +24,7 @@ def before(tmp_path: Path, empty_store: Path) -> tuple[Path, str]:
     folder.mkdir()
     shutil.copyfile(empty_store, folder / "mlflow.db")
     client = connected(folder)
-    run = client.create_run(tracking.experiment_of(client, "u -> y", folder / ARTIFACTS))
+    run = client.create_run(tracking.experiment_of(client, "u -> y", folder / ARTIFACTS, about="Fits."))
     # By hand: MLflow remembers in a process where the files of a run are.
     files = folder / ARTIFACTS / "u-y" / run.info.run_id / "artifacts"
     assert run.info.artifact_uri == files.as_uri()
