@@ -13,10 +13,11 @@ from sysid.api.given import ESTIMATED, TracesLike, traces_of
 from sysid.api.several import Several
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
+from sysid.estimation.remarks.equilibrium import begun_otherwise
 from sysid.export.bundle import Bundle
 from sysid.export.own_figures import side_by_side
 from sysid.extras import need
-from sysid.models import Cascade, Start, StartLike
+from sysid.models import AbstractModel, Cascade, Start, StartLike
 from sysid.traces import Role, TraceSet
 from sysid.validation import Evaluation, evaluate_cascade, evaluate_outputs
 from sysid.validation.beyond import beyond
@@ -138,14 +139,17 @@ def compare(traces: TracesLike, *fits: Compared | Sequence[Compared], start: Sta
     evaluations: dict[str, Evaluation] = {}
     outputs: dict[str, tuple[str, str]] = {}
     notes: dict[str, None] = {}
+    models: list[AbstractModel] = []
     traces, start = traces_of(traces, word="compare"), Start.of(start)
     for one in _fits(fits):
         for judged in _judged(one, traces, start):
             label = judged.label if judged.label not in evaluations else f"{judged.label} ({len(evaluations) + 1})"
             evaluations[label], outputs[label] = judged.evaluation, (judged.output, judged.unit)
         for fit in [one] if isinstance(one, FitResult) else [*getattr(one, "fits", {}).values()]:
+            models.append(fit.model)
             unsound = [] if fit.status.usable else [f"{fit.model.label}: {fit.status.value}"]
             notes |= dict.fromkeys((*unsound, *_beyond(fit, traces), *first_states(fit.model, traces, start)))
+    notes |= dict.fromkeys(begun_otherwise(models, tuple(traces), start))
     return Comparison(evaluations=evaluations, outputs=outputs, notes=tuple(notes))
 
 

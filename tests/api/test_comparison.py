@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import sysid
 from sysid.api.comparison import Comparison
@@ -66,3 +67,17 @@ def test_a_fit_that_cannot_be_used_is_told_below_the_table(comparison: Compariso
     runs_away = dataclasses.replace(fit, status=Status.UNSTABLE)
     assert f"{fit.model.label}: {Status.UNSTABLE.value}" in str(sysid.compare(traces, runs_away)).splitlines()
     assert "leaves its bounds" not in str(sysid.compare(traces, fit))
+
+
+def test_records_that_do_not_begin_as_declared_are_told_once_each() -> None:
+    """What was in motion was scored from rest without a word, and models ranked by how soon they forget."""
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 5)
+    y = lfilter([0.0, 0.1], [1.0, -0.9], u) + 4.0 * 0.9 ** np.arange(300)
+    still = lfilter([0.0, 0.1], [1.0, -0.9], np.r_[np.zeros(20), u[20:]])
+    traces = sysid.data([(u, y), (np.r_[np.zeros(20), u[20:]], still)], sample_time=0.1, split=["estimation"] * 2)
+    fits = [sysid.fit(traces, "u -> y", sysid.ARX(na=1, nb=nb, nk=1), rest_output=0.0) for nb in (1, 2)]
+    first, second = traces.names
+    assert [note.split(" does not")[0] for note in sysid.compare(traces, fits, start="rest").notes] == [first]
+    assert "write start: estimated" in str(sysid.compare(traces, fits, start="rest"))
+    assert not sysid.compare(traces, fits).notes, second

@@ -45,6 +45,25 @@ def equilibrium_notes(model: AbstractModel, traces: Sequence[Trace], start: Star
     for trace in traces:
         found = [sentence for one in asked for sentence in _of(one, trace, start)]
         told += found[:1]
+    return _few(told)
+
+
+def begun_otherwise(models: Sequence[AbstractModel], traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
+    """The same of records that several models are run over: each record is told once, by the first model that shows it.
+
+    Args:
+        models: Models whose free runs are compared.
+        traces: The records.
+        start: What was declared.
+
+    Returns:
+        One sentence for each record that is off.
+    """
+    told = (next((one for model in models for one in equilibrium_notes(model, [trace], start)), "") for trace in traces)
+    return _few([one for one in told if one])
+
+
+def _few(told: list[str]) -> tuple[str, ...]:
     rest = len(told) - MOST_TOLD
     return (*told[:MOST_TOLD], *([f"{rest} more records do not begin so."] if rest > 0 else []))
 
