@@ -342,9 +342,10 @@ def test_a_level_at_rest_is_a_number_of_an_output(level: Any) -> None:
         sysid.fit(traces, "u -> y", ORDERS, start="rest", rest_output=level)
 
 
-def test_a_trace_before_a_run_is_refused_in_words(fit: sysid.Fit) -> None:
-    with pytest.raises(ConfigError, match="u_before, y_before"):
-        fit.simulate(U, initial=fit.traces.traces[0])  # type: ignore[arg-type]
+def test_a_trace_before_a_run_is_both_of_its_signals(fit: sysid.Fit) -> None:
+    before: Any = fit.traces.traces[0]
+    run = fit.simulate(U, initial=before)
+    np.testing.assert_array_equal(run, fit.simulate(U, initial=(before["u"], before["y"])))
 
 
 def test_a_frame_is_no_data_set_to_any_word_of_a_fit(fit: sysid.Fit, tmp_path: Path) -> None:
