@@ -255,9 +255,13 @@ def _tried(results: Results) -> Section:
             picture_of = figures.learning_figure(curves, unit=unit)
             parts.append(picture(picture_of, "Learning curves", caption, f"learning-{index}"))
     parts += training_parts(results)
-    if len([fit for fit in results.fits if fit.n_parameters is not None]) > 2:
-        caption = "Size against accuracy on the traces that choose; lower left is better. Ringed: the chosen fit."
-        parts.append(picture(figures.size_figure(results), "Size against accuracy", caption, "size"))
+    mappings = results.mappings()
+    for index, (mapping, fits) in enumerate(mappings.items()):
+        if len([fit for fit in fits if fit.n_parameters is not None]) > 2:
+            where = f"the traces that choose, {mapping}" if len(mappings) > 1 else "the traces that choose"
+            caption = f"Size against accuracy on {where}; lower left is better. Ringed: the chosen fit."
+            drawn = figures.size_figure(results, fits)
+            parts.append(picture(drawn, "Size against accuracy", caption, f"size-{index}" if index else "size"))
     notes = [(fit.name, " ".join(fit.notes)) for fit in results.fits if fit.notes]
     if notes:
         rows = tuple((Cell(text=name, header=True), Cell(text=text)) for name, text in notes)

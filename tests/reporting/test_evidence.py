@@ -24,7 +24,7 @@ from sysid.reporting.linear.computing import bode_of, step_of
 from sysid.reporting.linear_views import linear_views
 from sysid.reporting.parts import Picture
 from sysid.reporting.residuals import read_residuals
-from sysid.reporting.sections.evidence import evidence_sections
+from sysid.reporting.sections.evidence import _models, evidence_sections
 from sysid.reporting.tables import Table
 from sysid.traces import Trace
 from sysid.validation import analyse_residuals
@@ -97,6 +97,21 @@ def test_the_sections_show_what_the_run_stored(run: Path) -> None:
     (pair,) = poles.rows
     low, high = (float(end) for end in pair[2].below.strip("()").split(" to "))
     assert low < abs(np.log(0.75 + 0.3708j)) < high  # of z^2 - 1.5 z + 0.7, every second
+
+
+def test_one_model_of_several_outputs_is_drawn_once(run: Path) -> None:
+    """It was drawn for each of its outputs, with all pairs every time, under the name of one output."""
+    fit = read_results(run).fits[0]
+    parts = [
+        fit.model_copy(update={"name": f"SS, {y}", "slug": f"ss-{y}", "system": "SS", "model_slug": "ss"}) for y in "ab"
+    ]
+    own = [
+        fit.model_copy(update={"name": f"TF, {y}", "slug": f"tf-{y}", "system": "TF", "model_slug": f"tf-{y}"})
+        for y in "ab"
+    ]
+    assert [(one.name, one.slug) for one in _models([*parts, *own])] == [
+        ("SS", "ss"), ("TF, a", "tf-a"), ("TF, b", "tf-b"),
+    ]  # fmt: skip
 
 
 def test_a_linear_model_that_no_input_moves_has_no_frequency_response(run: Path) -> None:

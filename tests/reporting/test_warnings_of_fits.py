@@ -46,3 +46,15 @@ def test_what_is_said_of_several_fits_is_said_once(make_run: Callable[..., Path]
 def test_without_warnings_there_is_neither(make_run: Callable[..., Path], tmp_path: Path) -> None:
     results = read_results(make_run(tmp_path / "run", samples=50, names=PAIR))
     assert warning_points(results) == [] and warnings_section(results) is None
+
+
+def only_the_other(document: dict[str, Any]) -> None:
+    document["fits"][0]["warnings"] = ["its free run is no better than a constant."]
+
+
+def test_a_warning_at_the_head_says_where_it_is_not_of_the_chosen_fit(
+    make_run: Callable[..., Path], tmp_path: Path
+) -> None:
+    results = read_results(make_run(tmp_path / "run", samples=50, names=PAIR, edit=only_the_other))
+    ((_, point),) = warning_points(results)
+    assert point == "ARX, which was not chosen: its free run is no better than a constant."

@@ -102,6 +102,8 @@ def data(
     for number, (label, one) in enumerate(experiments.items()):
         columns = columns_of(one, wanted_inputs, wanted_outputs, where=label)
         channels = [*(wanted_inputs or ()), *(wanted_outputs or ())]
+        # Who names one half of a pair means to have the other, too.
+        half = isinstance(one, tuple) and (wanted_inputs is None) != (wanted_outputs is None)
         marks.append(_taken_out(columns, split, channels, where=label))
         table = table_of(columns, name=label, channels=channels, timed=step is None)
         check_lengths(table, channels)
@@ -109,7 +111,7 @@ def data(
             check_rows(one[0] if isinstance(one, tuple) else one, where=label)
         trace = _trace(
             table,
-            channels or [column for column in table.names if column != table.time],
+            (not half and channels) or [column for column in table.names if column != table.time],
             label=label,
             sample_time=step if number == 0 or step is not None else whole[0].sample_time,
             units=units,

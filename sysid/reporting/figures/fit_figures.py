@@ -23,7 +23,7 @@ from sysid.reporting.figures.style import (
     styled,
 )
 from sysid.reporting.figures.thinning import distinct_points, thin
-from sysid.reporting.fit_records import CaseRecord, LearningCurve
+from sysid.reporting.fit_records import CaseRecord, FitRecord, LearningCurve
 from sysid.reporting.numbers import number
 from sysid.reporting.results import Results
 from sysid.reporting.signals import CaseSignals
@@ -320,11 +320,12 @@ def run_time_figure(seconds: Dict[str, float], *, quantity: str) -> Figure:
         return figure
 
 
-def size_figure(results: Results) -> Figure:
-    """Every fit by its parameters and its free-run error on the traces that choose, or that score where none choose.
+def size_figure(results: Results, fits: Sequence[FitRecord]) -> Figure:
+    """Fits by their parameters and their free-run error on the traces that choose, or that score where none choose.
 
     Args:
         results: The results.
+        fits: Those of one output, whose errors are of one unit.
 
     Returns:
         The figure, with a logarithmic axis for the error.
@@ -332,7 +333,7 @@ def size_figure(results: Results) -> Figure:
     with styled():
         figure = new_figure(7.6, 3.4)
         axes = figure.subplots()
-        for index, fit in enumerate(results.fits):
+        for index, fit in enumerate(fits):
             error = fit.selection_mse if np.isfinite(fit.selection_mse) else _mean_mse(fit.cases)
             if fit.n_parameters is None or not (np.isfinite(error) and error > 0.0):
                 continue
@@ -345,7 +346,7 @@ def size_figure(results: Results) -> Figure:
                 axes.plot([effective, fit.n_parameters], [error, error], color=style["color"], linewidth=1.0)
         logarithmic(axes)
         axes.set_xlabel("parameters (the line reaches to the effective ones)")
-        axes.set_ylabel(f"free-run mse [{squared(results.fits[0].unit)}]")
+        axes.set_ylabel(f"free-run mse [{squared(fits[0].unit)}]")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return figure
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from sysid.bounded_text import read_json
@@ -43,17 +44,28 @@ def evidence_sections(folder: Path, results: Results) -> list[Section]:
     residuals = {fit.name: read_residuals(folder / "fits" / fit.slug) for fit in results.fits}
     if any(residuals.values()):
         sections.append(_residuals(results, residuals))
-    tables = [table for fit in results.fits if not _linear(fit) for table in _parameters(folder, fit)]
+    models = _models(results.fits)
+    tables = [table for fit in models if not _linear(fit) for table in _parameters(folder, fit)]
     if tables:
         sections.append(Section(anchor="parameters", title="Parameters", parts=tuple(tables)))
     shown = [part for fit in results.fits for part in _curves(folder, fit)]
     if shown:
         sections.append(Section(anchor="curves", title="Static curves", parts=tuple(shown)))
     unit = results.frequency
-    parts = [part for fit in results.fits if _linear(fit) for part in _responses(folder, fit, unit)]
+    parts = [part for fit in models if _linear(fit) for part in _responses(folder, fit, unit)]
     if parts:
         sections.append(Section(anchor="frequency-response", title="Frequency response", parts=tuple(parts)))
     return sections
+
+
+def _models(fits: Sequence[FitRecord]) -> list[FitRecord]:
+    """Fits with a model each: one model of several outputs stands once, under the name that all of them have."""
+    found: dict[str, FitRecord] = {}
+    for fit in fits:
+        place = fit.model_slug or fit.slug
+        whole = place != fit.slug and fit.system is not None
+        found.setdefault(place, fit.model_copy(update={"name": fit.system, "slug": place}) if whole else fit)
+    return list(found.values())
 
 
 def _linear(fit: FitRecord) -> bool:
@@ -105,7 +117,7 @@ def _residuals(results: Results, residuals: dict[str, dict[str, GroupRecord]]) -
 
 
 def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord]]) -> Table:
-    rows = []
+    rows, units = [], dict.fromkeys(squared(fit.unit) for fit in results.fits)
     for fit in results.fits:
         for name, group in residuals[fit.name].items():
             found = group.analysis
@@ -122,7 +134,7 @@ def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord
             rows.append(
                 (
                     *head,
-                    figure_cell(found.variance),
+                    figure_cell(found.variance, below=squared(fit.unit) if len(units) > 1 else ""),
                     figure_cell(found.ljung_box_p),
                     Cell(text="white" if found.white else "not white"),
                     Cell(text=f"not of {owed}" if owed else "independent"),
@@ -133,7 +145,7 @@ def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord
         head=(
             ("fit", ""),
             ("cases", ""),
-            ("variance", squared(results.fits[0].unit)),
+            ("variance", next(iter(units)) if len(units) == 1 else ""),
             ("Ljung-Box", "p"),
             ("residuals", "whiteness"),
             ("past inputs", "independence"),

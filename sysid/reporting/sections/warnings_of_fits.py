@@ -35,14 +35,15 @@ def warning_points(results: Results) -> list[tuple[str, str]]:
         results: Of the run.
 
     Returns:
-        One point: of the chosen fit, or of the first one that has any; none without.
+        One point: of the chosen fit, or of the first one that has any, said not to be the chosen one; none without.
     """
     said = _said(results)
     if not said:
         return []
     text, names = next(iter(said.items()))
+    aside = "" if any(fit.name == names[0] for fit in results.best_fits) else ", which was not chosen"
     rest = f" {len(said) - 1} more under '{TITLE}'." if len(said) > 1 else ""
-    return [("Warning", f"{names[0]}: {text}{rest}")]
+    return [("Warning", f"{names[0]}{aside}: {text}{rest}")]
 
 
 def _said(results: Results) -> dict[str, list[str]]:

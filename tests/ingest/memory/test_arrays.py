@@ -257,3 +257,18 @@ def test_a_column_that_rises_evenly_is_named_where_nothing_tells_the_sample_time
         data(frame, inputs="u", outputs="y")
     with pytest.raises(ConfigError, match=r"write for example sample_time=0\.1$"):
         data(frame.drop(columns="sampling"), inputs="u", outputs="y")
+
+
+@pytest.mark.parametrize(
+    ("named", "expected"),
+    [
+        pytest.param({"outputs": ["a", "b"]}, ("u1", "u2", "a", "b"), id="outputs"),
+        pytest.param({"inputs": ["c", "d"]}, ("c", "d", "y1", "y2"), id="inputs"),
+    ],
+)
+def test_who_names_one_half_of_a_pair_has_the_other_too(named: dict[str, list[str]], expected: tuple[str, ...]) -> None:
+    """The half that was not named had been left out without a word."""
+    pair = np.arange(40.0).reshape(20, 2), -np.arange(40.0).reshape(20, 2)
+    trace = data(pair, sample_time=0.1, **named).traces[0]
+    assert trace.channel_names == expected
+    np.testing.assert_array_equal(trace.values, np.column_stack(pair))

@@ -150,3 +150,22 @@ def test_a_pole_beside_the_circle_has_digits_enough_to_tell() -> None:
     assert table is not None
     (text,) = [row[0].text for row in table.rows]
     assert abs(1.0 - float(text)) == pytest.approx(1e-3, rel=0.2)
+
+
+@pytest.mark.parametrize(("outputs", "rows", "columns"), [(1, 1, 2), (2, 2, 2), (3, 2, 3)])
+def test_pairs_of_several_outputs_have_room_for_their_names(outputs: int, rows: int, columns: int) -> None:
+    """Four of them stood in one row: legends were cut off, and lay over curves and axes."""
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal((400, 2))
+    y = np.column_stack([np.convolve(u @ [1.0, 0.5 + k], 0.5 * 0.8 ** np.arange(30))[:400] for k in range(outputs)])
+    names = ["temperature", "pressure", "level"][:outputs]
+    data = sysid.data((u, y), outputs=names, sample_time=1.0)
+    model = sysid.fit(data, f"u1+u2 -> {'+'.join(names)}", sysid.LinearStateSpace(states=2, noise=False)).model
+    bode, step, views = bode_of([(model, None)]), step_of([(model, None)], samples=20), linear_views(model, None)
+    for figure, panels in ((bode_figure(bode), 2), (step_figure(step), 1), (pole_zero_figure(views), 1)):
+        seen = [one for one in figure.axes if one.get_visible()]
+        assert len(seen) == panels * len(bode.names)
+        assert figure.get_size_inches()[0] == pytest.approx(7.6)
+        assert seen[0].get_gridspec().get_geometry() == (panels * rows, columns)
+        titles = [text for one in seen if (text := one.get_title(loc="left"))]
+        assert all(title.startswith(name) for title, name in zip(titles, bode.names, strict=True))
