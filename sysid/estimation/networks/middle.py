@@ -19,9 +19,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.networks.starts.multistart import Candidate, Multistart, Place
+from sysid.estimation.networks.starts.halving import planned_iterations
+from sysid.estimation.networks.starts.multistart import Candidate, Multistart, Place, is_short
 from sysid.estimation.networks.starts.united import FEWEST, distances, ends_of, keep_up
+from sysid.estimation.networks.training import Training
 from sysid.estimation.records.experiment import Experiment
+from sysid.estimation.results.result import Loop
 from sysid.models import NARXModel, VectorNARXModel
 
 
@@ -49,6 +52,31 @@ def comparing(multistart: Multistart) -> bool:
     training = multistart.training
     free = training.choose_by == "selection" and not multistart.selection
     return free and multistart.twice and training.n_starts >= FEWEST
+
+
+def most_iterations(
+    training: Training, *, n_samples: int, n_parameters: int, selects: bool, unites: bool, twice: bool
+) -> float:
+    """Iterations of all starts of a fit together, if none of them converges early.
+
+    Args:
+        training: How it is trained, with its number of starts.
+        n_samples: Samples that count.
+        n_parameters: Parameters of one network.
+        selects: Whether there are selection traces.
+        unites: Whether the structure's starts can be one model.
+        twice: Whether a short record of it is fitted a second time.
+
+    Returns:
+        Their number.
+    """
+    elected = selects and training.choose_by == "selection"
+    free = training.regularisation is None and training.loop is Loop.CLOSED
+    short = twice and free and is_short(n_samples, n_parameters)
+    least = training.ensemble if unites and not (twice and elected) else 1
+    if short and not elected and training.choose_by == "selection" and training.n_starts >= FEWEST:
+        least = training.n_starts
+    return planned_iterations(training, least) + (training.max_iterations * least if short else 0)
 
 
 def placed(

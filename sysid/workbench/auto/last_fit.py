@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from sysid.estimation import Training
 from sysid.estimation.estimators import estimator_of
-from sysid.estimation.networks.starts.multistart import is_short
+from sysid.estimation.networks.middle import most_iterations
 from sysid.models.store import structure_from_dict
 from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.beyond import Beyond
-from sysid.workbench.auto.budget import GOING_ON, REFIT, price
+from sysid.workbench.auto.budget import GOING_ON, REFIT
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.parts import ENSEMBLE, LAST, UNITED, Parts
 from sysid.workbench.auto.plan import FINALISTS, Plan
@@ -90,10 +90,13 @@ class LastFit:
         if estimator_of(structure).training is not Training:
             return math.nan
         point, samples = plan.points[trial.number], sum(map(len, self.data.estimation))
-        fits = 2 if estimator_of(structure).twice and is_short(samples, trial.parameters) else 1
         models = 1 if structure.for_outputs(self._n_outputs).several_outputs else self._n_outputs
-        longer = replace(point, training={**point.training, **way})
-        return slowed * trial.iteration_s * price(longer) * fits * more * models
+        row = estimator_of(structure)
+        iterations = most_iterations(
+            Training(**{**point.training, **way}).with_starts(row.starts), n_samples=samples,
+            n_parameters=trial.parameters, selects=False, unites=row.unites, twice=row.twice,
+        )  # fmt: skip
+        return slowed * trial.iteration_s * iterations * more * models
 
     def kept(self, plan: Plan) -> float:
         """Share of the time that is kept for it: no more than those of the best take, and as much again.

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, Training
 from sysid.estimation.estimators import estimator_of
+from sysid.estimation.networks.middle import most_iterations
 from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.estimation.stability.check import LEAST_S
 from sysid.traces import Trace, TraceSet
@@ -60,10 +61,17 @@ def how_long(fit: FitConfig, config: PipelineConfig, data: Data) -> Estimate:
     training = fit.training_options(config.seed)
     if not isinstance(training, Training):
         return Estimate(seconds=_linear(fit, config, data), basis=f"measured now on 1/{SHARE} of the samples")
-    fits: list[FitResult] = []
+    fits, row = list[FitResult](), estimator_of(fit.structure)
+    training = training.with_starts(row.starts)
+
+    def iterations() -> float:
+        return most_iterations(
+            training, n_samples=sum(map(len, data.estimation)), n_parameters=fits[-1].model.n_parameters,
+            selects=bool(data.selection), unites=row.unites, twice=row.twice and fit.initial is None,
+        )  # fmt: skip
+
     trained = network_time(
-        training.with_starts(estimator_of(fit.structure).starts),
-        lambda few, note: fits.append(_fitted(fit, config, data, few, note)),
+        training, lambda few, note: fits.append(_fitted(fit, config, data, few, note)), iterations=iterations
     )
     seconds = trained.seconds or 0.0
     checked = min(_checked(fits[-1], fit, config, data), max(LEAST_S, config.stability.time_share * seconds))
@@ -85,7 +93,11 @@ def _checked(found: FitResult, fit: FitConfig, config: PipelineConfig, data: Dat
 
 
 def network_time(
-    training: Training, fit: Callable[[Training, Callable[[FitProgress], None]], object], *, share: float = 1.0
+    training: Training,
+    fit: Callable[[Training, Callable[[FitProgress], None]], object],
+    *,
+    share: float = 1.0,
+    iterations: Callable[[], float] | None = None,
 ) -> Estimate:
     """How long the training of a network takes, from a few iterations of it.
 
@@ -93,6 +105,7 @@ def network_time(
         training: The training.
         fit: Fits with other options, those that take few iterations; given whom to tell of each.
         share: Part of the samples that this fit is on.
+        iterations: How many all starts make together, asked after that fit; those of the training by default.
 
     Returns:
         At most so long.
@@ -115,13 +128,11 @@ def network_time(
     each = {main: _median([when for stage, when in stamps if (stage == last) is main]) for main in (True, False)}
     iteration, earlier = (each[True] or total) / share, each[False] or 0.0
     around = max(total - sum((each[stage == last] or 0.0) for stage, _ in stamps), 0.0)
-    iterations, side_by_side = (
-        planned_iterations(training),
-        min(training.workers, training.n_starts, os.cpu_count() or 1),
-    )
+    made = planned_iterations(training) if iterations is None else iterations()
+    side_by_side = min(training.workers, training.n_starts, os.cpu_count() or 1)
     before = earlier * training.pretraining_iterations * training.n_starts if training.pretraining else 0.0
-    seconds = around + min((before + iterations * iteration) / side_by_side, training.max_time_s)
-    trained = f"{iterations:.0f} iterations of {1e3 * iteration:.1f} ms, {side_by_side} at a time"
+    seconds = around + min((before + made * iteration) / side_by_side, training.max_time_s)
+    trained = f"{made:.0f} iterations of {1e3 * iteration:.1f} ms, {side_by_side} at a time"
     ahead = f", {duration(before / side_by_side)} one step ahead" if before else ""
     return Estimate(seconds=seconds, basis=f"at most: {duration(around)}{ahead}, then {trained}")
 

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid.estimation import Training, fit_narx
+from sysid.estimation import Loop, Training, fit_narx
+from sysid.estimation.networks.middle import most_iterations
+from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.models import NARX
 from tests.estimation.networks.test_cautious import MAPPING, SMALL, recorded
 from tests.traces.made import trace_of
@@ -81,3 +83,28 @@ def test_without_noise_the_middle_of_those_that_miss_it_is_not_taken():
     fit = fit_narx([trace_of({"u": u, "y": y})], MAPPING, MEDIUM, replace(FOUR, starts=5))
     (chosen,) = (attempt for attempt in fit.attempts if attempt.chosen)
     assert chosen.estimation_mse <= 4.0 * min(attempt.estimation_mse for attempt in fit.attempts)
+
+
+def test_what_all_of_it_takes_is_told_before():
+    training = Training(max_iterations=100, starts=4)
+    lagged = {"n_samples": 300, "n_parameters": 31, "unites": True, "twice": True}
+    assert most_iterations(training, selects=False, **lagged) == 800.0  # four to their end, twice
+    assert most_iterations(training, selects=True, **lagged) == planned_iterations(training) + 100.0  # the best again
+    assert most_iterations(training, selects=False, **(lagged | {"n_samples": 3000})) == planned_iterations(training)
+    united = replace(training, ensemble=3, choose_by="evidence")
+    assert most_iterations(united, selects=True, **lagged) == planned_iterations(united, 3) + 300.0
+    hidden = lagged | {"twice": False}
+    assert most_iterations(replace(training, ensemble=3), selects=True, **hidden) == planned_iterations(training, 3)
+    for other in (replace(training, regularisation=0.1), replace(training, loop=Loop.OPEN)):
+        assert most_iterations(other, selects=False, **lagged) == planned_iterations(training)
+
+
+def test_as_many_iterations_are_made_as_were_told(fit):
+    ends = {}
+    for attempt in fit.attempts:
+        ends[attempt.start, attempt.cautious] = attempt.iterations
+    told = most_iterations(
+        FOUR, n_samples=300, n_parameters=fit.model.n_parameters, selects=False, unites=True, twice=True
+    )
+    assert sum(ends.values()) <= told
+    assert len(ends) * FOUR.max_iterations == told
