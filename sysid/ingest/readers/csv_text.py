@@ -16,6 +16,7 @@ from sysid.errors import ReaderError
 from sysid.ingest.cells.calendar import Calendar
 from sysid.ingest.cells.headers import Header, parse_headers, split_reference
 from sysid.ingest.cells.words import WordCollector, states_for
+from sysid.ingest.readers.csv_beside import records_beside
 from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
 from sysid.ingest.readers.csv_cells import Kind, unit_text
 from sysid.ingest.readers.csv_layout import Layout, recognise
@@ -96,7 +97,7 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
     step = said_step(above)
     if step is not None and clock is None:
         notes.append(f"sample time {step:g} s, from the lines above the table")
-    return RawTable(
+    table = RawTable(
         source=path,
         reader="csv",
         columns=raw,
@@ -115,6 +116,7 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
             "zone": guess,
         },
     )
+    return table if time is not None else replace(table, records=records_beside(table))
 
 
 WIDE = 4

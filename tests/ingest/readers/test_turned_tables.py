@@ -1,4 +1,4 @@
-"""Tables whose head is numbers, tables that lie on their side, and arrays that are no tables."""
+"""Tables whose head is numbers, that lie on their side or beside each other, and arrays that are no tables."""
 
 from __future__ import annotations
 
@@ -127,3 +127,33 @@ def test_a_remedy_names_a_command_that_works(tmp_path: Path) -> None:
         sysid.load(tmp_path / "a.csv")
     assert "which proposes these options" not in str(refused.value.remedy)  # that command comes to the same error
     assert "Options are typed behind sysid ingest" in str(refused.value.remedy)
+
+
+def beside(head: str, second: list[str]) -> str:
+    """Two records side by side, of which the second may be shorter."""
+    rows = [f"{t:.1f},{u},{y},{again}" for t, u, y, again in zip(T, U, Y, second, strict=True)]
+    return "\n".join([head, *rows]) + "\n"
+
+
+SHORTER = [f"{t:.1f},{y},{u}" if k < 40 else ",," for k, (t, u, y) in enumerate(zip(T, U, Y, strict=True))]
+
+
+@pytest.mark.parametrize("head", ["t1,u1,y1,t2,u2,y2", "t [s],u [V],y [V],t [s],u [V],y [V]"])
+def test_records_side_by_side_have_a_clock_each(tmp_path: Path, head: str) -> None:
+    (tmp_path / "a.csv").write_text(beside(head, SHORTER), encoding="utf-8")
+    with pytest.warns(UserWarning, match="2 records"):
+        one, two = sysid.load(tmp_path / "a.csv").traces
+    np.testing.assert_allclose(one["y"], Y)
+    np.testing.assert_allclose(two["u"], Y[:40])
+
+
+@pytest.mark.parametrize(
+    ("head", "second"),
+    [
+        ("t1,u1,y1,t2,u2,y2", [f"{t:.1f},{y},{u}" for t, u, y in TABLE]),  # one clock, written again
+        ("t,u1,y1,u2,y2,v", [f"{y},{u},{t}" for t, u, y in TABLE]),
+    ],
+)
+def test_channels_of_one_clock_are_one_record(tmp_path: Path, head: str, second: list[str]) -> None:
+    (tmp_path / "a.csv").write_text(beside(head, second), encoding="utf-8")
+    assert read_table(tmp_path / "a.csv").records == ()
