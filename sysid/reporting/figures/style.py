@@ -76,6 +76,10 @@ def styled() -> AbstractContextManager[None]:
     return mpl.rc_context(_STYLE)
 
 
+LEAST_SPAN = 1.1
+"""Ratio of the ends of a logarithmic axis, at least: ticks of what hardly changes have the same digits."""
+
+
 def logarithmic(axes: Axes, *, across: bool = False) -> None:
     """A logarithmic axis, where anything that is drawn has a logarithm: what never changes may have no error.
 
@@ -83,9 +87,16 @@ def logarithmic(axes: Axes, *, across: bool = False) -> None:
         axes: With its lines.
         across: Whether it is the axis of ``x``.
     """
-    drawn = (np.asarray(line.get_xdata() if across else line.get_ydata(), float) for line in axes.get_lines())
-    if any((values > 0.0).any() for values in drawn):
-        (axes.set_xscale if across else axes.set_yscale)("log")
+    drawn = [np.asarray(line.get_xdata() if across else line.get_ydata(), float) for line in axes.get_lines()]
+    values = np.concatenate([*drawn, np.empty(0)])
+    values = values[np.isfinite(values) & (values > 0.0)]
+    if not len(values):
+        return
+    (axes.set_xscale if across else axes.set_yscale)("log")
+    low, high = float(values.min()), float(values.max())
+    if high < LEAST_SPAN * low:  # ticks would all have the same digits
+        room = np.sqrt(LEAST_SPAN * low / high)
+        (axes.set_xlim if across else axes.set_ylim)(low / room, high * room)
 
 
 class Drawing(Figure):
