@@ -17,10 +17,10 @@ from sysid.errors import ReaderError
 from sysid.extras import need
 from sysid.ingest.readers import hdf5
 from sysid.ingest.readers.bounds import check_claim
+from sysid.ingest.readers.late import table_of
 from sysid.ingest.readers.leaves import Leaf, number_of, refused
 from sysid.ingest.readers.modelica import is_result, result_tree
 from sysid.ingest.readers.reader import Reader, damaged
-from sysid.ingest.readers.tree import table_of
 from sysid.ingest.tables.options import FileOptions, RepairOptions
 from sysid.ingest.tables.table import RawTable
 
