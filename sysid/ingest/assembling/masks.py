@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
 from sysid.ingest.cells.began import Began
-from sysid.ingest.tables.options import MaskOptions, RepairOptions
+from sysid.ingest.tables.mask_options import MaskOptions
+from sysid.ingest.tables.options import RepairOptions
 from sysid.traces import Trace
 
 

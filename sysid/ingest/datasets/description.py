@@ -9,11 +9,11 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from sysid.errors import ConfigError, UnitError
 from sysid.field_checks import FieldError, check
+from sysid.ingest.tables.option_group import Options
 from sysid.ingest.tables.options import (
     ColumnOption,
     FileOptions,
     GridOptions,
-    Options,
     RepairOptions,
     Rows,
     TimeOption,
