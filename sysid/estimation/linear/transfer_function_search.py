@@ -268,14 +268,14 @@ def _about_its_level(free: AbstractProblem, found: End, watch: Watch) -> tuple[A
 
     Without it a pole a little off 1 makes the ramp, from a state as far away: a plant that grows, or one that settles.
     """
-    plain = free.at_one(found)
+    plain = free.at_one(found, every=True)
     level = free.levelled(plain)
     if level is None:
         return free, found
     begun = tried(PoleStart(name="level", sections=plain.sections), found.delays, level.provider(found.delays))
     if not np.isfinite(begun.loss):
         return free, found
-    other = level.at_one(long_run(begun, free.training, watch))
+    other = level.at_one(long_run(begun, free.training, watch), every=True)
     # Each pole that leaves 1 brings a state of its own to bend a ramp by.
     bent = int(np.count_nonzero(found.theta != plain.theta)) - 1
     if not plain.worse_than(other) or other.worse_than(found, free=max(bent, 0)):
