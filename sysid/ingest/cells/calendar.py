@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
 from sysid.ingest.cells.began import Began
+from sysid.ingest.cells.date_orders import DAY, days_of, full_year
 from sysid.ingest.cells.stamp_forms import usual_form
-from sysid.ingest.cells.zones import guess_zone, to_utc, utc_microseconds
+from sysid.ingest.cells.zones import guess_zone, to_utc
 
-_DAY = 86_400_000_000
 _NONE = np.iinfo(np.int64).min
 _ZONELESS = 100_000
 _MONTHS = {
@@ -111,7 +111,7 @@ def _date_code(found: re.Match[str]) -> int | None:
         number = _MONTHS.get(found["month"].casefold())
         if number is None:
             return None
-        year, month, day = _full_year(int(found["year"])), number, int(found["day"])
+        year, month, day = full_year(int(found["year"])), number, int(found["day"])
     else:
         year, month, day = int(found["a"]), int(found["b"]), int(found["c"])
     return year * 100_000_000 + month * 10_000 + day
@@ -197,10 +197,6 @@ def _minutes(zone: str | None) -> int:
         return 60 * _HOURS_AHEAD.get(zone, 0)
     digits = zone[1:].replace(":", "")
     return (-1 if zone[0] == "-" else 1) * (int(digits[:2]) * 60 + int(digits[2:] or 0))
-
-
-def _full_year(year: int) -> int:
-    return year if year > 99 else year + (2000 if year < 70 else 1900)
 
 
 @dataclass(kw_only=True)
@@ -323,8 +319,8 @@ class Calendar:
         if not dates.any():
             local, notes = _over_midnight(micros)
         else:
-            days, notes = _days(dates, micros, self.where)
-            local = days * _DAY + micros
+            days, notes = days_of(dates, micros, self.where)
+            local = days * DAY + micros
         guess = None
         if zoned.all():
             local = local - 60_000_000 * offsets
@@ -345,9 +341,9 @@ class Calendar:
 
 def _over_midnight(micros: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:
     """Times of day in the order in which they were written: each fall by more than half a day is a midnight."""
-    passed = np.cumsum(np.concatenate([[0], np.diff(micros) < -_DAY // 2]))
+    passed = np.cumsum(np.concatenate([[0], np.diff(micros) < -DAY // 2]))
     notes = [f"midnight passes {int(passed[-1])} times" if passed[-1] > 1 else "midnight passes"] if passed[-1] else []
-    return micros + _DAY * passed, notes
+    return micros + DAY * passed, notes
 
 
 def _told_zone(local: NDArray[np.int64], notes: list[str]) -> tuple[str | None, list[str]]:
@@ -359,51 +355,3 @@ def _told_zone(local: NDArray[np.int64], notes: list[str]) -> tuple[str | None, 
     shown = np.datetime64(int(local[index]), "us").astype("datetime64[m]")
     told = f"an hour {hour} at {str(shown).replace('T', ' ')}: local time; time: {{zone: {zone}}} says so"
     return zone, [*notes, told]
-
-
-_ORDERS = {"year-month-day": (0, 1, 2), "day-month-year": (2, 1, 0), "month-day-year": (2, 0, 1)}
-
-
-def _days(dates: NDArray[np.int64], micros: NDArray[np.int64], where: str) -> tuple[NDArray[np.int64], list[str]]:
-    """Days since 1970 of dates of three numbers, in the order of them that can be."""
-    codes, places = np.unique(dates, return_inverse=True)
-    parts = [codes // 100_000_000, codes // 10_000 % 10_000, codes % 10_000]
-    possible: dict[str, NDArray[np.int64]] = {}
-    for name, order in _ORDERS.items():
-        year, month, day = (parts[index] for index in order)
-        if ((parts[0] > 31) != (order[0] == 0)).any() or (month > 12).any() or (day > 31).any() or (day < 1).any():
-            continue
-        found = _since_1970(year, month, day)
-        if found is not None:
-            possible[name] = found[places]
-    if not possible:
-        raise ReaderError(
-            "a date cannot be told",
-            where=where,
-            expected="year-month-day, day.month.year or month/day/year, one of them throughout",
-            got=f"{parts[0][0]}, {parts[1][0]}, {parts[2][0]} and others",
-            remedy="give its pattern, for example time: {unit: datetime, format: '%d.%m.%Y %H:%M:%S'}",
-        )
-    if len(possible) == 1:
-        return next(iter(possible.values())), []
-
-    def unevenness(days: NDArray[np.int64]) -> tuple[int, int]:
-        steps = np.diff(days * _DAY + micros)
-        return int((steps <= 0).sum()), int(steps.max(initial=0))
-
-    best = min(possible, key=lambda name: unevenness(possible[name]))
-    if unevenness(possible[best])[0]:
-        # A clock that steps back may tell the date: the night on which it was put back.
-        best = next((name for name, days in possible.items() if guess_zone(days * _DAY + micros)), best)
-    differ = len(codes) > 1
-    return possible[best], [f"dates taken as {best}, which is a guess: time.format says it"] if differ else []
-
-
-def _since_1970(year: NDArray[np.int64], month: NDArray[np.int64], day: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    days = []
-    for y, m, d in zip(year.tolist(), month.tolist(), day.tolist(), strict=True):
-        try:
-            days.append(utc_microseconds(datetime(_full_year(y), m, d)) // _DAY)
-        except ValueError:
-            return None
-    return np.array(days, dtype=np.int64)
