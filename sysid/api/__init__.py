@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from sysid.api.fitting import load as load
     from sysid.api.looking import advise as advise
     from sysid.api.looking import excite as excite
-    from sysid.api.orders import OrderSearch as OrderSearch
+    from sysid.api.order_search import OrderSearch as OrderSearch
     from sysid.api.orders import search_orders as search_orders
     from sysid.api.responses import bode as bode
     from sysid.api.responses import poles as poles

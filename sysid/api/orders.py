@@ -4,249 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from html import escape
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from sysid.api.fits import Fit
 from sysid.api.given import ESTIMATED, TracesLike, traces_of
-from sysid.api.per_output import PerOutput, framed
+from sysid.api.order_search import BY_SELECTION, OrderSearch, SystemOrderSearch
 from sysid.errors import ConfigError, shortened
-from sysid.estimation import StabilityOptions, estimators
-from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
-from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
+from sysid.estimation.linear.state_space.orders import state_orders
 from sysid.estimation.nonparametric.dead_time import longest_dead_time, shares
 from sysid.estimation.nonparametric.feedback import feedback_of
-from sysid.extras import need
-from sysid.models import ARX, Mapping, Start, StartLike
+from sysid.models import Mapping, Start, StartLike
 from sysid.models.orders.lags import whole
-from sysid.reporting.numbers import pole
 from sysid.traces import Role, Trace, TraceSet
-from sysid.validation.metrics import percent
-from sysid.validation.order_finalists import Finalist, alike_with, run_finalists, smallest_first
-from sysid.validation.structure_search import ARX_KIND, MOST, Found, check_kinds, run_structures, score
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
+from sysid.validation.order_finalists import run_finalists, smallest_first
+from sysid.validation.structure_search import ARX_KIND, MOST, check_kinds, run_structures, score
 
 LARGEST = 400_000
 """Candidates that a search without orders of its own tries at most: some seconds."""
 
-BY_SELECTION = "sorted by the free run over the selection traces"
-CLOSED_LOOP = "The output acts on an input within the sample (closed loop): dead times are searched from 1 on."
 LATE_SHARE, LATE_GAIN = 0.2, 1.2
 """Part of the output that a longer dead time than the usual ones must explain, and how much more than they do."""
 FINALISTS = 40
 """Candidates that are run freely."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class OrderSearch:
-    """Every candidate with its loss, and a shortlist in free run.
-
-    Args:
-        losses: All candidates.
-        finalists: The shortlist, best first: by the free run over the selection traces where there are some, the
-            smallest of those that cannot be told from the best before all; by BIC otherwise.
-        chosen_by: By what the shortlist is sorted, as a sentence.
-        grid: What was searched.
-        mapping: Inputs and output.
-        traces: The data set.
-        start: How each free run begins.
-        others: What became of other structures, where some were asked for.
-        states: Canonical correlations of past and future, where state spaces were.
-    """
-
-    losses: OrderLosses
-    finalists: tuple[Finalist, ...]
-    chosen_by: str
-    grid: OrderGrid
-    mapping: Mapping
-    traces: TraceSet
-    start: Start
-    others: Found | None = None
-    states: StateOrders | None = None
-
-    def best(self, criterion: str | None = None) -> ARX:
-        """The structure to go on with.
-
-        Args:
-            criterion: ``AIC``, ``AICc``, ``BIC`` or ``loss``; the first of the shortlist by default.
-
-        Returns:
-            The structure.
-
-        Raises:
-            ConfigError: If there is no such criterion.
-        """
-        if criterion is None:
-            return _orders(self.finalists[0])
-        known = {one.value.lower(): one for one in Criterion}
-        if criterion.lower() not in known:
-            raise ConfigError(
-                "unknown criterion",
-                where="criterion",
-                expected=", ".join(one.value for one in Criterion),
-                got=criterion,
-                remedy="write one of these, or leave it out for the best free run",
-            )
-        return self.losses.best(known[criterion.lower()])
-
-    @property
-    def contenders(self) -> tuple[Finalist, ...]:
-        """All structures in one table, best first: the best ARX models, and every other structure that was fitted."""
-        if self.others is None:
-            return self.finalists
-        known = {one.fit.model.structure.label: one for one in self.finalists}
-        by_bic = known.get(self.losses.best().label)
-        arx = [self.finalists[0], *([by_bic] if by_bic is not None else [])]
-        found = list({one.fit.model.structure.label: one for one in [*arx, *self.others.finalists]}.values())
-        if self.selects:
-            return smallest_first(sorted(found, key=lambda one: -one.mean_fit))
-        return tuple(sorted(found, key=lambda one: self.score(one, Criterion.BIC)))
-
-    @property
-    def selects(self) -> bool:
-        """Whether traces chose that nothing was fitted to."""
-        return self.chosen_by == BY_SELECTION
-
-    @property
-    def fit(self) -> Fit:
-        """The fit of the first of all, with what every fit says of its records."""
-        structure = self.contenders[0].fit.model.structure
-        # Those of the search were fitted by the dozen, and say nothing.
-        checked = StabilityOptions() if isinstance(structure, ARX) else None
-        estimation = self.traces.with_role(Role.ESTIMATION)
-        found = estimators.fit(estimation, self.mapping, structure, start=self.start, stability=checked)
-        return Fit.of(found, self.traces, self.start)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a reader has to know: where the best stands at the end of what was tried."""
-        best, grid = _orders(self.finalists[0]), self.grid
-        at_end = [
-            f"{name} = {found}"
-            for name, found, largest in (
-                ("na", best.na, grid.max_na),
-                ("nb", max(best.nb, default=0), grid.max_nb),
-                ("nk", max(best.nk, default=0), grid.max_nk),
-            )
-            if found == largest > 0
-        ]
-        arx = "The best" if self.others is None else "The best ARX model"
-        told = [CLOSED_LOOP] if grid.min_nk else []
-        told += self._tie
-        told += [f"{arx} stands at the end of what was tried ({', '.join(at_end)}): allow more."] if at_end else []
-        if self.others is not None:
-            first = self.contenders[0].fit.model.structure.label
-            at_largest = first in self.others.largest
-            told += [f"{first} has the largest order that was tried of its kind: allow more (most)."] * at_largest
-            told += self.others.notes
-        return tuple(told)
-
-    @property
-    def _tie(self) -> list[str]:
-        """That the best free run is no better than smaller ones by more than chance, where that is so."""
-        if not self.selects:
-            return []
-        first, best = self.contenders[0], max(self.contenders, key=lambda one: one.mean_fit)
-        alike = alike_with(best, self.contenders)
-        if best is first or first not in alike:
-            return []
-        labels = [one.fit.model.structure.label for one in (first, best)]
-        return [
-            f"{labels[0]} is put first: the smallest of {len(alike)} whose free runs differ by no more than one "
-            f"standard error from the best, {labels[1]} ({percent(best.mean_fit)} %)."
-        ]
-
-    def to_frame(self) -> pd.DataFrame:
-        """The shortlist as a table, best first.
-
-        Returns:
-            Columns ``structure``, ``parameters``, ``one_step_mse``, ``AIC``, ``AICc``, ``BIC``, ``fit`` (mean over the
-            cases that chose, percent), ``largest_pole`` (magnitude) and ``stable``.
-        """
-        need("pandas", "a frame")
-        import pandas as pd
-
-        criteria = (Criterion.AIC, Criterion.AICC, Criterion.BIC)
-        rows = [
-            {
-                "structure": one.fit.model.structure.label,
-                "parameters": one.fit.model.n_parameters,
-                "one_step_mse": one.one_step_mse,
-                **{criterion.value: self.score(one, criterion) for criterion in criteria},
-                "fit": one.mean_fit,
-                "largest_pole": one.pole_radius,
-                "stable": bool(np.isfinite(one.mean_fit)) and not one.pole_radius >= 1.0,
-            }
-            for one in self.contenders
-        ]
-        return pd.DataFrame(rows)
-
-    def score(self, finalist: Finalist, criterion: Criterion) -> float:
-        """A criterion of a structure; smaller is better.
-
-        Args:
-            finalist: The structure, with its loss.
-            criterion: Which criterion.
-
-        Returns:
-            Its value, without a unit.
-        """
-        return score(finalist, self.losses, criterion)
-
-    def plot(self) -> Figure:
-        """Loss against number of parameters, with what each criterion chooses.
-
-        Returns:
-            A figure of matplotlib's.
-        """
-        from sysid.reporting.figures.order_figure import OrderCurve, order_figure
-
-        return order_figure(OrderCurve.of(self.losses), unit=self.unit)
-
-    @property
-    def unit(self) -> str:
-        """The output's unit."""
-        return self.traces[self.traces.names[0]].channel(self.mapping.output).unit
-
-    def __str__(self) -> str:
-        head = f"{'structure':<24}{'parameters':>11}{'one-step mse':>14}{'BIC':>12}{'free run, fit %':>17}"
-        head += f"{'largest pole':>14}"
-        lines = [
-            f"{one.fit.model.structure.label:<24}{one.fit.model.n_parameters:>11}{one.one_step_mse:>14.4g}"
-            f"{self.score(one, Criterion.BIC):>12.1f}{percent(one.mean_fit):>17}"
-            f"  {pole(one.pole_radius):>12}"
-            for one in self.contenders[: 10 if self.others is None else None]
-        ]
-        return "\n".join([f"{len(self.losses):,} structures; {self.chosen_by}", head, *lines, *self.notes])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class SystemOrderSearch(PerOutput[OrderSearch]):
-    """The searches of a record of several outputs, as an ARX model an output is fitted; see the base class."""
-
-    def to_frame(self) -> pd.DataFrame:
-        """The shortlists as a table, best first for each output.
-
-        Returns:
-            ``output``, and the columns of :meth:`OrderSearch.to_frame`.
-        """
-        return framed(self.outputs)
-
-
-@one_blas_thread()
 def search_orders(
     traces: TracesLike,
     mapping: str | Mapping | Dict[str, Any],
@@ -424,8 +209,3 @@ def _as_late(grid: OrderGrid, traces: Sequence[Trace], mapping: Mapping) -> Orde
 def _least(losses: OrderLosses) -> float:
     """The least BIC a sample: grids that begin late have fewer of these."""
     return float(losses.score(Criterion.BIC).min()) / max(losses.n_samples, 1)
-
-
-def _orders(finalist: Finalist) -> ARX:
-    """The structure; the search fits nothing but these."""
-    return cast("ARX", finalist.fit.model.structure)

@@ -7,7 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 import sysid
-from sysid.api.orders import LARGEST, OrderSearch, _grid
+from sysid.api.order_search import OrderSearch
+from sysid.api.orders import LARGEST, _grid
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation.linear.order_search import Criterion
 
@@ -49,7 +50,7 @@ def test_the_selection_traces_choose_where_there_are_some(found: OrderSearch) ->
 
 
 def test_an_unstable_pole_stands_apart_from_the_free_run(found: OrderSearch, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sysid.api.orders.pole", lambda _: "1.0005, unstable")
+    monkeypatch.setattr("sysid.api.order_search.pole", lambda _: "1.0005, unstable")
     assert "  1.0005, unstable" in str(found)
 
 

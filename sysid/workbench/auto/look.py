@@ -10,7 +10,8 @@ import numpy as np
 
 from sysid.advice import Advice, Verdict, advise, looked_at
 from sysid.advice.dynamics import INTEGRATES
-from sysid.api.orders import OrderSearch, search_orders
+from sysid.api.order_search import OrderSearch
+from sysid.api.orders import search_orders
 from sysid.errors import UserError
 from sysid.estimation.linear.state_space.orders import state_orders
 from sysid.estimation.records.output_ends import found_ends

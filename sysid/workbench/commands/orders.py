@@ -11,7 +11,8 @@ from rich.table import Table
 
 from sysid.api.fitting import load
 from sysid.api.looking import mapping_of
-from sysid.api.orders import OrderSearch, SystemOrderSearch, search_orders
+from sysid.api.order_search import OrderSearch, SystemOrderSearch
+from sysid.api.orders import search_orders
 from sysid.estimation.linear.order_search import Criterion
 from sysid.models import AbstractStructure
 from sysid.names import slug

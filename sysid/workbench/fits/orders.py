@@ -16,7 +16,7 @@ from sysid.workbench.old_words import STRICT
 from sysid.workbench.runner.store import digest
 
 if TYPE_CHECKING:
-    from sysid.api.orders import OrderSearch
+    from sysid.api.order_search import OrderSearch
     from sysid.workbench.fits.config import PipelineConfig
     from sysid.workbench.fits.data import Data
 
