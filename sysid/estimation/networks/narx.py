@@ -71,7 +71,8 @@ def fit_narx(
         training: How to train.
         start: What stands before each trace; at rest by default.
         rest_output: Output at rest in its unit, or by name; the mean of the traces' first samples where not given.
-        selection: Traces that choose between starts; without them the evidence chooses.
+        selection: Traces that choose between starts; without them the evidence does, or where the record is short
+            the distance from the middle of all (``middle.py``).
         initial: A fit whose parameters are the first start: of the same structure, of a smaller network over some of
             its lags, or of a linear model over them.
         resume: Where the fit of a single start was put aside; it goes on as if it had not been.

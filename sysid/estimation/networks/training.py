@@ -70,9 +70,11 @@ class Training(TypedFields):
         tolerance: Relative improvement over ``patience`` iterations below which a start has converged.
         patience: Iterations over which improvement is judged.
         starts: Starts; successive halving: half of them dropped at each of four checkpoints. By default as many as the
-            structure needs: one for lagged regressors, several for hidden states.
+            structure needs: one for lagged regressors, several for hidden states, half as many again as an ensemble has
+            members. Three or more of a NARX on a short record without selection traces all come to their end.
         seed: Seed of the first start; the others count up from it.
-        choose_by: What chooses in the end: ``selection`` (least error on traces that are used for nothing else) or
+        choose_by: What chooses in the end: ``selection`` (least error on traces that are used for nothing else; where
+            there are none the evidence, or of the NARX above who stands in the middle of all, ``middle.py``) or
             ``evidence``.
         within: Share of each output's range over the selection traces that the root mean square of its error may come
             to: who stays within it on more of these traces comes before who has the least mean, which hides one that
