@@ -98,14 +98,18 @@ def pole(radius: float) -> str:
         radius: The magnitude; NaN for a model that is not linear.
 
     Returns:
-        It, and a word where it is not stable.
+        It, and a word where it is not stable: at 1, but for rounding, it integrates.
 
     Example:
         >>> pole(0.9512), pole(0.99996), pole(1.02), pole(float("nan"))
         ('0.951', '0.99996', '1.02, unstable', '')
+        >>> pole(1.0 + 2e-8)
+        '1, integrates'
     """
     if math.isnan(radius):
         return ""
+    if -1e-9 <= radius - 1.0 <= 1e-6:
+        return "1, integrates"
     digits = 3 if abs(radius - 1.0) > 5e-4 else 5
     return f"{radius:.{digits}g}" if radius < 1.0 else f"{radius:.{digits}g}, unstable"
 
