@@ -84,13 +84,19 @@ class Members:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class United(AbstractUnited):
-    """The ensemble of NARX networks; see the base class."""
+    """The ensemble of NARX networks; see the base class.
+
+    Args:
+        networks: How many it unites; a start that was elected may be in it as it was at two looks.
+    """
+
+    networks: int
 
     @property
     def made(self) -> str:
         """See the base class."""
-        n = len(set(self.candidate.members))
-        return f"the mean of {n} starts' maps one step ahead as one network; it has {n} times the neurons of one"
+        n = self.networks
+        return f"the mean of {n} networks' maps one step ahead as one network; it has {n} times the neurons of one"
 
 
 def members_of(
@@ -227,7 +233,10 @@ def as_start(multistart: starts.Multistart, members: Members, task: Task) -> Uni
             one.number for one, picks in zip(members.candidates, members.picks, strict=True) for _ in range(picks)
         ),
     )
-    return United(candidate=candidate, left_out=members.left_out, unstable=members.unstable, elected=elects(multistart))
+    return United(
+        candidate=candidate, left_out=members.left_out, unstable=members.unstable, elected=elects(multistart),
+        networks=len(members.candidates),
+    )  # fmt: skip
 
 
 def united(members: Sequence[Lagged], picks: Sequence[int]) -> Lagged:

@@ -174,7 +174,8 @@ def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Tra
         if compared:
             how = MIDDLE
         begun = len({one.number for one in candidates if not one.members})
-        taken = "Chosen" if choice.chosen in raced else "Ranked"
+        alone = choice.by_selection or not choice.chosen.members
+        taken = "Chosen" if alone and choice.chosen in raced else "Ranked"
         notes.append(f"{taken} by {how} among {begun} starts looked at {len(raced)} times.")
         if begun < training.n_starts and np.isfinite(training.max_time_s):
             notes.append(
