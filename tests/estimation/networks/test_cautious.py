@@ -64,6 +64,7 @@ def test_a_short_noisy_record_is_not_learnt_by_heart(seed: int, monkeypatch: pyt
     assert chosen.cautious
     (told,) = (note for note in fit.notes if "The record is short: 500 samples for 109 parameters." in note)
     assert "it was taken, since the smaller error of the other does not pay for the parameters" in told
+    assert told.endswith("of three or more (starts: 5) the one in the middle of all is taken.")
     assert off(fit, after) < 0.12
     monkeypatch.setattr(multistart, "SHORT", 0.0)
     once = fit_narx([record], MAPPING, LARGE, training)

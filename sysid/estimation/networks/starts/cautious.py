@@ -110,6 +110,11 @@ WHY = {
     Place.LAST: "since no other that was looked at has a stable free run",
 }
 """Why a cautious fit was taken without selection traces, by its place."""
+ONE_START = (
+    "One start of a short record says as much of the start as of the record: of three or more (starts: 5) the one in "
+    "the middle of all is taken."
+)
+"""What is said where there was one."""
 
 
 def told(choice: Choice, candidates: Sequence[Candidate], n_samples: int) -> tuple[str, ...]:
@@ -128,13 +133,15 @@ def told(choice: Choice, candidates: Sequence[Candidate], n_samples: int) -> tup
         return ()
     short = f"The record is short: {n_samples:,} samples for {len(min(fits.items())[1].solution.theta)} parameters."
     what = "cautious fit was made, which counts errors that persist as fewer samples"
-    if choice.by_distance or choice.chosen.members:
+    if len(fits) > 1:
         taken = sum(one.place is Place.FIRST for one in fits.values())
-        return (
-            f"{short} So of {len(fits)} starts a second, {what}; of {taken} of them it was taken, {WHY[Place.FIRST]}.",
-        )
+        end = f"{taken} of them were taken, {WHY[Place.FIRST]}" if taken else "none of them was taken"
+        return (f"{short} So a second, {what}, of each of {len(fits)} starts; {end}.",)
     chosen, end = choice.chosen, "it was not taken"
     if chosen.cautious:
         why = "by its error on the selection traces" if choice.by_selection else WHY[chosen.place]
         end = f"it was taken, {why}"
-    return (f"{short} So a second, {what}; {end}.",)
+    told = f"{short} So a second, {what}; {end}."
+    if choice.by_selection or len({one.number for one in candidates}) > 1:
+        return (told,)
+    return (f"{told} {ONE_START}",)
