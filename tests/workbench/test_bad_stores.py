@@ -41,12 +41,15 @@ def cut(name: Path, share: float = 0.5) -> Callable[[], None]:
     return damage
 
 
-def flip(name: Path) -> Callable[[], None]:
-    """One byte in the middle of the file is another."""
+def flip(name: Path, *, after: bytes = b"") -> Callable[[], None]:
+    """One byte in the middle of the file is another, or the first one after some words.
+
+    In a file of numbers the middle may be the last digit of one, where another is the same number.
+    """
 
     def damage() -> None:
         data = bytearray(name.read_bytes())
-        data[len(data) // 2] ^= 0x01
+        data[data.index(after) + len(after) if after else len(data) // 2] ^= 0x01
         name.write_bytes(bytes(data))
 
     return damage
@@ -94,7 +97,7 @@ DAMAGES = [
     Damage(id="results that are a list", damage=lambda: (RUN / "results.json").write_text("[]"), command=REPORT, says=("results are damaged", "list")),
     Damage(id="signals cut short", damage=cut(RUN / "fits/open-loop/signals.npz"), command=REPORT, says=("signals.npz", "open-loop", "run the pipeline again")),
     Damage(id="a bundle's description cut short", damage=cut(BUNDLE / "model.json"), command=SIMULATE, says=("model.json", "remedy")),
-    Damage(id="a bundle's description with another byte", damage=flip(BUNDLE / "model.json"), command=SIMULATE, says=("model.json", "remedy")),
+    Damage(id="a bundle's description with another byte", damage=flip(BUNDLE / "model.json", after=b'"name": "'), command=SIMULATE, says=("model.json", "remedy")),
     Damage(id="a bundle's file with another byte", damage=flip(BUNDLE / "step.onnx"), command=SIMULATE, says=("step.onnx", "remedy")),
     Damage(id="a bundle's file that is gone", damage=remove(BUNDLE / "step.onnx"), command=SIMULATE, says=("step.onnx", "remedy")),
     Damage(id="a bundle of a newer release", damage=change(BUNDLE / "model.json", schema_version=99), command=SIMULATE, says=("99", "newer", "remedy")),
@@ -123,7 +126,7 @@ def test_a_damaged_store_is_named_and_nothing_else_is_touched(
 EXPORT = "export: {fit: closed loop, formats: [onnx]}"
 HEALED = {
     "a fit cut short": cut(RUN / "fits/arx/fit.json"),
-    "a fit with another byte": flip(RUN / "fits/open-loop/fit.json"),
+    "a fit with another byte": flip(RUN / "fits/open-loop/fit.json", after=b'"status": "'),
     "figures cut short": cut(RUN / "fits/arx/evaluation.json"),
     "signals that are gone": remove(RUN / "fits/closed-loop/signals.npz"),
     "a stamp cut short": cut(RUN / ".steps/fit-arx.json"),

@@ -329,7 +329,7 @@ def test_an_initial_fit_that_cannot_be_is_refused_in_the_same_words(
 @pytest.mark.parametrize(
     ("structure", "training", "words"),
     [
-        (NARX, {"ensemble": 2}, "an ensemble of a single start"),
+        (NARX, {"ensemble": 2, "starts": 1}, "an ensemble of a single start"),
         (GREY, {"regularisation": 0.1}, "nothing to regularise"),
         (POLYNOMIAL_NARX, {"regularisation": 0.1}, "nothing to regularise"),
         (HW, {"regularisation": 0.1}, "nothing to regularise"),
