@@ -12,7 +12,6 @@ from sysid.api.fits import Fit
 from sysid.api.per_output import PerOutput, framed
 from sysid.errors import ConfigError
 from sysid.estimation import StabilityOptions, estimators
-from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.estimation.linear.state_space.orders import StateOrders
 from sysid.extras import need
@@ -232,7 +231,6 @@ class SystemOrderSearch(PerOutput[OrderSearch]):
         return framed(self.outputs)
 
 
-@one_blas_thread()
 def _orders(finalist: Finalist) -> ARX:
     """The structure; the search fits nothing but these."""
     return cast("ARX", finalist.fit.model.structure)

@@ -12,6 +12,7 @@ import numpy as np
 from sysid.api.given import ESTIMATED, TracesLike, traces_of
 from sysid.api.order_search import BY_SELECTION, OrderSearch, SystemOrderSearch
 from sysid.errors import ConfigError, shortened
+from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import order_search
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.estimation.linear.state_space.orders import state_orders
@@ -32,6 +33,7 @@ FINALISTS = 40
 """Candidates that are run freely."""
 
 
+@one_blas_thread()
 def search_orders(
     traces: TracesLike,
     mapping: str | Mapping | Dict[str, Any],

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import sysid
+from sysid.api import orders
 from sysid.api.order_search import OrderSearch
 from sysid.api.orders import LARGEST, _grid
 from sysid.errors import ConfigError, TraceError
@@ -207,3 +211,19 @@ def test_a_late_correlation_that_is_no_dead_time_costs_no_grid_of_all_lags() -> 
     delayed = np.concatenate([np.zeros(400), y[:-400]])
     late = sysid.search_orders(sysid.data((u, delayed), sample_time=1.0), "u -> y")
     assert late.best().nk[0] in {400, 401}
+
+
+def test_linear_algebra_has_one_thread_while_orders_are_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many small problems: a second thread is waited for longer than it helps."""
+    seen, run = list[int](), orders.run_finalists
+
+    def watched(*args: Any, **options: Any) -> Any:
+        seen.extend(row["num_threads"] for row in threadpool_info() if row["user_api"] == "blas")
+        return run(*args, **options)
+
+    monkeypatch.setattr(orders, "run_finalists", watched)
+    u = np.random.default_rng(0).standard_normal(200)
+    y = lfilter([0.0, 0.5], [1.0, -0.8], u)
+    with threadpool_limits(limits=2, user_api="blas"):
+        sysid.search_orders(sysid.data((u, y), sample_time=1.0, split=0.6), "u -> y", max_na=2, max_nb=2, max_nk=2)
+    assert set(seen) == {1}

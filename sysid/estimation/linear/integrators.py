@@ -19,7 +19,7 @@ from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.poles import sections_of
 from sysid.estimation.linear.transfer_function_runs import End, flat_prior
-from sysid.estimation.linear.variable_projection import PoleParameters
+from sysid.estimation.linear.variable_projection import PoleParameters, Sections
 from sysid.models.converting.orthonormal_basis import Domain, section_poles
 
 STEPS = 30
@@ -73,6 +73,32 @@ class _Free(AbstractProvider):
         here = self.whole.linearise(self.full(theta), correlation=correlation)
         normal = here.gauss_newton[np.ix_(self.free, self.free)]
         return replace(here, gradient=here.gradient[self.free], gauss_newton=normal)
+
+
+def near_ones_put(sections: Sections, domain: Domain, sample_time: float, near: float) -> Sections:
+    """Poles that are near 1 put there, while the others stay.
+
+    Args:
+        sections: For each input its sections.
+        domain: Their domain.
+        sample_time: Seconds.
+        near: How far from 1, in the z plane.
+
+    Returns:
+        For each input its sections.
+    """
+    reach = near if domain is Domain.DISCRETE else near / sample_time
+    return _put(sections, domain, [np.flatnonzero(_distance(part, domain) < reach) for part in sections])
+
+
+def _put(sections: Sections, domain: Domain, which: Sequence[Places]) -> Sections:
+    """Some poles of each input put at 1."""
+    moved = []
+    for part, places in zip(sections, which, strict=True):
+        poles = _poles(part, domain)
+        poles[places] = _at(domain)
+        moved.append(sections_of(poles, domain))
+    return tuple(moved)
 
 
 def all_at_one(end: End, domain: Domain, sample_time: float, near: float) -> End:
@@ -140,12 +166,7 @@ def _close(part: Sequence[Array], domain: Domain, reach: float, *, one: bool = F
 
 def _held(end: End, domain: Domain, which: Sequence[Places]) -> End:
     """The end with some poles put at 1, where the others lead to once all that are there are held."""
-    moved = []
-    for part, places in zip(end.sections, which, strict=True):
-        poles = _poles(part, domain)
-        poles[places] = _at(domain)
-        moved.append(sections_of(poles, domain))
-    theta = end.provider.poles.theta(tuple(moved))
+    theta = end.provider.poles.theta(_put(end.sections, domain, which))
     free = ~_stays(end.provider.poles, theta)
     if free.any() and np.isfinite(end.provider.loss(theta)):
         rest = _Free(whole=end.provider, at=theta, free=np.flatnonzero(free))

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.linear import slow_poles
-from sysid.estimation.linear.poles import sections_of
 from sysid.estimation.linear.records import tap_slices
-from sysid.estimation.linear.variable_projection import Sections, SeparableProvider, Separated
+from sysid.estimation.linear.variable_projection import SeparableProvider, Separated
 from sysid.models.converting.orthonormal_basis import Domain, section_poles
 
 Array = NDArray[np.float64]
@@ -86,24 +85,3 @@ def _solved(table: Array, target: Array) -> Array:
     norms = np.linalg.norm(table, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
     return np.asarray(np.linalg.lstsq(table / scale, target, rcond=1e-11)[0] / scale)
-
-
-def put_at_edge(sections: Sections, domain: Domain, sample_time: float, near: float) -> Sections:
-    """Poles near 1 put there, while the others stay: without the level they would make its ramp.
-
-    Args:
-        sections: For each input its sections.
-        domain: Their domain.
-        sample_time: Seconds.
-        near: How near, in the z plane.
-
-    Returns:
-        For each input its sections.
-    """
-    put = []
-    for part in sections:
-        poles = np.concatenate([section_poles(d, domain) for d in part])
-        edge = 1.0 if domain is Domain.DISCRETE else 0.0
-        away = np.abs(poles - edge) * (1.0 if domain is Domain.DISCRETE else sample_time)
-        put.append(sections_of(np.where(away < near, edge, poles).astype(np.complex128), domain))
-    return tuple(put)

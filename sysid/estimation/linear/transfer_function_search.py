@@ -16,10 +16,10 @@ from sysid.errors import FitDivergedError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.linear.delay_search import FEW, READ_BACKWARDS
+from sysid.estimation.linear.integrators import near_ones_put
 from sysid.estimation.linear.pole_moves import filled_up, next_smaller, slowness
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_delays import delays_of_least_error, found_delays
-from sysid.estimation.linear.transfer_function_level import put_at_edge
 from sysid.estimation.linear.transfer_function_problem import AbstractProblem, Score
 from sysid.estimation.linear.transfer_function_runs import EXACT, Candidate, End, Watch, long_run, short_run, tried
 from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_level, of_speed, of_stability, of_starts
@@ -270,7 +270,7 @@ def _about_its_level(free: AbstractProblem, found: End, watch: Watch) -> tuple[A
     Without it a pole a little off 1 makes the ramp, from a state as far away: a plant that grows, or one that settles.
     """
     near = 5.0 / max(len(record.target) for record in found.provider.records)
-    put = put_at_edge(found.sections, free.orders.domain, free.terms.sample_time, near)
+    put = near_ones_put(found.sections, free.orders.domain, free.terms.sample_time, near)
     plain = replace(found, theta=found.provider.poles.theta(put))
     level = free.levelled(plain)
     if level is None:

@@ -116,7 +116,7 @@ def members_of(
     Returns:
         They; ``None`` where fewer than two remain, or no second pick helps.
     """
-    if elects(multistart):
+    if elects(multistart.training, multistart.selection):
         return _elected(multistart, candidates, vet)
     return _together(multistart, candidates, experiments, vet)
 
@@ -234,9 +234,12 @@ def as_start(multistart: starts.Multistart, members: Members, task: Task) -> Uni
         ),
     )
     return United(
-        candidate=candidate, left_out=members.left_out, unstable=members.unstable, elected=elects(multistart),
+        candidate=candidate,
+        left_out=members.left_out,
+        unstable=members.unstable,
+        elected=elects(multistart.training, multistart.selection),
         networks=len(members.candidates),
-    )  # fmt: skip
+    )
 
 
 def united(members: Sequence[Lagged], picks: Sequence[int]) -> Lagged:

@@ -49,9 +49,12 @@ def comparing(multistart: Multistart) -> bool:
     Returns:
         Whether the record is short, nothing else chooses, and there are enough starts.
     """
-    training = multistart.training
-    free = training.choose_by == "selection" and not multistart.selection
-    return free and multistart.twice and training.n_starts >= FEWEST
+    return multistart.twice and _compares(multistart.training, selects=bool(multistart.selection))
+
+
+def _compares(training: Training, *, selects: bool) -> bool:
+    """Whether the starts of a short record are compared: nothing else chooses, and there are enough of them."""
+    return training.choose_by == "selection" and not selects and training.n_starts >= FEWEST
 
 
 def most_iterations(
@@ -74,7 +77,7 @@ def most_iterations(
     free = training.regularisation is None and training.loop is Loop.CLOSED
     short = twice and free and is_short(n_samples, n_parameters)
     least = training.ensemble if unites and not (twice and elected) else 1
-    if short and not elected and training.choose_by == "selection" and training.n_starts >= FEWEST:
+    if short and _compares(training, selects=selects):
         least = training.n_starts
     return planned_iterations(training, least) + (training.max_iterations * least if short else 0)
 

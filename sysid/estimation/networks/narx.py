@@ -31,7 +31,7 @@ from sysid.estimation.networks.starts.choosing import Choice, choose
 from sysid.estimation.networks.starts.output_weights import reweighted
 from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
-from sysid.estimation.networks.starts.united import ends_of
+from sysid.estimation.networks.starts.united import elects, ends_of
 from sysid.estimation.networks.template import held_told, layout_of, template_of
 from sysid.estimation.networks.training import FitProgress, Training, check_members
 from sysid.estimation.networks.warm_start import check_initial, grown
@@ -92,7 +92,7 @@ def fit_narx(
     """
     began = now()
     training, start = training or Training(), start or Start()
-    training, elected = training.with_starts(1), training.choose_by == "selection" and bool(selection)
+    training, elected = training.with_starts(1), elects(training, selection)
     if not elected:
         check_members(training)
     lags = Layout.of(network, len(mapping.inputs), len(mapping.outputs)).columns

@@ -15,12 +15,14 @@ from sysid.export.exporters import wanted_formats
 from sysid.reporting.published.tables import read_published
 from sysid.reporting.results import Results, parse_results
 from sysid.reporting.sweep_record import has_sweep, read_sweep
+from sysid.units import in_unit
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.choice import Choice, choose
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data, load_data, unmade_data
 from sysid.workbench.fits.estimates import EXPORT_TIME, SCORING_TIME, how_long
 from sysid.workbench.fits.evidence import curves, residuals
+from sysid.workbench.fits.fitted import Fitted, Scored
 from sysid.workbench.fits.orders import orders_key, said, search
 from sysid.workbench.fits.outputs import FitModel, FitOutput, models_of
 from sysid.workbench.fits.record import (
@@ -43,8 +45,6 @@ from sysid.workbench.runner.store import read_json, strict, write_json
 
 if TYPE_CHECKING:
     from sysid.export import Bundle
-from sysid.units import in_unit
-from sysid.workbench.fits.fitted import Fitted, Scored
 
 LOOKING = Outlined(name="advice", title="Looking at the traces", estimate=Estimate(seconds=2.0, basis="typical"))
 LOADING = Outlined(name="data", title="Loading the traces")

@@ -5,10 +5,9 @@ coordinates, so that no parameter can be averaged; their outputs can:
 
 .. math:: \bar y(t) = \sum_m \tfrac{n_m}{n} y_m(t), \qquad n = \sum_m n_m.
 
-With the members' states side by
-side it is one neural state space (:class:`~sysid.models.NeuralEnsemble`), which is exported, checked and timed as any.
-Where a sensor takes the absolute value, members are averaged before it: each is turned so that it has the sign of the
-best. What an absolute value hides is then hidden once.
+With the members' states side by side it is one neural state space (:class:`~sysid.models.NeuralEnsemble`), which is
+exported, checked and timed as any. Where a sensor takes the absolute value, members are averaged before it: each is
+turned so that it has the sign of the best. What an absolute value hides is then hidden once.
 
 Who sits in it, by selection traces or by who stands alone, is found as for every structure (``starts/united.py``).
 
@@ -127,7 +126,11 @@ def united(
     Returns:
         It; ``None`` where fewer than two remain, or no second pick helps.
     """
-    by, most, elected = multistart.training.choose_by, multistart.training.ensemble, elects(multistart)
+    by, most, elected = (
+        multistart.training.choose_by,
+        multistart.training.ensemble,
+        elects(multistart.training, multistart.selection),
+    )
     usable = sorted((one for one in candidates if one.solution.status.usable), key=lambda one: rank(one, by))
     usable = usable if elected else ends_of(candidates, by)
     usable, unstable = stable_of(usable, None if elected else vet, len(usable) if elected else most)

@@ -21,7 +21,9 @@ from numpy.typing import NDArray
 
 from sysid.estimation.networks.starts.cautious import pays
 from sysid.estimation.networks.starts.choosing import Choice, choose, rank, refusal
-from sysid.estimation.networks.starts.multistart import Candidate, Multistart, Network, Place
+from sysid.estimation.networks.starts.multistart import Candidate, Network, Place
+from sysid.estimation.networks.training import Training
+from sysid.traces import Trace
 
 ALONE = 1.5
 """Times the median distance from the median of all members beyond which one stands alone. On three simulated plants
@@ -34,16 +36,17 @@ BEHIND = 2.0
 """Times the least error on the records, as a root of a mean square, beyond which a start is left out."""
 
 
-def elects(multistart: Multistart) -> bool:
+def elects(training: Training, selection: Sequence[Trace]) -> bool:
     """Whether selection traces elect the members.
 
     Args:
-        multistart: The multistart.
+        training: How starts are trained.
+        selection: The traces.
 
     Returns:
         Whether there are some, and they choose.
     """
-    return multistart.training.choose_by == "selection" and bool(multistart.selection)
+    return training.choose_by == "selection" and bool(selection)
 
 
 def ends_of(candidates: Sequence[Candidate], choose_by: str) -> list[Candidate]:
