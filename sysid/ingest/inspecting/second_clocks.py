@@ -110,7 +110,9 @@ def without_clocks(trace: Trace) -> tuple[Trace, tuple[str, ...]]:
 
 def _said(column: RawColumn, first: RawColumn | None, behind: str) -> str:
     """What a column is if it is a clock or a counter, else nothing."""
-    if counts_rows(column) or (first is None and is_called_time(column.name) and _by_one(column.values)):
+    if counts_rows(column) or (
+        first is None and (is_called_time(column.name) or column.name in {"x", "X"}) and _by_one(column.values)
+    ):
         return "counts the rows"
     if _counts_on(column):
         return "counts on, but not by one from row to row"
@@ -163,7 +165,7 @@ def _never_falls(values: NDArray[np.float64]) -> bool:
 
 def _counts_on(column: RawColumn) -> bool:
     """Whether a column is called a number of something that comes again and again, and goes up as one does."""
-    if column.unit not in {None, "1"} or _COUNTED.fullmatch(column.name.strip()) is None:
+    if column.unit not in {None, "1"} or _COUNTED.fullmatch(re.split(r"[/.](?=\w)", column.name.strip())[-1]) is None:
         return False
     values = column.values
     return (

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from sysid.errors import ReaderError, shortened
+from sysid.ingest.readers.csv_above import names_last
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, is_units, kind_of, trimmed
 from sysid.ingest.readers.csv_split import Split
 from sysid.ingest.readers.csv_widths import has_no_column, rises, without_name
@@ -29,13 +30,17 @@ class Header:
         units: Texts of the line of units, or ``None``.
         line: Line of the names, or ``None``.
         units_line: Line of the units, where it stands above the names.
+        said: Words and numbers of the record that stand behind the names, ``"Increment,0.001"``.
         notes: What was recognised and should be told.
+        labels: How many columns at the left are such words, beside the first rows of numbers.
     """
 
     names: Sequence[str] = ()
     units: Sequence[str] | None = None
     line: int | None = None
     units_line: int | None = None
+    said: Sequence[str] = ()
+    labels: int = 0
     notes: list[str] = field(default_factory=list)
 
 
@@ -57,7 +62,7 @@ def header_of(split: Split, first: int, comments: list[tuple[int, str]], options
     found = Header()
     if options.header is False:
         return found
-    above = _heads_joined(list(split.rows[:first]), split)
+    above, found.said = names_last(_heads_joined(list(split.rows[:first]), split), split)
     if options.units_line is None and len(above) > 1 and _units_above(above, split):
         found.units_line = above[-2].line
         found.units = _to_width(above.pop(-2), split)
@@ -65,13 +70,49 @@ def header_of(split: Split, first: int, comments: list[tuple[int, str]], options
         found.units = _to_width(above.pop(), split)
     if above and _take_names(found, above, split):
         return found
-    for line, text in comments[-1:]:
+    _take_comment(found, comments[-2:], split)
+    return found
+
+
+def labelled_header(split: Split, first: int) -> Header | None:
+    """What the words beside the first rows of numbers say, as older oscilloscopes write them.
+
+    Args:
+        split: The rows of the file.
+        first: Index of the first row of numbers.
+
+    Returns:
+        Names and units of a clock and one signal, where there are no more; ``None`` where no words stand so.
+    """
+    if not split.labelled or first > 0:
+        return None
+    labels = next(index for index, kind in enumerate(split.kinds) if kind in DATA)
+    pairs = {row.cells[0].strip(): row.cells[1].strip() for row in split.rows if row.cells[0].strip() and labels > 1}
+    columns = [index for index, kind in enumerate(split.kinds) if kind in DATA]
+    names = [""] * split.width
+    if len(columns) == 2 and "Source" in pairs:
+        clock, signal = columns
+        names[clock] = f"time [{pairs.get('Horizontal Units', 's')}]"
+        names[signal] = (
+            f"{pairs['Source']} [{pairs['Vertical Units']}]" if pairs.get("Vertical Units") else pairs["Source"]
+        )
+    told = f"{len(pairs)} words and values beside the first rows are none of the table's"
+    return Header(names=names, said=[f"{k},{v}" for k, v in pairs.items()], notes=[told], labels=labels)
+
+
+def _take_comment(found: Header, comments: list[tuple[int, str]], split: Split) -> None:
+    """Names from the last comment, or from the one before where the last says their units."""
+    rows = list[tuple[int, list[str]]]()
+    for line, text in comments:
         bare = text.split(split.separator) if split.separator != BLANKS else text.split()
         cells = _to_width(Row(line=line, cells=bare), split)
-        if cells is not None and (split.width > 1 or len(text.split()) == 1):
-            found.names, found.line = [cell.strip(_MARKS) for cell in cells], line
-            found.notes.append(f"names from the comment in line {line}")
-    return found
+        rows += [] if cells is None else [(line, [cell.strip(_MARKS) for cell in cells])]
+    if not rows or rows[-1][0] != comments[-1][0] or (split.width == 1 and len(comments[-1][1].split()) > 1):
+        return
+    if len(rows) > 1 and is_units(rows[-1][1]) and len(set(rows[-1][1])) < len(set(rows[0][1])) == split.width:
+        found.units = rows.pop()[1]
+    found.line, found.names = rows[-1]
+    found.notes.append(f"names from the comment in line {found.line}")
 
 
 def _take_names(found: Header, above: list[Row], split: Split) -> bool:

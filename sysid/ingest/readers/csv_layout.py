@@ -20,7 +20,7 @@ from sysid.ingest.readers.csv_cells import (
     suffix_of,
     trimmed,
 )
-from sysid.ingest.readers.csv_header import header_of
+from sysid.ingest.readers.csv_header import header_of, labelled_header
 from sysid.ingest.readers.csv_split import SEPARATORS, Split, best_split, first_row
 from sysid.ingest.tables.options import FileOptions
 
@@ -45,6 +45,7 @@ class Layout:
         comments: Comments before the numbers, without their mark.
         suffixes: The unit behind every number of a column, or the empty text.
         notes: What was recognised and should be told.
+        labels: How many columns at the left hold words about the record beside its first rows.
     """
 
     separator: str
@@ -58,6 +59,7 @@ class Layout:
     comments: tuple[str, ...]
     suffixes: tuple[str, ...]
     notes: tuple[str, ...] = ()
+    labels: int = 0
 
 
 def recognise(lines: Sequence[str], options: FileOptions, path: Path, *, whole: bool) -> Layout:
@@ -88,7 +90,7 @@ def recognise(lines: Sequence[str], options: FileOptions, path: Path, *, whole: 
     )
     top = split.rows[first].first_line - 1
     above = [(line, text) for line, text in comments if line <= top]
-    header = header_of(split, first, above, options)
+    header = labelled_header(split, first) or header_of(split, first, above, options)
     above_header = [row for row in split.rows[:first] if header.line is None or row.line < header.line]
     preamble = [row for row in above_header if row.line != header.units_line]
     if preamble:
@@ -103,9 +105,10 @@ def recognise(lines: Sequence[str], options: FileOptions, path: Path, *, whole: 
         skip=top,
         header=header.line,
         preamble=tuple(preamble),
-        comments=tuple(text for _, text in above),
+        comments=(*(text for _, text in above), *header.said),
         suffixes=_suffixes(split, first),
         notes=tuple(header.notes),
+        labels=header.labels,
     )
 
 

@@ -20,6 +20,8 @@ SEPARATORS = ("\t", ";", ",", "|", BLANKS)
 
 MOST_COLUMNS = 4096
 _FEW = 50
+_MOST_LABELS, _FEWEST_BLANK = 64, 8
+"""Rows with a label beside or above the numbers at most, and rows without one below them at least."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
@@ -32,6 +34,7 @@ class Split:
     lines: Sequence[str] = ()
     kinds: tuple[Kind, ...] = ()
     score: float = 0.0
+    labelled: bool = False
     _told: dict[tuple[Kind, ...], bool] = field(default_factory=dict, init=False)
 
     @property
@@ -52,11 +55,20 @@ class Split:
         """Those of them from one on."""
         return list(compress(self.rows[first:], self.fitting[first:]))
 
+    def has_its_numbers(self, row: Row) -> bool:
+        """Whether a row has a number wherever the run has one, whatever stands beside them."""
+        kinds = kinds_of(trimmed(row.cells, self.width))
+        return len(kinds) == self.width and all(
+            one in DATA for one, own in zip(kinds, self.kinds, strict=True) if own in DATA
+        )
+
     def goes_on(self, kinds: tuple[Kind, ...]) -> bool:
         """Whether cells of these kinds go on as the run does."""
         if kinds not in self._told:  # rows are many, and their kinds few
             goes = len(kinds) == self.width and _merged(self.kinds, kinds) is not None
-            self._told[kinds] = goes and any(kind in DATA for kind in kinds)
+            # Labels beside the first rows are no part of the table, though its first column be one of nothing.
+            label = self.labelled and bool(kinds) and kinds[0] is not Kind.NOTHING
+            self._told[kinds] = goes and not label and any(kind in DATA for kind in kinds)
         return self._told[kinds]
 
 
@@ -138,6 +150,8 @@ def first_row(split: Split, options: FileOptions) -> int:
     first = split.fitting.index(True)
     if first == 0 and len(split.rows) > 1 and (options.header or numbers_columns(split)):
         return 1
+    if split.labelled and all(split.has_its_numbers(row) for row in split.rows[:first]):
+        return 0
     top = first
     while top > 0 and _is_spoilt(split, top - 1):
         top -= 1
@@ -199,9 +213,11 @@ def _runs(separator: str, rows: list[Row], options: FileOptions) -> Split:
         score = length * numeric
         if score > best_score:
             best, best_score = run, score
-    split = Split(separator=separator, rows=rows, kinds=best)
     if not best:
-        return split
+        return Split(separator=separator, rows=rows, kinds=best)
+    labelled = _has_labels(found, best)
+    best = (Kind.NOTHING, *best[1:]) if labelled else best
+    split = Split(separator=separator, rows=rows, kinds=best, labelled=labelled)
     fits = [
         split.goes_on(kinds) if len(kinds) == len(best) and not options.missing else split.fits(row)
         for row, kinds in zip(rows, found, strict=True)
@@ -209,6 +225,15 @@ def _runs(separator: str, rows: list[Row], options: FileOptions) -> Split:
     fitting = sum(fits) * _numeric(best) ** 2 * (1.0 if len(best) > 1 else 0.5)
     alike = sum(len(trimmed(row.cells, len(best))) == len(best) > 1 for row in rows)
     return replace(split, score=(fitting + 0.25 * alike) / len(rows))
+
+
+def _has_labels(found: Sequence[tuple[Kind, ...]], best: tuple[Kind, ...]) -> bool:
+    """Whether words stand in the first column beside the first rows, or above the table, and nothing from there on."""
+    if best[0] not in {Kind.WORD, Kind.NOTHING}:
+        return False
+    first = [kinds[0] for kinds in found if len(kinds) == len(best)]
+    last = max((index for index, kind in enumerate(first) if kind is not Kind.NOTHING), default=-1)
+    return 0 < last < min(_MOST_LABELS, len(first) - _FEWEST_BLANK)
 
 
 def _numeric(kinds: Sequence[Kind]) -> float:

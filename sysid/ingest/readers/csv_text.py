@@ -16,6 +16,7 @@ from sysid.errors import ReaderError
 from sysid.ingest.cells.calendar import Calendar
 from sysid.ingest.cells.headers import Header, parse_headers, split_reference
 from sysid.ingest.cells.words import WordCollector, states_for
+from sysid.ingest.readers.csv_above import NO_UNITS
 from sysid.ingest.readers.csv_beside import records_beside
 from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
 from sysid.ingest.readers.csv_cells import Kind, unit_text
@@ -89,7 +90,7 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
         notes.append(
             "the names are no words in Windows-1252: name the encoding (encoding: gb18030, cp1251, cp1250, cp932 ...)"
         )
-    clock = headers[time].name if time is not None else recognise_time(raw)
+    clock = (headers[time].name or f"column_{time + 1}") if time is not None else recognise_time(raw)
     raw, rows = _without_empty_rows(raw, rows, notes, stamped=clock is not None)
     if len(raw) > WIDE * max(len(rows), 1):
         notes.append(f"{len(raw)} columns of {len(rows)} samples: if channels stand in its rows, save it turned")
@@ -144,7 +145,7 @@ def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
         for header, suffix in zip(headers, layout.suffixes, strict=True)
     ]
     if layout.units is not None:
-        units = [split_reference(unit_text(cell)) for cell in layout.units]
+        units = [split_reference("" if cell in NO_UNITS else unit_text(cell)) for cell in layout.units]
         headers = [
             Header(name=header.name, unit=unit or header.unit, reference=reference or header.reference)
             for header, (unit, reference) in zip(headers, units, strict=True)
@@ -228,7 +229,7 @@ def _finished(
     found, nothing, nameless = list[RawColumn](), list[int](), list[int]()
     for index, (header, column) in enumerate(zip(headers, columns, strict=True)):
         where = f"{path}, column {header.name or index + 1}"
-        if index == dates:
+        if index == dates or index < layout.labels:
             continue
         if isinstance(column, Stamps):
             raw, told, zone = _stamps(header, column, where, is_time=index == calendar)

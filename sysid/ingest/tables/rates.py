@@ -12,7 +12,8 @@ _EITHER = (
 """Words that may say a rate or a time: which, says the unit."""
 _RATE = r"fs|f_s|sampl(?:e|ing)[ _-]?(?:rate|frequency)|scan[ _-]?rate|abtast(?:rate|frequenz)|sps"
 _PERIOD = (
-    r"ts|t_s|dt|delta[ _]?t|delta[ _]?x|sampl(?:e|ing)[ _-]?(?:time|interval|period)|time[ _-]?step"
+    r"ts|t_s|dt|delta[ _]?t|delta[ _]?x|(?:x[ _-]?)?increment|hresolution"
+    r"|sampl(?:e|ing)[ _-]?(?:time|interval|period)|time[ _-]?step"
     r"|abtast(?:zeit|intervall)"
 )
 IN_HERTZ = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "sa/s": 1.0, "samples/s": 1.0}
@@ -42,8 +43,14 @@ def said_step(lines: Iterable[str]) -> float | None:
     return found.pop() if len(found) == 1 else None
 
 
+def _once(line: str) -> str:
+    """A line that says the same of each column, ``SampleRate,1.0E+3,1.0E+3``, saying it once."""
+    word, *cells = re.split(r"[;\t]|,(?=\d+\.|\s)", line)
+    return f"{word};{cells[0]}" if len(cells) > 1 and len(set(cells)) == 1 else line
+
+
 def _step(line: str) -> float | None:
-    match = _LINE.fullmatch(line)
+    match = _LINE.fullmatch(_once(line))
     if match is None:
         return None
     unit = (match["head"] or match["tail"] or "").strip().lower()

@@ -71,6 +71,7 @@ class Animal:
 
 
 HEAD = "t [s],u [V],y [V]"
+BESIDE = ("Record Length,20", "Trigger Point,3", ",", "Source,u", "Vertical Units,V", "Horizontal Units,s")
 ZOO = {
     "digits of dates": Animal(
         text=table(lambda k: f"202403122359{40 + k},{U[k]},{Y[k]}", "stamp,u [V],y [V]"), step=1.0, told=("%Y%m%d",)
@@ -197,6 +198,43 @@ ZOO = {
     ),
     "thousands in English": Animal(
         text=table(lambda k: f"{1000000 + 100 * k:,};{U[k]};{Y[k]:.6f}", "t [ms];u [V];y [V]"), told=("thousands",)
+    ),
+    "Campbell's TOA5, units and kinds below the names": Animal(
+        text=table(
+            lambda k: f'"2024-05-01 {clock(k)}",{1000 + k},{U[k]},{Y[k]:.6f}',
+            '"TOA5","Rig","CR1000"', '"TIMESTAMP","RECORD","u","y"', '"TS","RN","V","m"', '"","","Smp","Avg"',
+        )
+    ),
+    "names that two comments say, units in the second": Animal(
+        text=table(lambda k: plain(k, "  "), "#t   u   y", "#s   V   V"), suffix=".txt"
+    ),
+    "a mark between names and numbers": Animal(text=table(plain, "Rig 4", HEAD, "[Data]")),
+    "Rigol: the increment behind the names": Animal(
+        text=table(
+            lambda k: f"{k},{U[k]:.2e},{Y[k]:.6e},", "X,u,y,Start,Increment,", "Sequence,Volt,Volt,-2.5e0,1.0e-1"
+        )
+    ),
+    "Tektronix: units in a line of their own further above": Animal(
+        text=table(plain, "Model,MSO44", "Sample Interval,1.0e-01", "Vertical Units,V,V", "Labels,,", "TIME,u,y")
+    ),
+    "older Tektronix: words of the record beside its first rows": Animal(
+        text=table(
+            lambda k: f"{BESIDE[k] if k < len(BESIDE) else ','},,  {T[k] - 1.0:.6f},  {U[k]:.5f},"
+        ),
+        y="",
+    ),
+    "Yokogawa: a word before what each column has": Animal(
+        text=table(
+            lambda k: f",{U[k]:.4E},{Y[k]:.6E}",
+            "Header Size,9", "Model,DL850", "TraceName,u,y", "BlockSize,20,20", "VUnit,V,V",
+            "SampleRate,1.0E+01,1.0E+01", "HOffset,-3.0E-02,-3.0E-02", "Date,2024/03/12", "",
+        )
+    ),
+    "dSPACE: a word before what each column has": Animal(
+        text=table(
+            lambda k: f",{plain(k)}", '"2024-03-12 08:15:00"', '"type","X","Y","Y"', '"unit","s","V","m"',
+            '"name","Time","u","y"', '"trace_values"',
+        )
     ),
 }  # fmt: skip
 
