@@ -24,6 +24,9 @@ enough to follow a clean record, large enough that states which it does not show
 EXACT = 1e-18
 """Variance of what a state leaves unexplained, relative to the output's, below which a history has no noise."""
 
+FORGETS = 0.5
+"""Distance from 1 beyond which the poles of a filter forget at once, as those of a recursion over past outputs do."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Filter:
@@ -167,7 +170,8 @@ class StateSpace(AbstractForm):
         """The state of a system at rest.
 
         With a model of the noise it is the filter's state after that output and these inputs stood for ever: like a
-        recursion over past outputs, the free run then begins at the output that is declared.
+        recursion over past outputs, the free run then begins at the output that is declared. Where that says nothing,
+        it is the state of the system without the noise.
 
         Args:
             inputs: Scaled inputs, shape ``(n_inputs,)``.
@@ -176,9 +180,28 @@ class StateSpace(AbstractForm):
         Returns:
             Shape ``(n_state,)``.
         """
-        if self.K is not None:
+        if self.K is not None and self._told_by_standing:
             return self.standing(inputs, output)
         return state_at_rest((self.A, self.B, self.C, self.D, self.constant), inputs, output)
+
+    @cached_property
+    def _told_by_standing(self) -> bool:
+        """Whether an output that stood for ever says where the state of the filter is.
+
+        White noise of a sensor, and a short record, put a zero of the noise near 1: of what stands the noise then has
+        less than of one sample, and a filter that hardly forgets sums a difference of the output from its equilibrium
+        up to many times its size. Where it forgets nothing, the state is not determined at all.
+        """
+        one = self if self.filter is None else self.filter.system
+        gain = self.gain if self.filter is None else self.filter.system.K
+        forgets = np.eye(self.n_state) - one.A + gain @ one.C
+        sizes = scipy.linalg.svdvals(forgets) if self.n_state else np.ones(1)
+        if not sizes[-1] > AT_ONE * max(float(sizes[0]), 1.0):
+            return False
+        if np.abs(scipy.linalg.eigvals(forgets)).min(initial=1.0) > FORGETS:
+            return True
+        left = np.eye(self.n_outputs) - one.C @ scipy.linalg.solve(forgets, gain)
+        return bool(np.abs(scipy.linalg.eigvals(left)).max() <= 1.0 + AT_ONE)
 
     def equilibrium(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The state at which the system stays while its inputs are held.

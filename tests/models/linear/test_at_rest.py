@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 
-from sysid.models import OE, Mapping, Scaling, TransferFunction
+from sysid.models import ARMAX, BJ, OE, Mapping, Scaling, TransferFunction
 from sysid.models.linear.at_rest import state_at_rest
 from sysid.models.linear.innovations import Innovations
 from sysid.models.linear.polynomial import PolynomialModel
@@ -102,3 +102,41 @@ def test_the_state_that_a_fit_begins_from_is_the_one_that_is_run() -> None:
     rested = state_at_rest((system.A, system.B, system.C, system.D, system.constant), u, y)
     assert isinstance(system, Innovations)
     assert_allclose(system.standing(u, y), rested)
+
+
+def noisy(kind: str, poles: tuple[float, ...], zeros: tuple[float, ...]) -> PolynomialModel:
+    """A plant with a model of its noise, whose output stands at 0.2 without an input."""
+    n, A, C = len(poles), np.poly(poles)[1:], np.atleast_1d(np.poly(zeros))[1:]
+    theta: tuple[float, ...]
+    orders: ARMAX | BJ
+    if kind == "ARMAX":
+        orders, theta = ARMAX(na=n, nb=(1,), nc=len(C), nk=(1,)), (0.1, *A, *C)
+    else:
+        orders, theta = BJ(nb=(1,), nc=len(C), nd=1, nf=(n,), nk=(1,)), (0.1, *A, *C, -0.5)
+    return PolynomialModel(
+        orders=orders, theta=np.array([*theta, 0.2]), scaling=Scaling.identity(1), mapping=Mapping.parse("u -> y"),
+        sample_time=1.0, input_units=("V",), output_unit="V", rest_output=REST,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "poles", "zeros", "begins"),
+    [
+        ("ARMAX", (0.8,), (), 0.2 + 0.8 * (REST - 0.2)),  # a recursion over past outputs
+        ("ARMAX", (0.8,), (0.5,), 0.2 + 0.6 * (REST - 0.2)),  # 1 - 0.2 / 0.5 of the way to the output that stood
+        ("ARMAX", (0.8,), (0.95,), 0.2),  # what stands is no noise: it had begun three times as far off, beyond
+        ("ARMAX", (0.8,), (1.0,), 0.2),  # a filter that forgets nothing: it had begun anywhere
+        ("ARMAX", (1.0,), (1.0,), REST),
+        ("ARMAX", (1.0 + 3e-6,), (1.0 - 1e-8,), 0.2),  # begun at -1435
+        ("BJ", (1.0,), (0.3,), REST),
+        ("BJ", (1.0, 0.5), (1.0,), REST),
+    ],
+)
+def test_a_model_of_the_noise_begins_at_rest_no_further_off_than_the_output_that_stood(
+    kind: str, poles: tuple[float, ...], zeros: tuple[float, ...], begins: float
+) -> None:
+    model = noisy(kind, poles, zeros)
+    run = model.simulate(np.zeros((400, 1)))
+    assert_allclose(run[0], begins, rtol=1e-9)
+    if poles == (0.8,):
+        assert_allclose(run[-1], 0.2, rtol=1e-9)
