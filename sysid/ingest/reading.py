@@ -179,7 +179,7 @@ def _all_channels(table: RawTable, files: FileOptions) -> tuple[Channel, ...]:
             continue
         if column.problem is not None:
             # A remark beside the measurements does no harm; what has a unit, or numbers, was measured, and is not lost.
-            if column.words is None or column.unit is not None:
+            if not column.aside and (column.words is None or column.unit is not None):
                 raise column.problem
             continue
         unit = files.units if isinstance(files.units, str) else files.units.get(column.name, column.unit)

@@ -14,20 +14,23 @@ from sysid.ingest.cells.numbers import MISSING, MOST_WORDS
 States = Mapping[str, float | Mapping[str, float]]
 """Numbers by word, for all columns or by the name of the column."""
 
-TRUTH = {"true": 1.0, "false": 0.0}
-"""Words that are numbers without being asked."""
+TRUTH = {
+    **dict.fromkeys(("true", "wahr", "vrai", "vero", "verdadero", "verdadeiro", "waar"), 1.0),
+    **dict.fromkeys(("false", "falsch", "faux", "falso", "onwaar"), 0.0),
+}
+"""Words that are numbers without being asked: what spreadsheets write for truth, in the languages of Europe's west."""
 
 PAIRS: tuple[dict[str, float], ...] = tuple(
     dict(zip(words.split(), (0.0, 1.0), strict=True))
     for words in (
         *("off on", "aus ein", "aus an", "uit aan", "closed open", "close open", "zu auf", "dicht open", "shut open"),
         *("no yes", "nein ja", "nee ja", "low high", "stop run", "stopped running", "inactive active", "idle active"),
-        *("disabled enabled", "released applied", "released pressed", "falsch wahr", "faux vrai", "f t", "n y"),
+        *("disabled enabled", "released applied", "released pressed", "f t", "n y"),
         *("down up", "ok alarm", "normal alarm", "ok fault", "manual auto", "ok nok"),
         *("non oui", "fermé ouvert", "fermée ouverte", "ferme ouvert", "arrêt marche", "arret marche", "éteint allumé"),
-        *("spento acceso", "chiuso aperto", "no si", "no sì", "falso vero"),
-        *("apagado encendido", "cerrado abierto", "cerrada abierta", "no sí", "falso verdadero"),
-        *("desligado ligado", "fechado aberto", "fechada aberta", "não sim", "falso verdadeiro"),
+        *("spento acceso", "chiuso aperto", "no si", "no sì"),
+        *("apagado encendido", "cerrado abierto", "cerrada abierta", "no sí"),
+        *("desligado ligado", "fechado aberto", "fechada aberta", "não sim"),
         *("av på", "fra til", "stängd öppen", "lukket åpen", "lukket åben", "nej ja", "nei ja", "ei kyllä"),
         *("wyłączony włączony", "wył zał", "zamknięty otwarty", "nie tak", "vypnuto zapnuto", "ne ano"),
         *("kapalı açık", "hayır evet", "выкл вкл", "закрыт открыт", "закрыто открыто", "нет да"),
@@ -119,7 +122,7 @@ class Words:
         )
 
 
-NOTHING = {"shut", "closed", "false", *(word for pair in PAIRS for word, number in pair.items() if not number)}
+NOTHING = {"shut", "closed", *(word for pair in (TRUTH, *PAIRS) for word, number in pair.items() if not number)}
 """Words that stand for 0 beside their opposites."""
 
 _DIGITS_OF_STAMPS = 4

@@ -18,7 +18,9 @@ from sysid.ingest.cells.words import PAIRS, TRUTH, known_states
 from sysid.ingest.reading import read_table
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, RepairOptions
+from sysid.ingest.tables.quality import is_quality
 from sysid.ingest.tables.table import RawTable, RepeatedNamesError
+from sysid.ingest.tables.time_columns import is_called_time
 
 _OF_TEXT = frozenset({"csv", "excel"})
 _LONG_SHARE = 0.6
@@ -170,14 +172,19 @@ def _states(table: RawTable) -> dict[str, Any] | None:
 def _long(table: RawTable) -> dict[str, Any] | None:
     """A table of (time, signal, value): one column of names, one of numbers, and times that come again."""
     words = [c for c in table.columns if c.words is not None and c.problem is not None and len(c.words.texts) > 1]
+    words = [c for c in words if not is_quality(c)]
     numbers = [c for c in table.columns if c.name != table.time and c.problem is None and np.isfinite(c.values).any()]
+    numbers = [c for c in numbers if not is_quality(c)]
     if table.time is not None and not words and len(numbers) == 2:
         return _numbered(table, numbers)
-    if table.time is None or not words or len(numbers) != 1:
+    if table.time is None or not words:
         return None
     time = next(column for column in table.columns if column.name == table.time)
     names = next((column for column in words if _names_rows(column, time)), None)
     if names is None:
+        return None
+    numbers = _without_further_clocks(numbers, time, names) if len(numbers) > 1 else numbers
+    if len(numbers) != 1:
         return None
     units = next((c.name for c in words if c is not names and _follows(c, names)), None)
     return {"long": {"names": names.name, "values": numbers[0].name} | ({"units": units} if units else {})}
@@ -197,6 +204,21 @@ def _numbered(table: RawTable, numbers: Sequence[RawColumn]) -> dict[str, Any] |
         if whole and len(pairs) == len(table) == len(np.unique(time)) * len(found):
             return {"long": {"names": names.name, "values": values.name}}
     return None
+
+
+def _without_further_clocks(numbers: list[RawColumn], time: RawColumn, names: RawColumn) -> list[RawColumn]:
+    """Without what rises with the time, as a second clock does, and without numbers of the signals themselves."""
+    order = np.argsort(time.values, kind="stable")
+    codes = names.words.codes if names.words is not None else np.zeros(len(order), dtype=np.int32)
+
+    def is_clock(column: RawColumn) -> bool:
+        values = column.values[order]
+        return is_called_time(column.name) and bool((values[1:] >= values[:-1]).all())
+
+    def is_number_of(column: RawColumn) -> bool:
+        return all(len(np.unique(column.values[codes == code])) == 1 for code in range(int(codes.max()) + 1))
+
+    return [column for column in numbers if not is_clock(column) and not is_number_of(column)]
 
 
 def _names_rows(names: RawColumn, time: RawColumn) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sysid.errors import UnitError
 from sysid.ingest.tables.clocks import since_1970
 from sysid.ingest.tables.columns import RawColumn
+from sysid.ingest.tables.quality import is_quality
 from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import is_called_time, is_counter, is_time_unit
 from sysid.traces import Trace
@@ -114,6 +115,8 @@ def _said(column: RawColumn, first: RawColumn | None, behind: str) -> str:
         first is None and (is_called_time(column.name) or column.name in {"x", "X"}) and _by_one(column.values)
     ):
         return "counts the rows"
+    if is_quality(column):
+        return "says how good values are"
     if _counts_on(column):
         return "counts on, but not by one from row to row"
     if first is None or is_counter(column.name):

@@ -52,6 +52,9 @@ def load_file(path: Path) -> TraceSet:
         held = [read_table(path)]
         several = bool(held[0].records)
         others = [f"{column.name} ({len(column.values)} samples)" for column in held[0].others]
+        words = any(c.words is not None and c.problem is not None for c in held[0].columns)
+        # Words, and a date beside the time, are no samples; that they stood there is told.
+        others += [f"{c.name} ({c.aside or c.problem.what})" for c in held[0].columns if c.problem is not None]
         trace = trace_of(held)
     except UserError as error:
         return _as_proposed(path, error)
@@ -59,7 +62,8 @@ def load_file(path: Path) -> TraceSet:
         return _as_proposed(path)
     trace, clocks = without_clocks(trace)
     if left := [*clocks, *others]:
-        warnings.warn(f"{path}: left out: {listed(left)}", GuessedWarning, stacklevel=3)
+        more = f"; {proposal_of(path)} proposes numbers for states that are known" if words else ""
+        warnings.warn(f"{path}: left out: {listed(left)}{more}", GuessedWarning, stacklevel=3)
     return TraceSet(name=bare_stem(path), traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
 
 

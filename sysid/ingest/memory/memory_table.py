@@ -16,6 +16,7 @@ from sysid.ingest.cells.headers import parse_header, unit_in_name
 from sysid.ingest.tables.columns import RawColumn, array_column
 from sysid.ingest.tables.frames import INDEX, check_distinct, not_numbers
 from sysid.ingest.tables.meaning import with_clock
+from sysid.ingest.tables.one_stamp import rows_of_one_stamp
 from sysid.ingest.tables.table import RawTable, by_length
 from sysid.ingest.tables.time_columns import is_time_unit, recognise_time
 
@@ -69,7 +70,7 @@ def table_of(
         origin=f"given from memory (SHA-256 {_digest(columns)})",
     )
     # Time is in seconds in every function of ours, unless its name or the size of its numbers says otherwise.
-    table = with_clock(table)
+    table = with_clock(rows_of_one_stamp(table))
     united = [replace(c, unit=_clock_unit(c.name)) if c.name == table.time and not c.unit else c for c in table.columns]
     return replace(table, columns=tuple(united))
 

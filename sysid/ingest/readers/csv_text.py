@@ -324,7 +324,11 @@ def _stamps(header: Header, column: Stamps, where: str, *, is_time: bool) -> tup
             seconds, told, zone = column.calendar.finish()
         except ReaderError as error:
             problem = error
-    raw = RawColumn(name=header.name, values=seconds, unit="s", problem=problem, began=column.calendar.began)
+    aside = "" if is_time or column.problem is not None else "calendar time beside the time"
+    unit = "s" if is_time else None
+    raw = RawColumn(
+        name=header.name, values=seconds, unit=unit, problem=problem, began=column.calendar.began, aside=aside
+    )
     return raw, told, zone
 
 

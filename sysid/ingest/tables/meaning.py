@@ -13,7 +13,9 @@ from sysid.ingest.cells.words import Words, states_for
 from sysid.ingest.tables.clocks import clock_of
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.joining import Signal, joined
+from sysid.ingest.tables.one_stamp import rows_of_one_stamp
 from sysid.ingest.tables.options import FileOptions, LongOptions
+from sysid.ingest.tables.quality import without_bad_values
 from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import time_unit
 from sysid.units import convert
@@ -46,9 +48,10 @@ def with_meaning(table: RawTable, files: FileOptions) -> RawTable:
     _check_states(table, files)
     records = tuple(replace(record, table=with_meaning(record.table, files)) for record in table.records)
     columns, others = (tuple(_as_states(c, files) for c in group) for group in (table.columns, table.others))
-    table = replace(table, columns=columns, others=others, records=records)
+    table = without_bad_values(replace(table, columns=columns, others=others, records=records))
     if files.long is not None:
         table = _wide(table, files.long)
+    table = rows_of_one_stamp(table)
     asked = files.time
     return table if asked.column or asked.unit or asked.step is not None else with_clock(table)
 

@@ -18,7 +18,7 @@ _TIME_NAMES = {
     "uhrzeit", "zeitstempel", "tijdstip", "clock", "hora", "heure", "fecha", "epoch", "unix time", "unixtime", "utc",
     "local time", "localtime", "time of day", "timeofday", "test time", "run time", "sim time", "simulation time",
     "total time", "relative time", "rel time", "record time", "recording time", "measurement time", "system time",
-    "unix timestamp",
+    "unix timestamp", "timestring", "time string",
 }  # fmt: skip
 _TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
 
@@ -98,7 +98,7 @@ def is_called_time(name: str) -> bool:
         >>> is_called_time("temperature"), is_called_time("dead_time")
         (False, False)
     """
-    whole = name.casefold().strip()
+    whole = name.casefold().strip().lstrip("_")
     # In whatever group it stands: "rig/time", "run{2}.t".
     for plain in (whole, re.split(r"[/.]", whole)[-1]):
         # "t_ms", "time.s", "test_time_seconds": the unit at the end of the name

@@ -199,6 +199,41 @@ ZOO = {
     "thousands in English": Animal(
         text=table(lambda k: f"{1000000 + 100 * k:,};{U[k]};{Y[k]:.6f}", "t [ms];u [V];y [V]"), told=("thousands",)
     ),
+    "long table of a historian: a bad value is none": Animal(
+        text=table(
+            lambda k: f"u;{T[k]:.1f};{U[k]};Good\ny;{T[k]:.1f};{0.0 if k == 7 else Y[k]:.6f};{'Bad' if k == 7 else 'Good'}",
+            "tag;time [s];value;quality",
+        ),
+        y="", unit="1", told=("1 missing value", "quality calls it bad"),
+    ),
+    "long table of WinCC: a second clock, and what is valid": Animal(
+        text=table(
+            lambda k: "\n".join(
+                f'"{name}";"12.03.2024 08:15:{k:02d}";{x[k]:.6f};1;{45363343750 + k * 11.574074:.6f}'.replace(".", ",").replace(
+                    "12,03,", "12.03."
+                )
+                for name, x in (("u", U), ("y", Y))
+            ),
+            '"VarName";"TimeString";"VarValue";"Validity";"Time_ms"', below=('"$RT_COUNT$";40',),
+        ),
+        step=1.0, unit="1",
+    ),
+    "long table of InfluxDB: numbers of tables, spans of the query": Animal(
+        text="#datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,dateTime:RFC3339,double,string,string\n"
+        ",result,table,_start,_stop,_time,_value,_field,_measurement\n"
+        + "".join(
+            f",,{i},2024-03-12T00:00:00Z,2024-03-13T00:00:00Z,2024-03-12T08:15:{k:02d}Z,{x[k]:.6f},{name},tank\n"
+            for i, (name, x) in enumerate((("u", U), ("y", Y)))
+            for k in range(N)
+        ),
+        step=1.0, unit="1",
+    ),
+    "rows of one stamp with a channel each": Animal(
+        text=table(lambda k: f"{T[k]:.1f},{U[k]},\n{T[k]:.1f},,{Y[k]:.6f}", HEAD), told=("40 rows of 20 stamps",)
+    ),
+    "truth in German": Animal(
+        text=table(lambda k: f"{T[k]:.1f};{'WAHR' if U[k] == 3.0 else 'FALSCH'};{Y[k]:.6f}", "t [s];u;y [V]"), unit="1"
+    ),
     "Campbell's TOA5, units and kinds below the names": Animal(
         text=table(
             lambda k: f'"2024-05-01 {clock(k)}",{1000 + k},{U[k]},{Y[k]:.6f}',
