@@ -86,8 +86,7 @@ def _bad(column: RawColumn) -> NDArray[np.bool_] | None:
     if column.problem is not None or not np.isfinite(values).all() or not len(values):
         return None
     different = set(np.unique(values).tolist())
-    if different <= {0.0, 1.0} and _TRUE.search(
-        column.name
-    ):  # of a number that is called quality, 0 may be the good one
-        return values == 0.0
-    return np.asarray(values < _OPC_UNCERTAIN) if _OPC_GOOD in different <= _OPC else None
+    # Of a number that is called quality, 0 may be the good one.
+    if different <= {0.0, 1.0} and _TRUE.search(column.name):
+        return np.asarray(values == 0.0, dtype=np.bool_)
+    return np.asarray(values < _OPC_UNCERTAIN, dtype=np.bool_) if _OPC_GOOD in different <= _OPC else None

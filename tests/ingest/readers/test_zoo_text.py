@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,6 +44,19 @@ def autumn(k: int) -> str:
     """The clock on the wall in Berlin on the night on which an hour comes twice, every 600 s from 02:30."""
     minutes = 150 + 10 * k - (60 if k >= 3 else 0)
     return f"2024-10-27 {minutes // 60:02d}:{minutes % 60:02d}:00"
+
+
+def historian(k: int) -> str:
+    """A row of each signal, one of them bad, where a zero stands."""
+    good, y = ("Bad", 0.0) if k == 7 else ("Good", Y[k])
+    return f"u;{T[k]:.1f};{U[k]};Good\ny;{T[k]:.1f};{y:.6f};{good}"
+
+
+def wincc(k: int) -> str:
+    """A row of each signal of a German panel, which counts millionths of days in a column that it calls ms."""
+    count = f"{45363343750 + k * 11.574074:.6f}"
+    rows = (f'"{name}";"12.03.2024 08:15:{k:02d}";{x:.6f};1;{count}' for name, x in (("u", U[k]), ("y", Y[k])))
+    return "\n".join(re.sub(r"(?<=\d)\.(?=\d{6})", ",", row) for row in rows)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,22 +214,11 @@ ZOO = {
         text=table(lambda k: f"{1000000 + 100 * k:,};{U[k]};{Y[k]:.6f}", "t [ms];u [V];y [V]"), told=("thousands",)
     ),
     "long table of a historian: a bad value is none": Animal(
-        text=table(
-            lambda k: f"u;{T[k]:.1f};{U[k]};Good\ny;{T[k]:.1f};{0.0 if k == 7 else Y[k]:.6f};{'Bad' if k == 7 else 'Good'}",
-            "tag;time [s];value;quality",
-        ),
+        text=table(historian, "tag;time [s];value;quality"),
         y="", unit="1", told=("1 missing value", "quality calls it bad"),
     ),
     "long table of WinCC: a second clock, and what is valid": Animal(
-        text=table(
-            lambda k: "\n".join(
-                f'"{name}";"12.03.2024 08:15:{k:02d}";{x[k]:.6f};1;{45363343750 + k * 11.574074:.6f}'.replace(".", ",").replace(
-                    "12,03,", "12.03."
-                )
-                for name, x in (("u", U), ("y", Y))
-            ),
-            '"VarName";"TimeString";"VarValue";"Validity";"Time_ms"', below=('"$RT_COUNT$";40',),
-        ),
+        text=table(wincc, '"VarName";"TimeString";"VarValue";"Validity";"Time_ms"', below=('"$RT_COUNT$";40',)),
         step=1.0, unit="1",
     ),
     "long table of InfluxDB: numbers of tables, spans of the query": Animal(
