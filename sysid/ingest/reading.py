@@ -22,6 +22,7 @@ from sysid.ingest.tables.options import FileOptions, GridOptions, RepairOptions
 from sysid.ingest.tables.table import RawTable
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
+from sysid.written_units import plain_unit
 
 
 def is_file_of_traces(source: str | Path) -> bool:
@@ -142,7 +143,7 @@ def trace_of(
 
 
 def _as_written(table: RawTable) -> Trace | None:
-    """The trace that a file of ours holds, or ``None`` if it is not ours or was changed."""
+    """The trace that a file of ours holds, or ``None`` if it is not ours or was changed, its header too."""
     try:
         head: dict[str, Any] = json.loads(table.metadata.get("sysid", ""))
         channels = tuple(
@@ -160,7 +161,16 @@ def _as_written(table: RawTable) -> Trace | None:
         )
     except (ValueError, KeyError, TypeError):
         return None
-    return trace if trace.digest == head["digest"] and np.array_equal(table.columns[0].values, trace.time) else None
+    # Who corrects a unit or a name in the header means it, whatever the remark above it says.
+    said = [_said(column) for column in table.columns[: len(channels) + 1]]
+    same = said == [_said(channel) for channel in (Channel(name="time", unit="s"), *channels)]
+    whole = trace.digest == head["digest"] and np.array_equal(table.columns[0].values, trace.time)
+    return trace if same and whole else None
+
+
+def _said(what: RawColumn | Channel) -> tuple[str, str | None, Reference]:
+    """Name, unit and reference, the unit as it is written here however people write it."""
+    return what.name, what.unit and (plain_unit(what.unit) or what.unit), what.reference or Reference.NONE
 
 
 def _mask(columns: Sequence[RawColumn]) -> NDArray[np.bool_]:

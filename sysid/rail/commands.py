@@ -73,7 +73,7 @@ def terrain(
 
     from sysid.rail.dynamics.train import read_train
     from sysid.rail.track.features import features
-    from sysid.rail.track.handling import SPEED_GAINS, lateral_ratio, peak_force, quadrant, sag_acceleration
+    from sysid.rail.track.handling import SPEED_GAINS, lateral_ratio, passage, peak_force, quadrant, sag_acceleration
     from sysid.rail.track.terrain import CREST, PATTERNS, Shape, combined, correlation, effective_grade
 
     line, consist = _line(track, section), read_train(train)
@@ -99,22 +99,24 @@ def terrain(
     felt = each[0] if len(each) == 1 else combined(each, pattern.value)
     found = features(x, felt)
     for one in found:
-        force = peak_force(line, consist, one.apex)
+        over = passage(one, consist)
+        force = peak_force(line, consist, over)
         if one.kind == "crest":
             handling = f"no power until half the train is past; gain at most {3.6 * SPEED_GAINS[one.severity]:.0f} km/h"
         else:
             handling = f"hold {sag_acceleration(line, shape, one.apex):+.3f} m/s2"
-        pulls = f"{'draft' if force.force >= 0.0 else 'buff'} {abs(force.force) / 1000.0:.0f} kN"
+        pulls = f"{'draft' if force.force >= 0.0 else 'buff'} {abs(force.force) / 1000.0:.0f} kN at {force.at:.0f} m"
         typer.echo(
             f"{one.kind:<6} {one.severity.value:<7} {one.start:8.0f} to {one.end:8.0f} m, strongest at {one.apex:8.0f} "
             f"m ({1000.0 * one.correlation:+.1f} per mille): {handling}"
             + (f"; coupler {force.coupler} {pulls}" if force.coupler else "")
         )
         if line.curvatures.any():
-            ratios = lateral_ratio(line, consist, one.apex)
-            worst = int(np.argmax(np.abs(ratios)))
+            ratios = np.stack([lateral_ratio(line, consist, float(place)) for place in over])
+            place, worst = np.unravel_index(np.argmax(np.abs(ratios)), ratios.shape)
             typer.echo(
-                f"       {quadrant(one, line, shape).value}; at a crawl L/V {ratios[worst]:+.3f} at vehicle {worst + 1}"
+                f"       {quadrant(one, line, shape).value}; at a crawl L/V {ratios[place, worst]:+.3f} at vehicle "
+                f"{worst + 1} at {over[place]:.0f} m"
             )
     if not found:
         typer.echo("neither crest nor sag")
@@ -148,7 +150,7 @@ def drive(
 ) -> None:
     """Drive a train from a station to a stop by a track card: constant speed, limits, automatic stop."""
     from sysid.rail.dynamics.brake import no_brake
-    from sysid.rail.dynamics.drive import Limits
+    from sysid.rail.dynamics.drive import STILL, Limits
     from sysid.rail.dynamics.drive import drive as driven
     from sysid.rail.dynamics.motion import MovingTrain
     from sysid.rail.dynamics.train import read_train
@@ -174,24 +176,27 @@ def drive(
         typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/drive.csv and .svg" if out else ""))
         return
     moving = MovingTrain(train=consist, track=line)
-    run = driven(moving, no_brake(len(consist.vehicles)), driver, Limits(duration=longest, block=1))
+    run = driven(moving, no_brake(len(consist.vehicles)), driver, Limits(duration=longest, block=1, back=MISSED))
     import numpy as np
 
     limits = np.array([line.lowest_limit(at - consist.length, at) for at in run.position])
     over = float((run.speed - limits).max())
-    stands = "stands" if run.speed[-1] <= 0.01 else "is"
+    stands = "stands" if abs(run.speed[-1]) <= STILL else "is"
     typer.echo(
         f"{stands} at {run.position[-1]:.2f} m after {run.motion.time[-1]:.1f} s; "
         f"{run.notch_changes} {'change' if run.notch_changes == 1 else 'changes'} of notch, "
         f"{run.traction_work / 3.6e6:.2f} kWh of traction, "
         + (f"{3.6 * over:.1f} km/h over a limit" if over > 0.0 else "no limit passed")
     )
-    if stands == "is":
+    if run.position[-1] < -MISSED:
+        typer.echo("note: it rolls back, and the run ends there: its traction does not hold it on this grade")
+    elif stands == "is":
         typer.echo(f"note: it has not stopped within {longest:g} s")
     elif abs(missed := float(run.position[-1]) - stop) > MISSED:
         typer.echo(
             f"note: it stands {abs(missed):.0f} m {'past' if missed > 0.0 else 'before'} the stop"
             + (": begin the automatic stop earlier (--point)" if missed > 0.0 else "")
+            + ": its traction does not start it" * bool(run.speed.max() <= STILL)
         )
     if out is not None:
         columns = {

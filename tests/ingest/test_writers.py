@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -93,6 +94,22 @@ def test_a_file_changed_since_is_read_for_what_it_says(tmp_path: Path) -> None:
     assert changed.channel_names == TRACE.channel_names
     np.testing.assert_array_equal(changed.usable_samples, TRACE.usable_samples)
     assert changed.provenance[0].startswith("read from run.csv")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("u [1]", "u [V]", ["BP [psi gauge]", "u [V]"]),
+        ("u [1]", "valve [1]", ["BP [psi gauge]", "valve [1]"]),
+        ("psi gauge", "psi absolute", ["BP [psi absolute]", "u [1]"]),
+    ],
+)
+def test_a_header_corrected_since_counts(tmp_path: Path, old: str, new: str, said: list[str]) -> None:
+    """The remark above it had counted, without a word."""
+    path = write_csv(dataclasses.replace(TRACE, usable=None), tmp_path / "run.csv")
+    remark, header, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([remark, header.replace(old, new), *rows]))
+    assert [channel.label for channel in read_trace(path).channels] == said
 
 
 def test_a_row_taken_out_is_a_gap(tmp_path: Path) -> None:

@@ -58,6 +58,14 @@ def test_a_table_and_a_picture_are_written(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "terrain.svg").read_text(encoding="utf-8").startswith("<?xml")
 
 
+@pytest.mark.parametrize(("line", "kind"), [("crest.yaml", "draft"), ("sag.yaml", "buff")])
+def test_the_force_told_is_the_largest_of_the_whole_passage(line: str, kind: str) -> None:
+    """50 wagons pull down on either side: with the leading end at the apex, where it was looked at, nothing does."""
+    told = re.search(rf"coupler 50 {kind} (\d+) kN at 4\d\d m", run(["terrain", str(LINES / line), TRAIN]))
+    assert told
+    assert float(told[1]) == pytest.approx(50 * 120.0 * 9.80665 * 0.008, rel=0.02)
+
+
 def test_a_line_with_curves_says_the_quadrant_and_the_lateral_force(tmp_path: Path) -> None:
     bent = tmp_path / "bent.yaml"
     bent.write_text("name: bent\ngrade: [[-4000, 8], [0, -8]]\ncurve: [[-2000, 500]]\n", encoding="utf-8")
@@ -145,6 +153,12 @@ def test_a_line_with_posts_in_kilometres_is_refused(tmp_path: Path) -> None:
         CliRunner().invoke(app, ["terrain", str(line), TRAIN], catch_exceptions=False)
 
 
+def test_a_card_without_rows_is_refused_by_that(tmp_path: Path) -> None:
+    (tmp_path / "card.csv").write_text("section,distance_km,code,value\n", encoding="utf-8")
+    with pytest.raises(SysidError, match="no rows"):
+        CliRunner().invoke(app, ["terrain", str(tmp_path / "card.csv"), TRAIN], catch_exceptions=False)
+
+
 def test_a_card_with_distances_in_metres_is_refused(tmp_path: Path) -> None:
     card = tmp_path / "m.csv"
     card.write_text("section,distance_km,code,value\nA,0,GRADE,5\nA,700,GRADE,-5\n", encoding="utf-8")
@@ -193,6 +207,30 @@ def test_cylinders_that_still_rise_at_the_end_are_told(seconds: int, told: bool)
     """Nine tenths of what they have by then is a time that means nothing."""
     said = run(["eot", "--pairs", "5", "--handle", "0", "--seconds", str(seconds)])
     assert (f"at {seconds} s cylinders still rise, the valve is open" in said) is told
+
+
+@pytest.mark.parametrize(
+    ("mass", "grade", "said"),
+    [
+        (40e3, 150, "is at -10.*\nnote: it rolls back, and the run ends there"),
+        (400e3, 8, "changes of notch"),
+        (
+            400e3,
+            9,
+            "stands at -?0.00 m after .*\nnote: it stands 1000 m before the stop: its traction does not start it",
+        ),
+    ],
+    ids=["rolls back", "a heavy train that starts is slow at first", "too heavy"],
+)
+def test_a_train_that_its_traction_does_not_move_is_told(tmp_path: Path, mass: float, grade: int, said: str) -> None:
+    """The first had run backwards for ten minutes and was told to stand, as was the second before it began."""
+    card, train = tmp_path / "card.csv", tmp_path / "train.yaml"
+    card.write_text(f"section,distance_km,code,value\nA,0,GRADE,{grade}\nA,0,SPEED LIM,70\n", encoding="utf-8")
+    text = (LINES / "commuter.yaml").read_text(encoding="utf-8").replace("mass: 40000", f"mass: {mass:g}")
+    train.write_text(text, encoding="utf-8")
+    told = run(["drive", str(card), str(train), *DRIVE[3:], "--longest", "60"])
+    assert re.search(said, told)
+    assert ("stands" in told) == ("stands" in said)
 
 
 @pytest.mark.parametrize(("point", "told"), [(990.0, True), (700.0, False)])

@@ -194,6 +194,11 @@ def test_a_train_from_a_file(tmp_path: Path) -> None:
         ("power: 2.0e6", "horse: 2.0e6"),
         ("ratio: 6.0", "leverage: 6.0"),
         ("mass: 30000", "mass: 0"),
+        ("mass: 80000", "mass: 80"),
+        ("mass: 80000", "mass: 8.0e+6"),
+        ("length: 20", "length: 20000"),
+        ("notches: 4", "notches: 0"),
+        ("notches: 4", "notches: 3.5"),
     ],
 )
 def test_impossible_trains_are_refused(tmp_path: Path, old: str, new: str) -> None:

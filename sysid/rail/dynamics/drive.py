@@ -16,6 +16,10 @@ STILL = 0.01
 """Speed in m/s below which a train counts as stopped (ours)."""
 
 
+STARTS = 1e-5
+"""Gain of speed in m/s over a look by which a train at rest counts as about to start (ours)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Observation:
     """What the driver of the first vehicle sees.
@@ -159,13 +163,15 @@ class Limits:
 
     Args:
         duration: Longest time in s.
-        until_still: Whether it ends when every vehicle stands still.
+        until_still: Whether it ends when every vehicle stands still, and is not about to start.
         block: Largest number of samples between two looks.
+        back: How far in m the first vehicle may roll back from where it began.
     """
 
     duration: float
     until_still: bool = True
     block: int = 50
+    back: float = np.inf
 
 
 @dataclass(kw_only=True, eq=False)
@@ -197,6 +203,7 @@ def drive(moving: MovingTrain, brake: AbstractBrake, driver: AbstractDriver, lim
     log, start, speed = _Log(), float(moving.state.position[0]), moving.speed
     total = round(limits.duration / moving.sample_time)
     done, acceleration, seen_speed = 0, 0.0, float(moving.state.speed[0])
+    fastest = float(np.abs(moving.state.speed).max())
     while done < total:
         seen = Observation(
             time=done * moving.sample_time,
@@ -214,7 +221,11 @@ def drive(moving: MovingTrain, brake: AbstractBrake, driver: AbstractDriver, lim
         before = seen_speed if len(motion) == 1 else float(motion.speeds[-2, 0])
         seen_speed = float(motion.speeds[-1, 0])
         acceleration = (seen_speed - before) / moving.sample_time
-        if limits.until_still and done > 1 and np.abs(motion.speeds[-1]).max() < STILL:
+        # A heavy train that starts is slow at first: it gains speed, and one that cannot start does not.
+        now = float(np.abs(motion.speeds[-1]).max())
+        still = done > 1 and now < STILL and (fastest >= STILL or now <= fastest + STARTS)
+        fastest = max(fastest, now)
+        if (limits.until_still and still) or float(motion.positions[-1, 0]) < start - limits.back:
             break
     return _run(moving, log, start, speed)
 

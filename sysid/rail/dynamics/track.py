@@ -59,11 +59,14 @@ class TrackProfile:
             raise self._error("the segments do not follow each other", "increasing positions in m", self.starts)
         if np.abs(self.grades).max() > 0.2:
             steepest = float(self.grades[np.argmax(np.abs(self.grades))])
-            raise self._error("a grade is too steep for a railway", "at most 200 per mille", steepest)
+            raise self._error(
+                "a grade is too steep for a railway", "at most 200 per mille", f"{1000.0 * steepest:g} per mille"
+            )
         if self.curvatures.min() < 0.0 or self.curvatures.max() > 1.0 / 20.0:
-            raise self._error("a curve is not possible", "a radius of at least 20 m", self.curvatures)
+            raise self._error("a curve is not possible", "1/m from 0 to 0.05, a radius of 20 m", self.curvatures)
         if np.abs(self.superelevations).max() > 0.3:
-            raise self._error("a cant is not possible", "at most 300 mm", self.superelevations)
+            largest = float(self.superelevations[np.argmax(np.abs(self.superelevations))])
+            raise self._error("a cant is not possible", "at most 300 mm", f"{1000.0 * largest:g} mm")
         if self.speed_limits.min() <= 0.0:
             raise self._error("a speed limit is not positive", "m/s above 0", self.speed_limits)
 

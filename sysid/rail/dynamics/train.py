@@ -143,6 +143,11 @@ def heavy_haul(*, pairs: int = 50, locomotives: int = 1, mass: float = WAGON_MAS
     return Train(vehicles=(*[locomotive()] * locomotives, *[wagon(mass=mass)] * (2 * pairs)), name=name)
 
 
+POSSIBLE = {"mass": (500.0, 1e6, "kg", "tonnes times 1000"), "length": (1.0, 100.0, "m", "millimetres over 1000")}
+"""Of one vehicle of a file (ours): from a trolley to the heaviest of wagons. What does not lie within was written in
+another unit, or is a whole train."""
+
+
 class _Group(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
     count: int = Field(default=1, ge=1, le=500)
@@ -176,6 +181,18 @@ def _made(kind: Any, values: dict[str, Any], where: str) -> Any:
         ) from None
 
 
+def _check_possible(group: _Group, where: str) -> None:
+    for name, (least, most, unit, instead) in POSSIBLE.items():
+        if not least <= (value := getattr(group, name)) <= most:
+            raise ConfigError(
+                f"no vehicle has such a {name}",
+                where=f"{where}, {name}",
+                expected=f"{least:g} to {most:,.0f} {unit}, of one vehicle",
+                got=f"{value:g} {unit}",
+                remedy=f"write {instead}; count says how many vehicles there are",
+            )
+
+
 def _rigging(group: _Group, where: str) -> Rigging | None:
     if group.brake == "none":
         return None
@@ -190,7 +207,7 @@ def _notches(group: _Group, where: str) -> NotchCurves | None:
     if group.power is None:
         return None
     values: dict[str, Any] = dict(group.power)
-    if "notches" in values:
+    if float(values.get("notches", 0.5)).is_integer():
         values["notches"] = int(values["notches"])
     return _made(diesel_electric, values, where)  # type: ignore[no-any-return]
 
@@ -201,7 +218,8 @@ def read_train(path: Path) -> Train:
     Args:
         path: A file with ``name``, ``coupler`` (fields of :class:`Coupler`) and ``vehicles``: groups, front first, with
             ``count``, ``mass`` (kg), ``length`` (m), ``axles`` or ``davis`` [a, b, c], ``brake`` (fields of
-            :class:`Rigging`, or ``none``) and ``power`` (arguments of :func:`diesel_electric`).
+            :class:`Rigging`, or ``none``) and ``power`` (arguments of :func:`diesel_electric`). Masses and lengths
+            have to be :data:`POSSIBLE` ones.
 
     Returns:
         The train.
@@ -213,6 +231,7 @@ def read_train(path: Path) -> Train:
     vehicles: list[Vehicle] = []
     for group in file.vehicles:
         where = f"{path}, vehicles, {group.name}"
+        _check_possible(group, where)
         if group.davis is None:
             davis = modified_davis(group.mass, group.axles)
         else:

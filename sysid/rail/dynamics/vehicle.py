@@ -229,6 +229,10 @@ class NotchCurves:
         return float(np.interp(abs(speed), self.speed_step * np.arange(len(curve)), curve))
 
 
+MOST_NOTCHES = 100
+"""In each direction (ours)."""
+
+
 def diesel_electric(
     *,
     power: float = 3.1e6,
@@ -257,11 +261,21 @@ def diesel_electric(
     Returns:
         The curves.
 
+    Raises:
+        ConfigError: If there is no notch, or a number cannot be.
+
     Example:
         >>> curves = diesel_electric()
         >>> round(curves.force(8, 20.0) * 20.0 / 1e6, 2), curves.force(-8, 0.0)
         (3.1, -0.0)
     """
+    _need(
+        float(notches).is_integer() and 1 <= notches <= MOST_NOTCHES,
+        "a locomotive has notches",
+        where="power, notches",
+        expected=f"a whole number from 1 to {MOST_NOTCHES}",
+        got=notches,
+    )
     step = 0.25
     speeds = step * np.arange(round(top_speed / step) + 1)
     safe = np.maximum(speeds, 1e-9)

@@ -153,6 +153,10 @@ def read_card(path: Path) -> TrackCard:
             expected=",".join(HEADER),
             got=",".join(lines[0]) if lines else "nothing",
         )
+    if not any(lines[1:]):
+        raise ReaderError(
+            "the card has no rows", where=path, expected=f"rows of {','.join(HEADER)}", got="a header alone"
+        )
     return TrackCard(
         rows=tuple(_row(cells, f"{path}, line {k}") for k, cells in enumerate(lines[1:], start=2) if cells)
     )

@@ -94,28 +94,50 @@ class ForceEstimate:
     Args:
         force: In N, positive in draft.
         coupler: Number from 1, the one behind vehicle ``coupler``; 0 where a single vehicle has none.
+        at: Where the first vehicle is, in m.
     """
 
     force: float
     coupler: int
+    at: float
 
 
-def peak_force(track: TrackProfile, train: Train, x: float) -> ForceEstimate:
+PASSAGE = 200
+"""Places over a feature at which forces are looked at (ours)."""
+
+
+def passage(feature: Feature, train: Train) -> NDArray[np.float64]:
+    """Where the leading end is while a train goes over a feature, until the last vehicle is past the apex.
+
+    With the leading end at the apex all of it may still be on one grade, and nothing pulls; half a train on, it does.
+
+    Args:
+        feature: The crest or sag.
+        train: The train.
+
+    Returns:
+        Positions in m, increasing.
+    """
+    return np.linspace(feature.start, max(feature.end, feature.apex + train.length), PASSAGE)
+
+
+def peak_force(track: TrackProfile, train: Train, x: NDArray[np.float64] | float) -> ForceEstimate:
     """The largest coupler force that grades alone make, as the display shows it.
 
     Args:
         track: The line.
         train: The train.
-        x: Of the first vehicle in m.
+        x: Of the first vehicle in m, one place or several.
 
     Returns:
-        The estimate.
+        The estimate, and at which place.
     """
-    forces = quasi_static_forces(track, train, x)
-    if not len(forces):
-        return ForceEstimate(force=0.0, coupler=0)
-    at = int(np.argmax(np.abs(forces)))
-    return ForceEstimate(force=float(forces[at]), coupler=at + 1)
+    places = np.atleast_1d(np.asarray(x, dtype=np.float64))
+    forces = np.stack([quasi_static_forces(track, train, float(place)) for place in places])
+    if not forces.size:
+        return ForceEstimate(force=0.0, coupler=0, at=float(places[0]))
+    place, coupler = (int(one) for one in np.unravel_index(np.argmax(np.abs(forces)), forces.shape))
+    return ForceEstimate(force=float(forces[place, coupler]), coupler=coupler + 1, at=float(places[place]))
 
 
 CURVED = 1.0 / 1500.0

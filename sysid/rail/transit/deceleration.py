@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from sysid.errors import ConfigError, TraceError
 from sysid.rail.constants import MPH
 from sysid.traces import Trace
+from sysid.units import convert
 
 RATE, JERK = 2.0 * MPH, 1.0 * MPH
 """Deceleration in m/s2 and jerk in m/s3 of the source: 2 mph/s and 1 mph/s2."""
@@ -197,7 +198,7 @@ def identify_characteristic(
     piecewise linear characteristic are then found together by least squares.
 
     Args:
-        trace: With signal in mA and deceleration in m/s2.
+        trace: With signal and deceleration, in mA and m/s2 or what these can be made of.
         signal: Its channel.
         deceleration: Its channel.
         segments: Of the characteristic.
@@ -209,8 +210,11 @@ def identify_characteristic(
 
     Raises:
         TraceError: If too few samples are settled.
+        UnitError: If a channel measures something else.
     """
-    p, a = np.array(trace[signal]), np.array(trace[deceleration])
+    p, a = (
+        convert(trace[name], trace.channel(name).unit, unit) for name, unit in ((signal, "mA"), (deceleration, "m/s^2"))
+    )
     back = max(1, round(window / trace.sample_time))
     settled = np.zeros(len(p), dtype=np.bool_)
     settled[back:] = np.abs(p[back:] - p[:-back]) < settle

@@ -1,11 +1,13 @@
 """Comfortable deceleration: profile, characteristic found from a trace, controller that learns from stop to stop."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sysid.errors import ConfigError, TraceError
+from sysid.errors import ConfigError, TraceError, UnitError
 from sysid.estimation import fit_arx
 from sysid.models import ARX, AbstractModel, Mapping
 from sysid.rail.constants import MPH
@@ -141,6 +143,19 @@ def test_the_characteristic_found_from_a_trace_has_the_source_s_points(
 ) -> None:
     assert characteristic.segments == 4
     assert characteristic.signal(rate * MPH) == pytest.approx(signal, abs=0.3)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("A", 1e-3), ("mA", 1.0)])
+def test_the_trace_may_have_its_signal_in_another_unit(
+    surrogate: AbstractModel, characteristic: Characteristic, unit: str, scale: float
+) -> None:
+    """Its numbers had been taken for mA, whatever its unit."""
+    trace = slow_trace(surrogate)
+    channels = (Channel(name="P", unit=unit), trace.channels[1])
+    other = replace(trace, channels=channels, values=trace.values * [scale, 1.0])
+    assert identify_characteristic(other).signals == pytest.approx(characteristic.signals, rel=1e-6)
+    with pytest.raises(UnitError, match="cannot convert V to mA"):
+        identify_characteristic(replace(trace, channels=(Channel(name="P", unit="V"), trace.channels[1])))
 
 
 def test_the_dead_band_ends_at_the_deceleration_of_friction_alone(characteristic: Characteristic) -> None:
