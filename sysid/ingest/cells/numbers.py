@@ -38,7 +38,7 @@ def usually_missing(text: str) -> bool:
     return text.casefold() in USUAL_MISSING or (len(text) > 0 and not text.strip("*#?-_."))
 
 
-_BLANKS = dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f"), " ")
+_MARKS = dict.fromkeys(map(ord, "\u00a0\u2007\u2009\u202f"), " ") | {0x2019: "'"}
 
 HEXADECIMAL = re.compile(r"[+-]?0[xX][0-9a-fA-F]{1,13}")
 """Counts as converters and buses write them; more digits are more than float64 holds."""
@@ -81,7 +81,7 @@ class NumberFormat:
             >>> NumberFormat(decimal=",", thousands=".").parse("1.5") is None
             True
         """
-        text = spaced(cell.strip()) if self.thousands == " " else cell.strip()
+        text = spaced(cell.strip()) if self.thousands in {" ", "'"} else cell.strip()
         if self.suffix:
             text = text.removesuffix(self.suffix).rstrip()
         if text.lower() in MISSING or text in self.missing:
@@ -156,7 +156,7 @@ class NumberFormat:
 
 
 def spaced(text: str) -> str:
-    r"""A text with a plain blank for each that typographers use between thousands.
+    r"""A text with a plain blank, or a plain apostrophe, for each that typographers use between thousands.
 
     Args:
         text: Of a cell.
@@ -165,10 +165,10 @@ def spaced(text: str) -> str:
         The text.
 
     Example:
-        >>> spaced("1\u202f000\xa0000")
-        '1 000 000'
+        >>> spaced("1\u202f000\xa0000"), spaced("1\u2019000")
+        ('1 000 000', "1'000")
     """
-    return text.translate(_BLANKS)
+    return text.translate(_MARKS)
 
 
 def _float(text: str) -> float:

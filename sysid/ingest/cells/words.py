@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -81,6 +82,17 @@ class Words:
         Returns:
             The error to raise when it is asked for.
         """
+        shown = ", ".join(f"{text[:30]!r}" for text in self.texts[:6])
+        shown = shown if len(self.texts) <= 6 else f"{shown} and {len(self.texts) - 6} more"
+        if self._are_stamps():
+            return ReaderError(
+                UNKNOWN_DATES,
+                where=where,
+                expected="ISO 8601 (2024-05-01 10:00:00.5), or a pattern",
+                got=shown,
+                remedy="if it is the time, give its pattern as for datetime.strptime: "
+                "time: {column: ..., unit: datetime, format: '%d.%m.%Y %H:%M:%S.%f'}",
+            )
         if not self.complete:
             return ReaderError(
                 "the column holds remarks, no numbers",
@@ -97,17 +109,6 @@ class Words:
                 got=f"{self.texts[0][:30]!r} in every row that has something",
                 remedy="leave the column out",
             )
-        shown = ", ".join(f"{text[:30]!r}" for text in self.texts[:6])
-        shown = shown if len(self.texts) <= 6 else f"{shown} and {len(self.texts) - 6} more"
-        if all(sum(map(str.isdigit, text)) >= _DIGITS_OF_STAMPS for text in self.texts):
-            return ReaderError(
-                "the column holds dates or times in a form that is not known",
-                where=where,
-                expected="ISO 8601 (2024-05-01 10:00:00.5), or a pattern",
-                got=shown,
-                remedy="if it is the time, give its pattern as for datetime.strptime: "
-                "time: {column: ..., unit: datetime, format: '%d.%m.%Y %H:%M:%S.%f'}",
-            )
         # The one that stands for nothing is 0, whichever came first.
         ordered = sorted(self.texts[:6], key=lambda text: text.casefold() not in NOTHING)
         table = ", ".join(f"{quoted(text)}: {index}" for index, text in enumerate(ordered))
@@ -121,10 +122,18 @@ class Words:
             + f"; if one stands for a missing value, write missing: [{quoted(self.texts[0])}]",
         )
 
+    def _are_stamps(self) -> bool:
+        """Whether texts are dates or times in some form: of few words each has digits, of many also marks between."""
+        digits = all(sum(map(str.isdigit, text)) >= _DIGITS_OF_STAMPS for text in self.texts)
+        return digits and (self.complete or all(map(_STAMP.search, self.texts)))
+
 
 NOTHING = {"shut", "closed", *(word for pair in (TRUTH, *PAIRS) for word, number in pair.items() if not number)}
 """Words that stand for 0 beside their opposites."""
 
+UNKNOWN_DATES = "the column holds dates or times in a form that is not known"
+
+_STAMP = re.compile(r"[0-9]{1,4}[-./:_ TthH]+[0-9]{1,2}")
 _DIGITS_OF_STAMPS = 4
 """So many digits in every text are a date or a time, or none that states have."""
 

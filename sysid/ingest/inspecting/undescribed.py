@@ -12,6 +12,7 @@ import yaml
 
 from sysid.errors import ReaderError, UnitError, UserError
 from sysid.field_checks import check
+from sysid.ingest.cells.words import UNKNOWN_DATES
 from sysid.ingest.inspecting.findings import FileFinding, listed
 from sysid.ingest.inspecting.inspection import inspect_file
 from sysid.ingest.inspecting.proposal import propose_dataset
@@ -76,6 +77,8 @@ def _as_proposed(path: Path, error: UserError | None = None) -> TraceSet:
         proposed = yaml.safe_load(propose_dataset(left))
     except UserError as also:  # which the command that describes a file comes to as well
         raise typed_options(also if error is None or isinstance(error, UnitError) else error, path) from None
+    if found.time.step is not None and found.time_guessed and (dated := _unread_dates(found)):
+        raise typed_options(dated, path)
     with remedies_of_a_file(path):
         return _described(path, found, proposed, error)
 
@@ -100,6 +103,13 @@ def _described(path: Path, found: FileFinding, proposed: dict[str, Any], error: 
         told = f"{_told(path, guesses)}. {proposal_of(path)} writes this down, to be corrected"
         warnings.warn(told, GuessedWarning, stacklevel=5)
     return traces
+
+
+def _unread_dates(found: FileFinding) -> UserError | None:
+    """Why a column of dates could not be read; a record that has one is not 1 s apart for want of another clock."""
+    columns = () if found.table is None else found.table.columns
+    problems = (column.problem for column in columns if column.problem is not None)
+    return next((problem for problem in problems if problem.what == UNKNOWN_DATES), None)
 
 
 def guessed_time(table: RawTable, files: FileOptions, *, sample_time: float) -> FileOptions:

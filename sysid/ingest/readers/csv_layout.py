@@ -7,7 +7,7 @@ line before them, a line of units aside; what stands above it is a preamble.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -144,14 +144,33 @@ def _suffixes(split: Split, first: int) -> tuple[str, ...]:
 def _decimal(rows: Sequence[Row], path: Path, options: FileOptions) -> str:
     if options.thousands == ",":
         return "."
-    commas = next((row for row in rows for cell in row.cells if "," in cell and _COMMA.fullmatch(cell.strip())), None)
-    points = next((row for row in rows for cell in row.cells if "." in cell and _POINT.fullmatch(cell.strip())), None)
-    if commas and points and options.thousands is None:
+    commas, points = (
+        {bare: row for row in rows for cell in row.cells if mark in cell and form.fullmatch(bare := _bare(cell))}
+        for mark, form in ((",", _COMMA), (".", _POINT))
+    )
+    shown = _shown(commas, points)
+    if commas and points and options.thousands is None and shown is None:
+        first, other = next(iter(commas.values())), next(iter(points.values()))
         raise ReaderError(
             "the file holds numbers with a decimal comma and numbers with a decimal point",
-            where=f"{path}, lines {commas.line} and {points.line}",
+            where=f"{path}, lines {first.line} and {other.line}",
             expected="one decimal mark",
-            got=f"{commas.cells} and {points.cells}",
+            got=f"{first.cells} and {other.cells}",
             remedy="name it (decimal: ',' or decimal: '.'), and what separates thousands (thousands: '.')",
         )
-    return "," if commas else "."
+    return shown or ("," if commas else ".")
+
+
+def _bare(cell: str) -> str:
+    """A number without the unit behind it."""
+    text = cell.strip()
+    return text.removesuffix(suffix_of(text)).rstrip() if text[-1:].isalpha() or text[-1:] in "%°" else text
+
+
+def _shown(commas: Iterable[str], points: Iterable[str]) -> str | None:
+    """The decimal mark that a number with both marks shows, ``4.000,00``, where all others go with it: ``800.000``."""
+    for mark, other, decimal, grouped in ((",", ".", commas, points), (".", ",", points, commas)):
+        both = any(other in text for text in decimal)
+        if both and all(re.fullmatch(rf"[+-]?[0-9]{{1,3}}(?:{re.escape(other)}[0-9]{{3}})+", one) for one in grouped):
+            return mark
+    return None

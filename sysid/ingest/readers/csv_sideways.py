@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from sysid.ingest.cells.calendar import is_calendar
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.cells.numbers import NumberFormat
-from sysid.ingest.tables.columns import RawColumn, distinct
+from sysid.ingest.tables.columns import RawColumn, array_column, distinct
 from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import recognise_time
 
@@ -49,18 +51,20 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
         )
         if not (named or (bare and width >= max(_NAMELESS, _LONGER * len(cells)))):
             continue
-        parsed = [numbers.column(row if bare else row[1:]) for row in cells]
+        stamps = None if bare else _stamps(cells[0][1:], path)
+        parsed = [numbers.column(row if bare else row[1:]) for row in cells[stamps is not None :]]
         if any(isinstance(one, int) for one in parsed):
             continue
         heads = [parse_header("" if bare else name) for name in names]
-        columns = [
+        columns = [] if stamps is None else [replace(stamps, name=heads.pop(0).name or "time")]
+        columns += [
             RawColumn(
                 name=head.name or f"column_{number + 1}",
                 values=np.asarray(values),
                 unit=head.unit,
                 reference=head.reference,
             )
-            for number, (head, values) in enumerate(zip(heads, parsed, strict=True))
+            for number, (head, values) in enumerate(zip(heads, parsed, strict=True), len(columns))
         ]
         columns, renamed = distinct(columns)
         return RawTable(
@@ -68,6 +72,16 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
             reader="csv",
             columns=tuple(columns),
             time=recognise_time(columns),
+            settings={"calendar": stamps is not None and stamps.began is not None},
             notes=(f"its {len(columns)} lines are taken as channels, of {len(columns[0].values)} samples", *renamed),
         )
     return None
+
+
+def _stamps(cells: Sequence[str], path: Path) -> RawColumn | None:
+    """Dates, times of day or lengths of time in the first line, as a turned table has its index there."""
+    texts = [cell.strip().strip('"') for cell in cells]
+    if not all(map(is_calendar, texts)):
+        return None
+    column = array_column("time", np.array(texts), where=str(path))
+    return None if column.problem is not None else column

@@ -5,6 +5,7 @@ Comments of the form ``# key: value`` before the header, and lines of two cells 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -139,7 +140,7 @@ def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
     texts: Sequence[str] = layout.names or [*(f"column_{i + 1}" for i in range(_filled(layout))), *[""] * width][:width]
     if options.names is not None:
         texts = _given_names(options.names, layout, path)
-    headers = parse_headers([from_csv_cell(text) for text in texts])
+    headers = parse_headers([re.sub(r"\s*[\r\n]+\s*", " ", from_csv_cell(text)) for text in texts])
     headers = [
         Header(name=header.name, unit=split_reference(suffix)[0]) if suffix and header.unit is None else header
         for header, suffix in zip(headers, layout.suffixes, strict=True)

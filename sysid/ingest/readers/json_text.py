@@ -15,6 +15,7 @@ import numpy as np
 from sysid.errors import ReaderError
 from sysid.ingest.cells.calendar import is_calendar
 from sysid.ingest.readers.bounds import too_large
+from sysid.ingest.readers.json_series import series_in
 from sysid.ingest.readers.late import table_of
 from sysid.ingest.readers.leaves import Leaf, number_of, step_in
 from sysid.ingest.readers.reader import Reader, damaged
@@ -44,7 +45,7 @@ def _tree_in(path: Path, _: tuple[int, int]) -> Any:
     raw = path.read_bytes()
     _check_size(raw, path)
     try:
-        return _tree(_content(raw.decode("utf-8-sig")), 0)
+        return _tree(series_in(_content(raw.decode("utf-8-sig"))), 0)
     except (ValueError, RecursionError) as error:
         raise damaged(path, "JSON", error) from error
 

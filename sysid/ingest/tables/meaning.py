@@ -12,12 +12,14 @@ from sysid.errors import ChannelError, ConfigError, ReaderError, UnitError
 from sysid.ingest.cells.words import Words, states_for
 from sysid.ingest.tables.clocks import clock_of
 from sysid.ingest.tables.columns import RawColumn
+from sysid.ingest.tables.date_parts import time_of_parts
 from sysid.ingest.tables.joining import Signal, joined
 from sysid.ingest.tables.one_stamp import rows_of_one_stamp
 from sysid.ingest.tables.options import FileOptions, LongOptions
 from sysid.ingest.tables.quality import without_bad_values
 from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import time_unit
+from sysid.ingest.tables.wrapped import going_on
 from sysid.units import convert
 
 _RATED = ("s", "ms", "us", "ns", "min", "h")
@@ -51,8 +53,9 @@ def with_meaning(table: RawTable, files: FileOptions) -> RawTable:
     table = without_bad_values(replace(table, columns=columns, others=others, records=records))
     if files.long is not None:
         table = _wide(table, files.long)
-    table = rows_of_one_stamp(table)
     asked = files.time
+    table = table if asked.step is not None else time_of_parts(table)
+    table = rows_of_one_stamp(going_on(table))
     return table if asked.column or asked.unit or asked.step is not None else with_clock(table)
 
 

@@ -18,7 +18,7 @@ _TIME_NAMES = {
     "uhrzeit", "zeitstempel", "tijdstip", "clock", "hora", "heure", "fecha", "epoch", "unix time", "unixtime", "utc",
     "local time", "localtime", "time of day", "timeofday", "test time", "run time", "sim time", "simulation time",
     "total time", "relative time", "rel time", "record time", "recording time", "measurement time", "system time",
-    "unix timestamp", "timestring", "time string",
+    "unix timestamp", "timestring", "time string", "millis", "micros",
 }  # fmt: skip
 _TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
 

@@ -61,8 +61,8 @@ def test_blocks_that_were_only_written_in_another_order_are_sorted(tmp_path: Pat
 
 
 def test_a_counter_that_wraps_parts_the_record_in_its_order(tmp_path: Path) -> None:
-    """Sorted, the second part had come first, and a minute was missing between them."""
-    times = [str((63000 + 100 * k) % 65536) for k in range(60)]
+    """Sorted, the second part had come first, and a minute was missing between them; no clock is full at 65,600."""
+    times = [str((63000 + 100 * k) % 65600) for k in range(60)]
     traces = proposed(tmp_path, "t [ms],u [V],y [m]\n" + rows(times))
     assert [len(trace) for trace in traces.traces] == [26, 34]
     assert np.array_equal(traces.traces[1]["y"], Y[26:])

@@ -32,6 +32,14 @@ def test_remarks_beside_it_do_no_harm(tmp_path: Path) -> None:
         assert sysid.load(tmp_path / "rig.csv").traces[0].channel_names == ("u", "y")
 
 
+def test_a_column_of_dates_that_cannot_be_read_is_no_reason_to_guess_a_second(tmp_path: Path) -> None:
+    rows = [f"W11-2-2024_{k // 60:02d}h{k % 60:02d},{U[k]},{Y[k]}" for k in range(N)]
+    (tmp_path / "rig.csv").write_text("\n".join(["when,u [V],y [V]", *rows]))
+    with pytest.raises(ReaderError, match="in a form that is not known") as refused:
+        sysid.load(tmp_path / "rig.csv")
+    assert "format: '%d.%m.%Y %H:%M:%S.%f'}. Options are typed behind sysid ingest" in str(refused.value.remedy)
+
+
 @pytest.mark.parametrize("row", [list, tuple])
 def test_a_list_of_rows_is_no_list_of_experiments(row: type) -> None:
     with pytest.raises(ConfigError, match="120 rows of 2 numbers") as refused:

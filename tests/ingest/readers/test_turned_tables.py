@@ -56,6 +56,13 @@ SIDEWAYS: dict[str, tuple[Callable[[Path], None], str, str]] = {
     "a turned frame": (
         pd.DataFrame({"t": T, "u": U, "y": Y}).set_index("t").T.to_csv, "u", "y",
     ),
+    "a turned frame of dates": (
+        pd.DataFrame({"u": U, "y": Y}, index=pd.date_range("2024-03-12 08:15", periods=N, freq="100ms")).T.to_csv,
+        "u", "y",
+    ),
+    "a turned frame of lengths of time": (
+        pd.DataFrame({"u": U, "y": Y}, index=pd.to_timedelta(T, unit="s")).T.to_csv, "u", "y",
+    ),
     "numbers alone": (lambda path: np.savetxt(path, TABLE.T), "column_2", "column_3"),
     "numbers and commas": (lambda path: np.savetxt(path, TABLE.T, delimiter=","), "column_2", "column_3"),
 }  # fmt: skip
@@ -83,6 +90,27 @@ def test_rows_by_name_and_columns_beside_values_are_tables(tmp_path: Path) -> No
     series = {"columns": ["t", "u", "y"], "values": TABLE.tolist(), "name": "rig"}
     (tmp_path / "influx.json").write_text(json.dumps({"results": [{"series": [series]}]}), encoding="utf-8")
     for name in ("index.json", "influx.json"):
+        loaded(tmp_path / name, u="u", y="y")
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.04])
+def test_answers_of_data_bases_of_time_series_are_series(tmp_path: Path, apart: float) -> None:
+    stamps = 1710231300.0 + T
+    prometheus = [
+        {"metric": {"__name__": name}, "values": [[t + late, repr(x)] for t, x in zip(stamps, values, strict=True)]}
+        for name, values, late in (("u", U.tolist(), 0.0), ("y", Y.tolist(), apart))
+    ]
+    answer = {"status": "success", "data": {"resultType": "matrix", "result": prometheus}}
+    (tmp_path / "prometheus.json").write_text(json.dumps(answer), encoding="utf-8")
+    if apart:
+        assert any("interpolated" in one for one in inspect_file(tmp_path / "prometheus.json").problems)
+        return
+    panel = [
+        {"target": name, "datapoints": [[x, round(1e3 * t)] for t, x in zip(stamps, values.tolist(), strict=True)]}
+        for name, values in (("u", U), ("y", Y))
+    ]
+    (tmp_path / "grafana.json").write_text(json.dumps(panel), encoding="utf-8")
+    for name in ("prometheus.json", "grafana.json"):
         loaded(tmp_path / name, u="u", y="y")
 
 

@@ -46,6 +46,12 @@ def autumn(k: int) -> str:
     return f"2024-10-27 {minutes // 60:02d}:{minutes % 60:02d}:00"
 
 
+def leap_day(k: int) -> str:
+    """Month, day, hour and minute, every 10 minutes from 23:00 on the 29th of February."""
+    minutes = 1380 + 10 * k
+    return f"{'02 29' if minutes < 1440 else '03 01'} {minutes // 60 % 24:02d} {minutes % 60:02d}"
+
+
 def historian(k: int) -> str:
     """A row of each signal, one of them bad, where a zero stands."""
     good, y = ("Bad", 0.0) if k == 7 else ("Good", Y[k])
@@ -236,6 +242,34 @@ ZOO = {
     ),
     "truth in German": Animal(
         text=table(lambda k: f"{T[k]:.1f};{'WAHR' if U[k] == 3.0 else 'FALSCH'};{Y[k]:.6f}", "t [s];u;y [V]"), unit="1"
+    ),
+    "a year, a month, a day, an hour and minutes in columns": Animal(
+        text=table(lambda k: f"2024 {leap_day(k)} {U[k]} {Y[k]:.6f}", "#YY MM DD hh mm u y"),
+        suffix=".txt", step=600.0, unit="1", told=("YY, MM, DD, hh, mm together",),
+    ),
+    "a clock of 32 bit that is full": Animal(
+        text=table(lambda k: f"{(2**32 - 500000 + 100000 * k) % 2**32},{U[k]},{Y[k]:.6f}", "micros,u [V],y [V]"),
+        told=("a counter of 32 bit is full",),
+    ),
+    "dates as SAS writes them": Animal(
+        text=table(lambda k: f"12MAR2024:08:15:{k:02d},{U[k]},{Y[k]:.6f}", "DT,u [V],y [V]"), step=1.0
+    ),
+    "a unit behind numbers with a decimal comma": Animal(
+        text=table(lambda k: f"{T[k]:.1f} s;{U[k]} V;{Y[k]:.6f} V".replace(".", ","), "t;u;y")
+    ),
+    "one number shows what points and commas mean": Animal(
+        text=table(
+            lambda k: f"{T[k]:.1f};{U[k]};{Y[k]:.6f};".replace(".", ",") + ("4.000,00" if k % 3 else f"{800 + k}.000"),
+            "t [s];u [V];y [V];p [Pa]",
+        ),
+        told=("thousands",),
+    ),
+    "thousands as a Swiss Windows writes them": Animal(
+        text=table(lambda k: f"{1000000 + 100 * k:,};{U[k]};{Y[k]:.6f}".replace(",", "\u2019"), "t [ms];u [V];y [V]"),
+        told=("thousands",),
+    ),
+    "a head of several lines in its cells": Animal(
+        text=table(plain, '"Time\n[s]","u\n[V]","y\n[V]"')
     ),
     "Campbell's TOA5, units and kinds below the names": Animal(
         text=table(
