@@ -91,7 +91,9 @@ def _log10(g: Values, x: int) -> int:
     return g.apply(machine.MUL, g.constant(1.0 / math.log(10.0)), g.apply(machine.LOG, x))
 
 
-_X, _LIMITS = ("x",), ("x", "low", "high")
+_X = ("x",)
+LIMITS = ("x", "low", "high")
+"""What a function takes that has limits."""
 
 FUNCTIONS: dict[str, Function] = {
     "abs": Function(arguments=_X, lower=_unary(machine.ABS), says="magnitude"),
@@ -111,9 +113,9 @@ FUNCTIONS: dict[str, Function] = {
     "min": Function(arguments=("a", "b"), lower=_many(machine.MIN), more=True, says="the least"),
     "max": Function(arguments=("a", "b"), lower=_many(machine.MAX), more=True, says="the greatest"),
     "sign": Function(arguments=_X, lower=lambda g, x: g.switch(machine.SIGN, x), says="-1, 0 or 1"),
-    "clamp": Function(arguments=_LIMITS, lower=_clamp, says="held within limits"),
-    "saturate": Function(arguments=_LIMITS, lower=_clamp, says="the same as clamp"),
-    "deadzone": Function(arguments=_LIMITS, lower=_deadzone, says="0 between limits, and what is beyond them"),
+    "clamp": Function(arguments=LIMITS, lower=_clamp, says="held within limits"),
+    "saturate": Function(arguments=LIMITS, lower=_clamp, says="the same as clamp"),
+    "deadzone": Function(arguments=LIMITS, lower=_deadzone, says="0 between limits, and what is beyond them"),
     "where": Function(arguments=("condition", "yes", "no"), lower=_where, says="one of two, by a condition"),
 }
 """By name."""

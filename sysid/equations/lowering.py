@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sysid.equations.functions import FUNCTIONS, OWN, operator
+from sysid.equations.functions import FUNCTIONS, LIMITS, OWN, operator
 from sysid.equations.graph import (
     CONTINUOUS_STATE,
     DISCRETE_STATE,
@@ -103,7 +103,19 @@ class _Lowering(Names):
         arguments = [self.value(one) for one in node.parts]
         if name in self.terms.tables:
             return self.apply(machine.TABLE, arguments[0], own=list(self.terms.tables).index(name))
+        if FUNCTIONS[name].arguments == LIMITS:
+            self._check_limits(node, *map(self.value_of, arguments[1:]))
         return FUNCTIONS[name].lower(self, *arguments)
+
+    def _check_limits(self, node: Call, low: float | None, high: float | None) -> None:
+        if low is not None and high is not None and low > high:
+            raise equation_error(
+                f"the lower limit of {node.function} is above its upper one",
+                self.system.text,
+                node.at,
+                expected=f"{node.function}({', '.join(LIMITS)})",
+                remedy=f"exchange them: {high:g}, {low:g}",
+            )
 
     def _taken(self, node: Call, names: tuple[str, ...]) -> list[Node]:
         """Arguments and options of a function with states, in order."""

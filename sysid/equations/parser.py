@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from sysid.equations.functions import CONSTANTS
+from sysid.equations.functions import CONSTANTS, FUNCTIONS, OWN
 from sysid.equations.lexer import Word, words_of
 from sysid.equations.syntax import (
     CONTINUOUS,
@@ -38,6 +38,7 @@ BINDING = {
 """How much each operator between two expressions binds."""
 _NOT, _MINUS = 3, 7
 _COMPARING = 4
+_VALUE = "a number, a name, a function or a bracket"
 RESERVED = frozenset({"and", "or", "not", TIME, "dt"})
 """Words that name nothing."""
 _RATE = re.compile(r"d(\w+)")
@@ -234,14 +235,22 @@ class _Parser:
             return Operation(operator="not", operands=(self.expression(_NOT),), at=word.at)
         if word.kind == "quoted" or (word.kind == "name" and word.text not in RESERVED):
             return self._name(word)
+        if word.text == TIME:
+            raise self._no_time(word)
         got = "the equation ends" if word.kind == "end" else f"{word.text!r} stands"
         raise self.wrong(
             f"{got} where a value belongs",
             word,
-            expected="a number, a name, a function or a bracket",
-            remedy=f"{TIME} stands in delays only, as in u({TIME} - 0.5); give a time that is needed as an input"
-            if word.text == TIME
-            else "complete the expression, or remove the operator before it",
+            expected=_VALUE,
+            remedy="complete the expression, or remove the operator before it",
+        )
+
+    def _no_time(self, word: Word) -> ConfigError:
+        return self.wrong(
+            f"{word.text!r} stands where a value belongs",
+            word,
+            expected=_VALUE,
+            remedy=f"{TIME} stands in delays only, as in u({TIME} - 0.5); give a time that is needed as an input",
         )
 
     def _name(self, word: Word) -> Node:
@@ -266,7 +275,9 @@ class _Parser:
 
     def _past(self, word: Word) -> Node:
         """``u(t)`` or ``u(t - 0.5)``, from ``t`` on."""
-        self.take()
+        time = self.take()
+        if word.kind == "name" and word.text in {*FUNCTIONS, *OWN}:
+            raise self._no_time(time)
         if self.now.text == ")":
             self.take()
             return Name(name=word.text, at=word.at)

@@ -68,6 +68,8 @@ def test_a_network_has_weights_of_its_own_each_time_it_is_written() -> None:
     ("text", "words"),
     [
         ("y = relay(u, on=1, off=2)", "goes off above where it goes on"),
+        ("y = clamp(u, 1, 0)", "lower limit of clamp is above"),
+        ("y = deadzone(u, 0.1, -0.1)", "lower limit of deadzone is above"),
         ("y = relay(u, 1)", "relay takes x, on, off"),
         ("y = net(u)", "a network takes what it sees, and neurons"),
         ("y = net(u; neurons=0)", "not a number of neurons"),

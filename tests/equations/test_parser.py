@@ -93,6 +93,8 @@ def test_equations_stand_on_lines_that_are_over_and_remarks_are_nothing() -> Non
         ("y = u(t - tau)", "a delay is a number of seconds", 11),
         ("y = u(t + 1)", "a delay is a number of seconds", 9),
         ("y = t", "'t' stands where a value belongs", 5),
+        ("y = sin(t)", "'t' stands where a value belongs", 9),
+        ("y = exp(t - 5)", "'t' stands where a value belongs", 9),
         ("x[k+2] = 1", "a left side is now or the next sample", 1),
         ("2 = y", "does not begin so", 1),
         ("y 2", "'2' where '=' belongs", 3),

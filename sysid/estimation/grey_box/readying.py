@@ -17,7 +17,14 @@ from sysid.estimation.grey_box.preparing import WINDOW, first_terms, norms_for, 
 from sysid.estimation.grey_box.provider import EquationProvider
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.grey_box.shooting import in_windows
-from sysid.estimation.grey_box.stepping import STIFF, Stepping, can_be_implicit, explicit_steps, solver_for
+from sysid.estimation.grey_box.stepping import (
+    STIFF,
+    Stepping,
+    can_be_implicit,
+    explicit_steps,
+    hides_growth,
+    solver_for,
+)
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.parameters.named import named_of
 from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range
@@ -130,7 +137,7 @@ def ready_for(
         other = _looked_at(template, *in_windows(whole, declared), begun=True)
         if parted := bool(np.isfinite(other[0].loss(other[1]))):
             provider, theta, stepping = other
-    if not np.isfinite(provider.loss(theta)):
+    if not np.isfinite(provider.loss(theta)) or hides_growth(provider, theta):
         raise no_run(_stiff_remedy(template.grey, provider, theta))
     seen = provider.form
     template = replace(

@@ -32,6 +32,9 @@ STIFF = 16.0
 """Runge-Kutta steps from sample to sample that are only needed for the run not to grow, above which implicit ones are
 tried."""
 
+GROWN = 1.0
+"""What an implicit step times a rate of growth may be: beyond 2.3 the method turns growth into decay."""
+
 LOOKED_AT = 20
 """Places along each record where the equations are linearised."""
 
@@ -107,13 +110,38 @@ def explicit_steps(provider: EquationProvider, theta: Array) -> float:
     Returns:
         The most that any of some places along the records, and their states at rest, ask for.
     """
-    form, fastest = provider.at(theta), 0.0
+    fastest = max((float(np.abs(rates).max()) for rates in _rates(provider, theta)), default=0.0)
+    return fastest * provider.form.sample_time / REACH
+
+
+def hides_growth(provider: EquationProvider, theta: Array) -> bool:
+    """Whether implicit steps make a free run of equations that explode.
+
+    Steps that forget what is fast forget what grows fast as well: at half the step no less, so that nothing else shows
+    it. A state that jumps from one branch to another grows for a moment; what counts is most of the run.
+
+    Args:
+        provider: The records.
+        theta: What is trained.
+
+    Returns:
+        Whether at most of some places along the records the linearised equations grow faster than the steps follow.
+    """
+    form = provider.form
+    if form.lowered.solver != ROSENBROCK:
+        return False
+    grown = [float(rates.real.max()) * form.sample_time / form.substeps > GROWN for rates in _rates(provider, theta)]
+    return 2 * sum(grown) > len(grown)
+
+
+def _rates(provider: EquationProvider, theta: Array) -> Iterator[NDArray[np.complex128]]:
+    """The eigenvalues of the linearised equations in 1/s, at places along the records and at rest."""
+    form = provider.at(theta)
     n = form.lowered.n_continuous
     for own, x, u in _places(provider, form, theta) if n else ():
         J = own.rates_by_state(x, u)[:, :n]
         if np.isfinite(J).all():
-            fastest = max(fastest, float(np.abs(np.linalg.eigvals(J)).max()))
-    return fastest * form.sample_time / REACH
+            yield np.asarray(np.linalg.eigvals(J), dtype=np.complex128)
 
 
 def _places(
@@ -153,7 +181,8 @@ def solver_for(
         tried = replace(substeps_for(other, theta), explicit=needed)
         cheaper = _cost(other, tried) < _cost(provider, found)
         better = not np.isnan(tried.change) and not tried.change >= found.change
-        if (tried.enough and cheaper) or (not found.enough and (tried.enough or better)):
+        wanted = (tried.enough and cheaper) or (not found.enough and (tried.enough or better))
+        if wanted and not hides_growth(other.with_form(replace(other.form, substeps=tried.substeps)), theta):
             chosen = (other, tried)
     provider, stepping = chosen
     return provider.with_form(replace(provider.form, substeps=stepping.substeps)), stepping

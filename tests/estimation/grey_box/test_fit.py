@@ -210,9 +210,16 @@ def test_masked_samples_do_not_count() -> None:
     assert fit.model.parameters == pytest.approx({"gain": 3.0, "lag": 4.0}, rel=0.01)  # type: ignore[attr-defined]
 
 
-def test_equations_without_a_run_are_refused() -> None:
+@pytest.mark.parametrize(
+    ("equations", "solver"),
+    [("dx/dt = log(-gain) + u; y = x", None), ("dx/dt = u + 50*gain*x; y = x", None),
+     ("dx/dt = u + 50*gain*x; y = x", "rosenbrock")],
+    ids=["no number", "explodes", "explodes, implicit steps asked for"],
+)  # fmt: skip
+def test_equations_without_a_run_are_refused(equations: str, solver: str | None) -> None:
+    """Implicit steps forget what is fast, what grows too: a run that explodes had been fitted and called bounded."""
     with pytest.raises(TraceError, match="no free run at their declared start"):
-        fitted([first_order(3.0, 4.0)], "dx/dt = log(-gain) + u; y = x", parameters={"gain": 1.0})
+        fitted([first_order(3.0, 4.0)], equations, parameters={"gain": 1.0}, solver=solver)
 
 
 def test_a_declared_state_without_a_run_is_not_the_end() -> None:
