@@ -14,6 +14,7 @@ from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
+from sysid.estimation.linear.begun_at_rest import Beginning, at_rest, left_out
 from sysid.estimation.linear.delay_search import check_max_delay, without_dead_time
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
@@ -39,11 +40,6 @@ from sysid.traces import Trace
 
 def _ignore(_: Iteration) -> None:
     """The callback of those who do not watch."""
-
-
-STANDS, NOISE, ROUNDING = 3, 1.5, 1e-6
-"""Samples that tell whether an output stands, and the most that it moves then: over what it does from sample to sample,
-and over its standard deviation."""
 
 
 def fit_transfer_function(
@@ -133,24 +129,6 @@ def _third(experiment: Experiment) -> int:
     return int(places[len(places) // 3])
 
 
-def _at_rest(experiment: Experiment, dead: int) -> int:
-    """First samples of a record in which all inputs and the output stand: what came before it was no different.
-
-    A record of a step begins so, and the samples that a long dead time would leave out may be all that it tells. The
-    output has to stand until it can show that inputs move, ``dead`` samples later: where inputs stepped as the record
-    began it stands too, and moves before.
-    """
-    moved = (experiment.inputs != experiment.inputs[0]).any(axis=1)
-    first = int(np.argmax(moved)) if moved.any() else 0
-    until = first + dead
-    known = slice(0, until) if experiment.usable is None else np.flatnonzero(experiment.usable[:until])
-    y = experiment.output[known]
-    if len(y) < STANDS:
-        return 0
-    noise = float(np.std(np.diff(y))) / np.sqrt(2.0)
-    return first if float(np.std(y)) <= NOISE * noise + ROUNDING * float(np.std(experiment.output)) else 0
-
-
 def _mean_mse(model: AbstractModel, traces: Sequence[Trace], start: Start) -> float:
     """Mean over records of the free run's mean squared error; infinite where a free run is not finite."""
     errors = []
@@ -237,7 +215,7 @@ class _Problem(AbstractProblem):
         """With first samples left out that stand; see the base class."""
         # Where dead times are tried that are longer than all records, those that begin at rest alone tell of them.
         long = max(len(e.output) for e in self.experiments) > self.delay_range()[1]
-        rests = long and any(e.free and _at_rest(e, 0) for e in self.experiments)
+        rests = long and any(e.free and at_rest(_beginning(e), 0) for e in self.experiments)
         return replace(self, rested=False) if rests else None
 
     def likely_delays(self, least: int, most: int) -> list[list[int]]:
@@ -288,8 +266,10 @@ class _Problem(AbstractProblem):
         not judged by each of them.
         """
         unknown, dead = (max(delays), min(delays)) if most is None else (most, 0)
-        rest = [_at_rest(experiment, dead) if self.rested else 0 for experiment in self.experiments]
-        known = [self._record(one, delays, unknown - at) for one, at in zip(self.experiments, rest, strict=True)]
+        lost = [unknown] * len(self.experiments)
+        if self.rested:
+            lost = left_out([_beginning(experiment) for experiment in self.experiments], unknown, dead)
+        known = [self._record(one, delays, n) for one, n in zip(self.experiments, lost, strict=True)]
         records = tuple(record for record in known if len(record.target))
         if not records:
             raise TraceError(
@@ -311,7 +291,7 @@ class _Problem(AbstractProblem):
             output = np.concatenate([experiment.history.output, output])
             weights = np.concatenate([experiment.past_weights, weights])
         scaled, held = self.scaling.scale_inputs(inputs), self.scaling.scale_inputs(past[np.newaxis])[0]
-        rows = slice(max(unknown, 0) if experiment.free else 0, None)
+        rows = slice(unknown if experiment.free else 0, None)
         return TimeRecord(
             inputs=np.asfortranarray(delayed_inputs(scaled, held, delays)[rows]),
             # From a state that is fitted any past can be reached, and zero is one that every system has.
@@ -323,6 +303,11 @@ class _Problem(AbstractProblem):
             free_start=experiment.free,
             moving=self.orders.moving(self.terms.mapping.inputs),
         )
+
+
+def _beginning(experiment: Experiment) -> Beginning:
+    """What says whether a record begins at rest."""
+    return experiment.inputs, experiment.output[:, np.newaxis], experiment.usable
 
 
 def _counted(experiment: Experiment) -> list[slice]:

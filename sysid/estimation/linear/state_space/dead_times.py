@@ -9,6 +9,7 @@ import numpy as np
 
 from sysid.errors import FitDivergedError, TraceError, UserError
 from sysid.estimation.least_squares.threads import one_blas_thread
+from sysid.estimation.linear.begun_at_rest import left_out
 from sysid.estimation.linear.delay_search import check_max_delay, searched_delays
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.search import quick_size
@@ -81,8 +82,10 @@ def late(segments: Sequence[Segment], orders: LinearStateSpace, *, unknown: int 
         TraceError: If none is.
     """
     shifts = orders.shifts(segments[0].inputs.shape[1])
-    lost = max(shifts, default=0) if unknown is None else unknown
-    found = [segment.delayed(shifts, unknown=lost, masked=orders.noise) for segment in segments]
+    lost, dead = (max(shifts, default=0), min(shifts, default=0)) if unknown is None else (unknown, 0)
+    beginnings = [(one.inputs, one.outputs, None if one.whole else one.root_weights > 0.0) for one in segments]
+    rows = left_out(beginnings, lost, dead + orders.shortest) if lost else [0] * len(segments)
+    found = [one.delayed(shifts, unknown=n, masked=orders.noise) for one, n in zip(segments, rows, strict=True)]
     longest = max(map(len, found))
     if longest <= orders.states:
         raise TraceError(
