@@ -109,11 +109,18 @@ class PoleParameters:
             return raw
         if self.domain is Domain.DISCRETE:
             return np.asarray((1.0 - self.slowest) * np.tanh(raw))
-        return np.asarray(np.exp(raw) + self._floor(len(raw)))
+        return np.asarray(self._shift(len(raw)) @ np.exp(raw) + self._floor(len(raw)))
 
     def _floor(self, order: int) -> NDArray[np.float64]:
         """Least coefficients ``(c1, c0)`` of a continuous section: two poles of the slowest rate."""
         return np.array([2.0 * self.slowest, self.slowest**2]) if order == 2 else np.array([self.slowest])
+
+    def _shift(self, order: int) -> NDArray[np.float64]:
+        """From coefficients about ``s = -slowest``, which are positive where no pole is slower, to what is above that.
+
+        A least ``c0`` alone lets one of two real poles be as slow as the other is fast.
+        """
+        return np.array([[1.0, 0.0], [self.slowest, 1.0]]) if order == 2 else np.eye(1)
 
     def _denominator(self, k: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.domain is Domain.CONTINUOUS:  # k is (c1, c0)
@@ -123,8 +130,11 @@ class PoleParameters:
     def _raw(self, d: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.domain is Domain.CONTINUOUS:
             c = d[:-1][::-1]
+            if not self.stable:
+                return c.copy()
             floor = self._floor(len(c))
-            return np.log(np.maximum(np.abs(c) - floor, 1e-3 * floor)) if self.stable else c.copy()
+            beyond = np.linalg.solve(self._shift(len(c)), np.abs(c) - floor)
+            return np.asarray(np.log(np.maximum(beyond, 1e-3 * floor)))
         k = d[1:].copy()
         if len(d) == 3:
             k[0] = d[1] / (1.0 + d[2]) if d[2] != -1.0 else 0.0
@@ -134,12 +144,12 @@ class PoleParameters:
 
     def _jacobian(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         """Of the section's coefficients ``(c1, c2)`` or ``(c1, c0)`` with respect to the vector's entries."""
+        if self.domain is Domain.CONTINUOUS:
+            return self._shift(len(raw)) * np.exp(raw) if self.stable else np.eye(len(raw))
         k = self._constrained(raw)
-        outer = np.ones(len(k))
-        if self.stable:
-            edge = 1.0 - self.slowest
-            outer = edge - k**2 / edge if self.domain is Domain.DISCRETE else k - self._floor(len(k))
-        if self.domain is Domain.CONTINUOUS or len(k) == 1:
+        edge = 1.0 - self.slowest
+        outer = edge - k**2 / edge if self.stable else np.ones(len(k))
+        if len(k) == 1:
             return np.diag(outer)
         return np.array([[1.0 + k[1], k[0]], [0.0, 1.0]]) * outer
 

@@ -46,3 +46,13 @@ def test_an_input_integrates_and_the_slow_pole_of_another_stays_what_it_is() -> 
     slow = [float(np.abs(fit.model.poles(j)).max()) for j in range(2)]
     assert slow[0] == pytest.approx(1.0, abs=1e-12)
     assert slow[1] == pytest.approx(np.exp(-0.05 * T), abs=2e-4)
+
+
+def test_a_continuous_lag_before_an_integrator_leaves_that_at_zero() -> None:
+    """A bound of the product of two poles let one be slower than any record, and the run from rest was lost."""
+    fit = sysid.fit(_record((0.0,)), "u1 -> y", sysid.TransferFunction(poles=2, zeros=0, delays=0, domain="continuous"))
+    rest = np.r_[np.zeros(20), np.ones(300), -np.ones(300)]
+    b, a, _ = signal.cont2discrete(([0.5], [1.0, 1.0, 0.0]), T)
+    expected = signal.lfilter(b.ravel(), a, rest)
+    assert abs(fit.model.pole_radius - 1.0) < 1e-12
+    assert np.std(fit.simulate(rest) - expected) < 0.02 * np.std(expected)

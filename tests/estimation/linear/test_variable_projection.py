@@ -59,7 +59,7 @@ def records(kind: str, domain: Domain, m: int) -> tuple[AbstractRecord, ...]:
 def test_gradient_is_that_of_the_loss(
     domain: Domain, n_poles: tuple[int, ...], n_zeros: tuple[int, ...], kind: str, stable: bool
 ) -> None:
-    poles = PoleParameters(n_poles=n_poles, domain=domain, stable=stable)
+    poles = PoleParameters(n_poles=n_poles, domain=domain, stable=stable, slowest=0.05)
     provider = SeparableProvider(
         poles=poles, n_zeros=n_zeros, records=records(kind, domain, len(n_poles)), constant=True
     )
@@ -72,7 +72,7 @@ def test_gradient_is_that_of_the_loss(
 
 @DOMAINS
 def test_poles_go_there_and_back(domain: Domain) -> None:
-    poles = PoleParameters(n_poles=(5, 2), domain=domain, stable=True)
+    poles = PoleParameters(n_poles=(5, 2), domain=domain, stable=True, slowest=0.05)
     theta = np.random.default_rng(3).normal(size=7)
     np.testing.assert_allclose(poles.theta(poles.sections(theta)), theta, rtol=1e-9)
 
@@ -84,6 +84,15 @@ def test_every_vector_is_stable(domain: Domain) -> None:
         for d in poles.sections(3.0 * np.random.default_rng(seed).normal(size=4))[0]:
             roots = np.roots(d if domain is Domain.DISCRETE else d[::-1])
             assert np.abs(roots).max() < 1.0 if domain is Domain.DISCRETE else roots.real.max() < 0.0
+
+
+def test_no_vector_of_continuous_poles_has_one_slower_than_the_slowest() -> None:
+    """Also of a section with a fast pole: a record does not tell one that is slower from an integrator."""
+    poles = PoleParameters(n_poles=(4,), domain=Domain.CONTINUOUS, stable=True, slowest=1e-3)
+    for seed in range(20):
+        (part,) = poles.sections(np.random.default_rng(seed).normal(scale=6.0, size=4))
+        rates = [-float(np.roots(section[::-1]).real.max()) for section in part]
+        assert min(rates) >= 1e-3 * (1.0 - 1e-6)
 
 
 def test_a_model_that_runs_away_has_infinite_loss() -> None:
