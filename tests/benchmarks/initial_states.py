@@ -74,9 +74,9 @@ def main() -> None:
     )
     for name, network, weight, n_initial, samples in rows:
         training, test = every[name]
-        case = Case(title=name, training=(), parts=(), n_initial=n_initial, grid=(), seeds=1, starts=3, iterations=200)
+        case = Case(title=name, training=(), parts=(), n_initial=n_initial, grid=(), seeds=1, iterations=200)
         for seed in range(3):
-            form = fit(case, training, (network, weight), seed, 3).model.recursion
+            form = fit(case, training, (network, weight), seed, starts=3).model.recursion
             assert isinstance(form, NeuralForm)
             print(f"{name}, {network.label}, seed {seed}: at rest {left(form, training[0]):.3f}")
             for record in test:

@@ -6,7 +6,7 @@ Every `pipelines/benchmarks/*.yaml` whose record lies in the folder is run as `s
 a record that is not there is left out, and that is told. With `--minutes` a search has so many by the clock, as
 `sysid auto` has, in place of the iterations that make it the same on every machine. Nothing of a test record chooses
 anything: each row says by which rule its model was chosen, and what was declared beyond the record. Rows of experts
-beside them are those of `public_neural`, `public_ensembles` and `linear_public`; a search that declares nothing is
+beside them are those of `public_neural` and `linear_public`; a search that declares nothing is
 meant to come within a fifth of them.
 
 Published: Champneys et al., "Baseline results for selected nonlinear system identification benchmarks",
@@ -69,8 +69,8 @@ BY_HAND = {
     "silverbox": {"multisine test": 0.203, "arrow": 0.270, "arrow without extrapolation": 0.209},
     "emps": {"test": 4.39},
 }
-"""By pipeline and case, in the unit of its row: medians of three seeds of `public_ensembles` (tanks), `public_neural`
-and `emps-by-hand`."""
+"""By pipeline and case, in the unit of its row: medians of three seeds of `public_neural` and
+`emps-by-hand`."""
 DECLARED = {
     "-equations": ("by equations", "its equations"),
     "-by-hand": ("by hand", "an integrator that neurons see, inputs in proportion"),

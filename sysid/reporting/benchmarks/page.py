@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -29,7 +29,8 @@ def publish_benchmarks(name: str, into: Path, ran: Sequence[Benchmark]) -> Path:
     Args:
         name: Name of the report.
         into: Folder of the published reports.
-        ran: The benchmarks; one that was run by the same command before is replaced.
+        ran: The benchmarks; one that was run by the same command before is replaced, and so is a figure that another
+            command found before.
 
     Returns:
         The page, with :data:`sysid.reporting.benchmarks.findings.FINDINGS_FILE` beside it.
@@ -42,13 +43,21 @@ def publish_benchmarks(name: str, into: Path, ran: Sequence[Benchmark]) -> Path:
     kept: dict[str, Benchmark] = {}
     if (folder / FINDINGS_FILE).exists():
         kept = {benchmark.command: benchmark for benchmark in read_findings(folder).benchmarks}
-    kept |= {benchmark.command: benchmark for benchmark in ran}
-    report = Benchmarks(name=name, benchmarks=list(kept.values()))
+    again = {finding.what for benchmark in ran for finding in benchmark.findings}
+    by_command = {command: _without(older, again) for command, older in kept.items()}
+    by_command |= {benchmark.command: benchmark for benchmark in ran}
+    report = Benchmarks(name=name, benchmarks=[one for one in by_command.values() if one])
     write_findings(folder, report)
     page = folder / PAGE
     with replacing(page) as draft:
         draft.write_text("\n".join(_lines(report)) + "\n", encoding="utf-8", newline="\n")
     return page
+
+
+def _without(older: Benchmark, again: Collection[str]) -> Benchmark | None:
+    """What is left of a benchmark beside figures that were found again: two figures of one thing contradict."""
+    left = [finding for finding in older.findings if finding.what not in again]
+    return older.model_copy(update={"findings": left}) if left or not older.findings else None
 
 
 def _lines(report: Benchmarks) -> list[str]:

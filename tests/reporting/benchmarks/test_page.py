@@ -88,15 +88,23 @@ def test_a_column_that_nobody_fills_is_left_out(tmp_path: Path) -> None:
 
 
 def test_a_report_grows_and_a_benchmark_that_is_run_again_takes_its_own_place(tmp_path: Path) -> None:
-    publish_benchmarks("all", tmp_path, [benchmark("first"), benchmark("second")])
-    publish_benchmarks("all", tmp_path, [benchmark("first", title="Anew"), benchmark("third")])
+    second = [Finding(what="another", ours=1.0)]
+    publish_benchmarks("all", tmp_path, [benchmark("first"), benchmark("second", findings=second)])
+    publish_benchmarks("all", tmp_path, [benchmark("first", title="Anew"), benchmark("third", findings=[])])
     kept = read_findings(tmp_path / "all").benchmarks
     assert [(one.command, one.title) for one in kept] == [
         ("first", "Anew"),
         ("second", "Speed of everything"),
         ("third", "Speed of everything"),
     ]
-    assert kept[1].findings == FINDINGS
+    assert kept[1].findings == second
+
+
+def test_a_figure_that_another_command_found_again_stands_once(tmp_path: Path) -> None:
+    publish_benchmarks("all", tmp_path, [benchmark("all"), benchmark("some", findings=FINDINGS[:1])])
+    publish_benchmarks("all", tmp_path, [benchmark("last", findings=FINDINGS[:2])])
+    kept = read_findings(tmp_path / "all").benchmarks
+    assert [(one.command, one.findings) for one in kept] == [("all", FINDINGS[2:]), ("last", FINDINGS[:2])]
 
 
 def test_damaged_figures_and_a_folder_of_somebody_else_are_refused(tmp_path: Path) -> None:
