@@ -1,14 +1,15 @@
 """Time to the same free-run error: jax-sysid, fastcan and pyrenn beside this project, in one run.
 
-    python -m tests.benchmarks peers [--cap=300] [--only=tank] [--workers=2]
+    python -m tests.benchmarks peers [--cap=300] [--only=tank] [--peer="jax-sysid, state space"] [--workers=2]
 
 The peers live in an environment of their own under the cache folder, which the first run makes (some 700 MB); they are
 no dependencies of the project. Two problems, the same lags and neurons for all: a synthetic tank behind a valve, 2,000
 samples, 2 lags, 10 neurons; and BP+AR -> BC on EST01 of the data set abdx-service, 20,000 samples, 2 lags, 20 neurons
-(fastcan: polynomials over the same lags; jax-sysid also as a state space with two free states, which is its own way).
-Every tool sees scaled signals at rest before the first sample; the errors that times are measured to are those of the
-free run over the training record. Beside them stands what the peers' best parameters give on VAL01 to VAL04, which
-nothing is fitted to or chosen on.
+(fastcan: polynomials over the same lags; jax-sysid also as a state space with two free states, which is its own way,
+and beside it ours of as many states and neurons). Ours trains as ``Training()`` has it: one start of a NARX network,
+six of a state space, most of which are dropped soon. Every tool sees scaled signals at rest before the first sample;
+the errors that times are measured to are those of the free run over the training record. Beside them stands what the
+peers' best parameters give on VAL01 to VAL04, which nothing is fitted to or chosen on.
 
 Times are processor times, one thread each, so that a machine with other work gives the same answer. A peer gets the
 cap at most. Two comparisons: the time to an error that was fixed beforehand (the tank: 3.6 % of the output's standard
@@ -29,6 +30,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import groupby
@@ -39,9 +41,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from sysid.estimation import FitProgress, Training, fit_narx
+from sysid.estimation import FitProgress, Training, fit_narx, fit_neural_state_space
 from sysid.ingest import load_dataset
-from sysid.models import NARX, Mapping
+from sysid.models import NARX, Mapping, NeuralStateSpace
 from sysid.reporting.scores import Score
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found, read, scored
@@ -49,7 +51,8 @@ from tests.benchmarks._peers_environment import python_with
 
 PINNED = ("jax-sysid==1.1.0", "fastcan==0.6.0", "pyrenn==0.1")
 WORKER = Path(__file__).with_name("_peers_worker.py")
-TOOLS = ("jax-sysid", "fastcan, degree 2", "fastcan, degree 3", "pyrenn", "jax-sysid, state space")
+STATE_SPACE = "jax-sysid, state space"
+TOOLS = ("jax-sysid", "fastcan, degree 2", "fastcan, degree 3", "pyrenn", STATE_SPACE)
 CERTAIN = {"fastcan, degree 2", "fastcan, degree 3"}
 SEEDS = (0, 1, 2)
 PATIENCE = 30.0
@@ -170,11 +173,15 @@ def peer(python: Path, tool: str, problem: Path, cap: float, seed: int = 0) -> L
     return Learned(tool=tool, seconds=points[:, 0], errors=points[:, 1], unseen=unseen)
 
 
-def own(problem: Problem, cap: float) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Seconds since the call and mse in the output's unit squared, one learning curve a seed."""
-    network = NARX(input_delays=problem.lags, output_delays=problem.lags, neurons=problem.neurons)
+Curve = tuple[np.ndarray, np.ndarray]
+"""Seconds since the call, and mean squared errors in the output's unit squared."""
 
-    def curve(seed: int, iterations: int) -> tuple[np.ndarray, np.ndarray]:
+
+def own(problem: Problem, cap: float, network: NARX | NeuralStateSpace) -> list[Curve]:
+    """One learning curve a seed."""
+    estimate = fit_narx if isinstance(network, NARX) else fit_neural_state_space
+
+    def curve(seed: int, iterations: int) -> Curve:
         points: list[tuple[float, float]] = []
         began = time.process_time()
 
@@ -184,7 +191,7 @@ def own(problem: Problem, cap: float) -> list[tuple[np.ndarray, np.ndarray]]:
                 raise KeyboardInterrupt  # ends the fit, not the program
 
         training = Training(seed=seed, max_iterations=iterations, workers=1)
-        fit_narx(
+        estimate(
             [problem.trace], problem.mapping, network, training, rest_output=problem.rest_output, on_progress=watch
         )
         return np.array(points)[:, 0], np.array(points)[:, 1]
@@ -193,39 +200,46 @@ def own(problem: Problem, cap: float) -> list[tuple[np.ndarray, np.ndarray]]:
     return [curve(seed, 2000) for seed in SEEDS]
 
 
-def reached(curve: tuple[np.ndarray, np.ndarray], error: float) -> float:
+def reached(curve: Curve, error: float) -> float:
     """Seconds until the error is undercut; infinite if it never is."""
     seconds, errors = curve
     return float(seconds[np.argmax(errors <= error)]) if (errors <= error).any() else np.inf
 
 
-def compare(problem: Problem, python: Path, cap: float, folder: Path, workers: int) -> None:
-    """All tools on one problem."""
+def compare(problem: Problem, python: Path, tools: Sequence[str], cap: float, *, folder: Path, workers: int) -> None:
+    """Tools on one problem."""
     print(f"{problem.name}; {problem.lags} lags, {problem.neurons} neurons; cap {cap:g} s a peer", flush=True)
-    curves = own(problem, min(cap, 60.0))
-    ours = statistics.median(reached(curve, problem.target) for curve in curves)
-    each = ", ".join(f"{reached(curve, problem.target):.2f} s" for curve in curves)
-    least = ", ".join(f"{curve[1].min():.3g}" for curve in curves)
-    goal = f"{problem.target:.3g} {problem.unit}"
-    found(
-        f"{problem.name}: our time to {goal}, median of three seeds",
-        ours,
-        "s",
-        note=f"single seeds {each}; least mse within {max(curve[0][-1] for curve in curves):.0f} s: {least}",
-    )
+    narx = NARX(input_delays=problem.lags, output_delays=problem.lags, neurons=problem.neurons)
+    state_space = NeuralStateSpace(states=2, neurons=problem.neurons)
+    equals = [state_space if tool == STATE_SPACE else narx for tool in tools]
+    ours = {network: told(problem, cap, network) for network in dict.fromkeys(equals)}
     stored = problem.store(folder)
-    jobs = [(tool, seed) for tool in TOOLS for seed in (SEEDS if tool not in CERTAIN else SEEDS[:1])]
+    jobs = [(tool, seed) for tool in tools for seed in (SEEDS if tool not in CERTAIN else SEEDS[:1])]
     with ThreadPoolExecutor(workers) as pool:  # each peer is a process; what is compared is processor time
         done = pool.map(lambda job: peer(python, job[0], stored, cap, job[1]), jobs)
-        for tool, own_jobs in groupby(jobs, key=lambda job: job[0]):
+        for (tool, own_jobs), network in zip(groupby(jobs, key=lambda job: job[0]), equals, strict=True):
             runs = [learned for _ in own_jobs if (learned := next(done))]
             if runs:
-                judge(problem, runs, curves, cap)
+                judge(problem, runs, ours[network], cap)
             else:
                 print(f"  {tool} gave nothing with any seed", flush=True)
 
 
-def judge(problem: Problem, runs: list[Learned], curves: list[tuple[np.ndarray, np.ndarray]], cap: float) -> None:
+def told(problem: Problem, cap: float, network: NARX | NeuralStateSpace) -> list[Curve]:
+    """Our own learning curves, and what they come to by themselves."""
+    curves = own(problem, min(cap, 60.0), network)
+    each = ", ".join(f"{reached(curve, problem.target):.2f} s" for curve in curves)
+    least = ", ".join(f"{curve[1].min():.3g}" for curve in curves)
+    found(
+        f"{problem.name}: our time to {problem.target:.3g} {problem.unit} by {network.label}, median of three seeds",
+        statistics.median(reached(curve, problem.target) for curve in curves),
+        "s",
+        note=f"single seeds {each}; least mse within {max(curve[0][-1] for curve in curves):.0f} s: {least}",
+    )
+    return curves
+
+
+def judge(problem: Problem, runs: list[Learned], curves: list[Curve], cap: float) -> None:
     """Say how a peer compares, by its seeds."""
     tool, ours = runs[0].tool, statistics.median(reached(curve, problem.target) for curve in curves)
     learned = [(run.seconds, run.errors * problem.scale**2) for run in runs]
@@ -286,8 +300,8 @@ def elsewhere(problem: Problem, learned: Learned, best: float, cap: float) -> st
 if __name__ == "__main__":
     options = dict(argument[2:].split("=") for argument in sys.argv if argument.startswith("--") and "=" in argument)
     limit, wanted = float(options.get("cap", 300.0)), options.get("only", "tank,cylinder").split(",")
-    interpreter = environment()
+    interpreter, asked = environment(), [options["peer"]] if "peer" in options else TOOLS
     with tempfile.TemporaryDirectory() as scratch:
         for make in (tank, cylinder):
             if make.__name__ in wanted:
-                compare(make(), interpreter, limit, Path(scratch), int(options.get("workers", 1)))
+                compare(make(), interpreter, asked, limit, folder=Path(scratch), workers=int(options.get("workers", 1)))
