@@ -80,6 +80,8 @@ MODELS: dict[str, Callable[[], AbstractModel]] = {
     "NARX, linear part alone": lambda: build_narx(NARX(input_delays=2, output_delays=2, neurons=0)),
     "NARX, direct input": lambda: build_narx(NARX(input_delays="0:3", output_delays=2, neurons=5)),
     "NARX, direct input only": lambda: build_narx(NARX(input_delays="0:0", output_delays=1, neurons=5)),
+    "NARX of inputs alone": lambda: build_narx(NARX(input_delays="0:2", output_delays=[], neurons=5)),
+    "NARX, a curve without memory": lambda: build_narx(NARX(input_delays=[0], output_delays=[], neurons=5)),
     "NARX, sparse lags": lambda: build_narx(NARX(input_delays=[1, 2, 4, 8], output_delays=[2, 5], neurons=5)),
     "NARX, delays per input": lambda: build_narx(NARX(input_delays=[[0], [1, 2, 4]], output_delays="1:2", neurons=5)),
     "NARX against its limits": lambda: build_narx(

@@ -85,6 +85,7 @@ FITS = [
     pytest.param(NARX, {"seed": 7, "max_iterations": 4}, EVERYWHERE, id="NARX that runs away"),
     pytest.param(NARX, {"seed": 7, "loop": "open", "max_iterations": 8}, EVERYWHERE, id="NARX one step ahead"),
     pytest.param(NARX, {"seed": 7, "max_iterations": 30, "starts": 3}, EVERYWHERE, id="NARX of several starts"),
+    pytest.param(NARX | {"output_delays": []}, {"seed": 7, "max_iterations": 4}, EVERYWHERE, id="NARX of inputs alone"),
     pytest.param(NARX | {"limits": [None, 130]}, {"seed": 7, "max_iterations": 4}, EVERYWHERE, id="NARX with a limit"),
     pytest.param(
         NARX | {"gated": True}, {"seed": 7, "max_iterations": 6, "pretraining": 60, "starts": 3, "ensemble": 2},
@@ -99,9 +100,16 @@ FITS = [
     pytest.param(HW, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="HammersteinWiener"),
     pytest.param(WH, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="WienerHammerstein"),
     pytest.param(POLYNOMIAL_NARX, {"seed": 7, "max_iterations": 4}, ALONE, id="PolynomialNARX"),
+    pytest.param(
+        POLYNOMIAL_NARX | {"output_delays": []}, {"seed": 7, "max_iterations": 4}, ALONE, id="polynomial, inputs alone"
+    ),
     pytest.param(VECTOR_SS, None, ALONE, id="VectorSS, of one"),
     pytest.param(VECTOR_NSS, {"seed": 7, "max_iterations": 4, "starts": 1}, ALONE, id="VectorNSS, of one"),
     pytest.param(VECTOR, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="NARX of several outputs, of one"),
+    pytest.param(
+        VECTOR | {"output_delays": []}, {"seed": 7, "max_iterations": 4, "starts": 1}, ALONE,
+        id="NARX of several outputs, of inputs alone",
+    ),
 ]  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from sysid.equations.system import written_name
 from sysid.errors import ConfigError, shortened
 from sysid.models.blocks.curves import number
 from sysid.models.channels.mapping import Mapping
-from sysid.models.orders.lags import Lags, LagSpec, parse_lags, whole
+from sysid.models.orders.lags import Lags, LagSpec, check_reads, parse_lags, parse_output_lags, whole
 from sysid.models.orders.ranges import IntRange
 from sysid.models.orders.structure import AbstractStructure
 
@@ -32,7 +32,7 @@ class PolynomialNARX(AbstractStructure):
 
     Args:
         input_delays: For every input the lags, or one set for all: ``2`` for 1 and 2, ``"0:2"``, a list.
-        output_delays: Lags of the output.
+        output_delays: Lags of the output; ``[]`` for a polynomial of inputs alone (a Volterra series of finite memory).
         degree: Factors of a term at most.
         terms: Terms at most; fewer where the free run does not gain.
 
@@ -59,7 +59,8 @@ class PolynomialNARX(AbstractStructure):
             not given or any(isinstance(one, list | tuple | str) for one in given)
         )
         object.__setattr__(self, "input_delays", tuple(map(_lags, given)) if several else (_lags(given),))
-        object.__setattr__(self, "output_delays", parse_lags(self.output_delays, first=1, where="output_delays"))
+        object.__setattr__(self, "output_delays", parse_output_lags(self.output_delays))
+        check_reads(self.input_delays, self.output_delays)
         for name, most in (("degree", 9), ("terms", MOST_TERMS)):
             value = getattr(self, name)
             if not whole(value) or not 1 <= value <= most:
@@ -75,12 +76,14 @@ class PolynomialNARX(AbstractStructure):
     def label(self) -> str:
         """Lags, degree and terms."""
         inputs = "+".join(map(_short, self.input_delays))
-        return f"polynomial NARX {inputs}/{_short(self.output_delays)}, degree {self.degree}, up to {self.terms} terms"
+        lags = f"NARX {inputs}/{_short(self.output_delays)}" if self.output_delays else f"NFIR {inputs}"
+        return f"polynomial {lags}, degree {self.degree}, up to {self.terms} terms"
 
     def lags(self, n_inputs: int) -> Lags:
         """The regressors."""
-        given = self.input_delays
-        return Lags(inputs=given * n_inputs if len(given) == 1 else given, output=self.output_delays)
+        given = self.input_delays * n_inputs if len(self.input_delays) == 1 else self.input_delays
+        check_reads(given, self.output_delays)
+        return Lags(inputs=given, output=self.output_delays)
 
     def check_inputs(self, n_inputs: int) -> None:
         """Refuse lags that are not for these inputs, and more candidates than can be looked at."""

@@ -8,7 +8,17 @@ from typing import Annotated, Any, cast
 
 from sysid.errors import ConfigError, shortened
 from sysid.models.orders.activations import PLAIN, Activation, check_activation
-from sysid.models.orders.lags import MOST, Lagged, Lags, LagSpec, is_one_set, parse_lags, whole
+from sysid.models.orders.lags import (
+    MOST,
+    Lagged,
+    Lags,
+    LagSpec,
+    check_reads,
+    is_one_set,
+    parse_lags,
+    parse_output_lags,
+    whole,
+)
 from sysid.models.orders.output_limits import FOUND, parse_limits, parse_several, written
 from sysid.models.orders.ranges import IntRange
 from sysid.models.orders.structure import AbstractStructure
@@ -22,7 +32,8 @@ class NARX(AbstractStructure):
         input_delays: Lags of every input: ``4`` for 1 to 4, ``"0:3"`` for a range, ``[0, 1, 2, 4]`` for a set; ``[]``
             for a record without input (NAR).
             Lag 0 is the direct input x(n). One such entry per input, in a list of lists, sets them apart.
-        output_delays: Lags of the output, in the same forms, from 1 on.
+        output_delays: Lags of the output, in the same forms, from 1 on; ``[]`` for a network that reads inputs alone
+            (NFIR, MATLAB's ``timedelaynet``; a curve where the inputs' only lag is 0).
         neurons: Number of neurons.
         feedthrough: A linear part from all regressors to the output beside the neurons.
         gated: Each neuron is a gate: what it adds is not a constant but a linear function of the regressors times what
@@ -43,6 +54,8 @@ class NARX(AbstractStructure):
         7
         >>> NARX(input_delays="0:1", output_delays=1, neurons=12, gated=True).label
         'NARX 0:1/1/12 gated'
+        >>> NARX(input_delays="0:3", output_delays=[], neurons=6).label
+        'NFIR 0:3/6'
     """
 
     input_delays: Annotated[tuple[tuple[int, ...], ...], IntRange(low=1, high=5)]
@@ -68,13 +81,14 @@ class NARX(AbstractStructure):
         limits: Any = None,
     ) -> None:
         object.__setattr__(self, "input_delays", _per_input(input_delays))
-        object.__setattr__(self, "output_delays", parse_lags(output_delays, first=1, where="output_delays"))
+        object.__setattr__(self, "output_delays", parse_output_lags(output_delays))
         object.__setattr__(self, "neurons", neurons)
         object.__setattr__(self, "feedthrough", feedthrough)
         object.__setattr__(self, "gated", gated)
         object.__setattr__(self, "activation", activation)
         object.__setattr__(self, "limits", parse_limits(limits))
         check_activation(activation)
+        check_reads(self.input_delays, self.output_delays)
         if not whole(neurons) or (neurons == 0 and not feedthrough):
             raise ConfigError(
                 "not a number of neurons",
@@ -101,6 +115,8 @@ class NARX(AbstractStructure):
             return f"NAR {_short(self.output_delays)}/{self.neurons}{kind}"
         distinct = dict.fromkeys(self.input_delays)
         inputs = ",".join(_short(lags) for lags in distinct)
+        if not self.output_delays:
+            return f"NFIR {inputs}/{self.neurons}{kind}"
         return f"NARX {inputs}/{_short(self.output_delays)}/{self.neurons}{kind}"
 
     def lags(self, n_inputs: int) -> Lags:
@@ -124,6 +140,7 @@ class NARX(AbstractStructure):
                 remedy="give each input its own list, or one list for all",
             )
         inputs = self.input_delays * n_inputs if len(self.input_delays) == 1 else self.input_delays
+        check_reads(inputs, self.output_delays)
         return Lags(inputs=inputs, output=self.output_delays)
 
     def lagged(self, n_inputs: int) -> Lagged:
@@ -194,7 +211,8 @@ class VectorNARX(AbstractStructure):
 
     Args:
         input_delays: Lags of the inputs, as in :class:`~sysid.models.NARX`.
-        output_delays: Lags of the outputs in the same forms, from 1 on; one set for all, or a list of one per output.
+        output_delays: Lags of the outputs in the same forms, from 1 on; one set for all, or a list of one per output;
+            ``[]`` for none.
         neurons: Number of neurons.
         feedthrough: A linear part from all regressors to the outputs beside the neurons.
         activation: The kind of the neurons, as in :class:`~sysid.models.NARX`.
@@ -292,7 +310,9 @@ class VectorNARX(AbstractStructure):
             ConfigError: If several sets are given and their number is not that of the channels.
         """
         inputs = self._sets("input", self.input_delays, n_inputs)
-        return Lags(inputs=(*inputs, *self._sets("output", self.output_delays, n_outputs)), output=())
+        outputs = self._sets("output", self.output_delays, n_outputs)
+        check_reads((*inputs, *outputs), ())
+        return Lags(inputs=(*inputs, *outputs), output=())
 
     def lagged(self, n_inputs: int) -> Lagged:
         """Neurons over its regressors, each set of output delays a channel like the inputs."""

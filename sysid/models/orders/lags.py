@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,13 +117,53 @@ def parse_lags(spec: LagSpec, *, first: int, where: str) -> tuple[int, ...]:
     return lags
 
 
+def parse_output_lags(spec: LagSpec) -> tuple[int, ...]:
+    """Lags of the output, from 1 on; an empty collection is a model that reads inputs alone.
+
+    Args:
+        spec: As :func:`parse_lags` takes it.
+
+    Returns:
+        The lags, strictly increasing.
+
+    Raises:
+        ConfigError: If it is not a set of different whole numbers from 1 on.
+
+    Example:
+        >>> parse_output_lags(2), parse_output_lags([])
+        ((1, 2), ())
+    """
+    given = spec if is_one_set(spec) else tuple(cast("Iterable[int]", spec))
+    return () if given == () else parse_lags(given, first=1, where="output_delays")
+
+
+def check_reads(inputs: tuple[tuple[int, ...], ...], output: tuple[int, ...]) -> None:
+    """Refuse a model that reads nothing.
+
+    Args:
+        inputs: Lags of each input.
+        output: Lags of the output.
+
+    Raises:
+        ConfigError: If there is no lag at all.
+    """
+    if not output and not any(inputs):
+        raise ConfigError(
+            "a model of no lags reads nothing",
+            where="output_delays",
+            expected="lags of an input, or of the output",
+            got="neither",
+            remedy="write output_delays: 2 for a record without inputs, or input_delays: '0:2' for one with inputs",
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
 class Lags:
     """The regressors of a model, in order: input by input, then the past outputs.
 
     Args:
         inputs: For each input channel its lags in samples, from 0 on; may be empty for an input.
-        output: Lags of the output in samples, from 1 on; may be empty (a finite impulse response).
+        output: Lags of the output in samples, from 1 on; may be empty (a finite memory of the inputs).
     """
 
     inputs: tuple[tuple[int, ...], ...]

@@ -38,6 +38,8 @@ STRUCTURES = [
     pytest.param(NARX(input_delays=[[0, 1], [2]], output_delays=2, neurons=4), id="a set per input"),
     pytest.param(NARX(input_delays=2, output_delays=2, neurons=6, feedthrough=False), id="without feed-through"),
     pytest.param(NARX(input_delays=2, output_delays=2, neurons=0), id="linear"),
+    pytest.param(NARX(input_delays="0:3", output_delays=[], neurons=4), id="inputs alone"),
+    pytest.param(NARX(input_delays=[0], output_delays=[], neurons=4), id="no memory"),
 ]
 
 

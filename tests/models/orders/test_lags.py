@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.models import ARX, NARX, NeuralStateSpace, TransferFunction
+from sysid.models import ARX, NARX, NeuralStateSpace, PolynomialNARX, TransferFunction, VectorNARX
 from sysid.models.orders.lags import MOST, parse_lags
 
 NO_ORDERS = [float("inf"), float("nan"), 1e30, 2.5, True, None, "two", -1, 10**7, 10**5000, [[[]]], {"a": 1}]
@@ -58,3 +59,27 @@ def test_a_number_of_no_lags_is_refused_with_the_lag_that_can_be_written(first: 
         parse_lags(0, first=first, where="delays")
     (written,) = re.findall(r"\[\d+\]", str(refused.value.remedy))
     assert parse_lags(json.loads(written), first=first, where="delays") == (first,)
+
+
+@pytest.mark.parametrize("kind", [NARX, VectorNARX, PolynomialNARX])
+@pytest.mark.parametrize("spec", [[], (), iter(())], ids=["a list", "a tuple", "an iterator"])
+def test_no_lags_of_the_output_are_a_model_of_inputs_alone(kind: type, spec: Any) -> None:
+    fields = {} if kind is PolynomialNARX else {"neurons": 3}
+    network = kind(input_delays="0:2", output_delays=spec, **fields)
+    assert network == kind(input_delays="0:2", output_delays=network.output_delays, **fields)
+    assert network.output_delays in {(), ((),)}
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        pytest.param(lambda: NARX(input_delays=[], output_delays=[], neurons=3), id="network"),
+        pytest.param(lambda: NARX(input_delays=[0], output_delays=[], neurons=3).lags(0), id="network, no input"),
+        pytest.param(lambda: VectorNARX(input_delays=[0], output_delays=[], neurons=3).lags(0, 2), id="two outputs"),
+        pytest.param(lambda: PolynomialNARX(input_delays=[], output_delays=[]), id="polynomial"),
+        pytest.param(lambda: PolynomialNARX(input_delays=[0], output_delays=[]).lags(0), id="polynomial, no input"),
+    ],
+)
+def test_a_model_that_reads_nothing_is_refused(read: Callable[[], object]) -> None:
+    with pytest.raises(ConfigError, match="a model of no lags reads nothing"):
+        read()
