@@ -118,7 +118,10 @@ class AbstractPolynomial(AbstractStructure):
         same = all(len(getattr(self, name)) == m for name in self.per_input)
         fits = all(map(whole, numbers)) and same and all(nb >= 1 for nb in self.nb)
         fits = fits and sum(numbers) <= MOST_LAGS
-        if not fits or (m == 0 and not self.noise):
+        alone = fits and m == 0 and "nf" in self.per_input
+        if alone and self.noise:
+            example = f"ARMAX with na: {self.order('nd')}, nb: [], nc: {self.order('nc')}, nk: [], which is C/D e"
+        if not fits or alone or (m == 0 and not self.noise):
             given = {name: getattr(self, name) for name in ("na", *self.per_input, "nc", "nd") if hasattr(self, name)}
             raise ConfigError(
                 f"not the orders of {self.kind}",

@@ -27,6 +27,10 @@ EXACT = 1e-18
 FORGETS = 0.5
 """Distance from 1 beyond which the poles of a filter forget at once, as those of a recursion over past outputs do."""
 
+BEYOND = 2.0
+"""How far a run may begin from the output that stood, as a part of how far that was from its equilibrium: as far off, on
+the other side."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Filter:
@@ -201,7 +205,7 @@ class StateSpace(AbstractForm):
         if np.abs(scipy.linalg.eigvals(forgets)).min(initial=1.0) > FORGETS:
             return True
         left = np.eye(self.n_outputs) - one.C @ scipy.linalg.solve(forgets, gain)
-        return bool(np.abs(scipy.linalg.eigvals(left)).max() <= 1.0 + AT_ONE)
+        return bool(np.abs(scipy.linalg.eigvals(left)).max() <= BEYOND)
 
     def equilibrium(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         """The state at which the system stays while its inputs are held.

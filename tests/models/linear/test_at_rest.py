@@ -7,10 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 
-from sysid.models import ARMAX, BJ, OE, Mapping, Scaling, TransferFunction
+from sysid.models import ARMAX, BJ, OE, Mapping, Scaling, TransferFunction, VectorScaling
 from sysid.models.linear.at_rest import state_at_rest
 from sysid.models.linear.innovations import Innovations
 from sysid.models.linear.polynomial import PolynomialModel
+from sysid.models.linear.state_space import StateSpace
 from sysid.models.linear.transfer_function import TransferFunctionModel
 
 REST = 5.0
@@ -140,3 +141,15 @@ def test_a_model_of_the_noise_begins_at_rest_no_further_off_than_the_output_that
     assert_allclose(run[0], begins, rtol=1e-9)
     if poles == (0.8,):
         assert_allclose(run[-1], 0.2, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("second", "begins"), [(-0.014, [REST, 3.0 * (1.0 - 0.1 / 0.086)]), (-0.099, [REST, 0.0])])
+def test_an_output_that_nearly_integrates_begins_where_it_stood_beside_one_that_does_not(
+    second: float, begins: list[float]
+) -> None:
+    system = Innovations(
+        A=np.diag([1.0 - 1e-10, 0.9]), B=np.ones((2, 1)), C=np.eye(2), D=np.zeros((2, 1)), K=np.diag([0.03, second]),
+        constant=np.zeros(2),
+    )  # fmt: skip
+    form = StateSpace.of(system, VectorScaling.of([Scaling.identity(1)] * 2), noise=True)
+    assert_allclose(form.resting(np.zeros(1), np.array([REST, 3.0])), begins, rtol=1e-6, atol=1e-6)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sysid.errors import ConfigError
-from sysid.models import ARMAX
+from sysid.models import ARMAX, BJ
 
 
 @given(
@@ -22,3 +23,8 @@ def test_orders_are_taken_or_refused_in_words(given_orders: dict) -> None:
         assert error.remedy
     else:
         assert orders.n_parameters == len(orders.names(tuple(f"u{j}" for j in range(len(orders.nb)))))
+
+
+def test_box_jenkins_without_an_input_is_refused_with_what_it_is() -> None:
+    with pytest.raises(ConfigError, match=r"write for example ARMAX with na: 2, nb: \[\], nc: 1, nk: \[\]"):
+        BJ(nb=(), nc=1, nd=2, nf=(), nk=())
