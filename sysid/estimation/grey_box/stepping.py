@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,9 @@ ACCURACY = 1e-4
 """How much half the step may change a free run, over the output's scale, before it is known what the records leave."""
 
 MOST_SUBSTEPS = 256
+
+STALLED = 3
+"""Doublings of the steps that have to bring runs nearer by a half: those of smooth equations do so at each."""
 
 STEPPED = 5_000
 """Samples of a record on which a step is tried."""
@@ -48,12 +51,14 @@ class Stepping:
         change: What twice as many change of the free run, over the output's scale; not a number where the run is none.
         accuracy: What they may change.
         explicit: Runge-Kutta steps from sample to sample that stay bounded, where it was seen that they are many.
+        stalled: Whether more steps do not bring runs nearer: what switches, or is chaotic, goes another way by little.
     """
 
     substeps: int
     change: float
     accuracy: float = ACCURACY
     explicit: float = 0.0
+    stalled: bool = False
 
     @property
     def enough(self) -> bool:
@@ -76,6 +81,7 @@ def substeps_for(provider: EquationProvider, theta: Array, accuracy: float = ACC
     if form.lowered.n_continuous == 0:
         return Stepping(substeps=1, change=0.0, accuracy=accuracy)
     before: list[Array] | None = None
+    changes: list[float] = []
     best = Stepping(substeps=1, change=float("nan"), accuracy=accuracy)
     n = 1
     while n <= 2 * MOST_SUBSTEPS:
@@ -86,8 +92,20 @@ def substeps_for(provider: EquationProvider, theta: Array, accuracy: float = ACC
                 best = Stepping(substeps=n // 2, change=change, accuracy=accuracy)
             if best.enough:
                 break
+            changes.append(change)
+            if _stalls(changes):
+                return replace(best, stalled=True)
         before, n = runs, 2 * n
     return best
+
+
+def _stalls(changes: Sequence[float]) -> bool:
+    """Whether eight times as many steps have not halved what twice as many change."""
+    return (
+        len(changes) > STALLED
+        and bool(np.isfinite(changes[-1 - STALLED :]).all())
+        and (min(changes[-STALLED:]) > 0.5 * changes[-1 - STALLED])
+    )
 
 
 def _runs(provider: EquationProvider, theta: Array, form: EquationForm) -> list[Array]:
@@ -176,7 +194,7 @@ def solver_for(
     found = substeps_for(provider, theta)
     needed = 0.0 if implicit is None else explicit_steps(provider, theta)
     chosen = (provider, found)
-    if implicit is not None and (needed > STIFF or not found.enough):
+    if implicit is not None and (needed > STIFF or not (found.enough or found.stalled)):
         other = provider.with_form(replace(provider.form, lowered=implicit()))
         tried = replace(substeps_for(other, theta), explicit=needed)
         cheaper = _cost(other, tried) < _cost(provider, found)
@@ -238,6 +256,12 @@ def step_warning(model: EquationModel, stepping: Stepping) -> str:
     Returns:
         Two sentences.
     """
+    if stepping.stalled:
+        return (
+            f"More steps than {model.substeps} between samples do not bring runs nearer to each other: twice as many "
+            f"change the output by {stepping.change:.1e} of its range. Something switches another way by next to "
+            "nothing, as in a limit cycle, or the equations are chaotic: no run is exact far from its beginning."
+        )
     other = "write solver: rosenbrock, " * (model.solver == RUNGE_KUTTA and can_be_implicit(model.lowered))
     return (
         f"{model.substeps} {_KINDS[model.solver]} steps between samples are not enough: twice as many change the "

@@ -163,6 +163,20 @@ def test_the_step_is_chosen_and_told() -> None:
     assert any("2 Runge-Kutta steps of 0.25 s as asked for" in note for note in asked.notes)
 
 
+def test_a_relay_that_swings_by_itself_does_not_ask_for_ever_shorter_steps() -> None:
+    """A thermostat's run slips by a sample sooner or later, however short the steps: it had 256, and took minutes."""
+    u, x, on = steps(300, high=0.3), np.zeros(301), 0.0
+    for t in range(300):
+        on = 1.0 if 1.0 - x[t] > 0.2 else on if 1.0 - x[t] >= -0.2 else 0.0
+        x[t + 1] = u[t] + (x[t] - u[t]) * np.exp(-0.1) + 2.0 * (1.0 - np.exp(-0.1)) * on
+    fit = fitted(
+        [a_trace(u, x[:300])], "on = relay(1 - x, on=0.2, off=-0.2); dx/dt = (u - x)/lag + heat*on; y = x",
+        sysid.Training(starts=1, max_iterations=3), parameters={"lag": 4.6, "heat": 0.41},
+    )  # fmt: skip
+    assert fit.model.substeps <= 16  # type: ignore[attr-defined]
+    assert any("do not bring runs nearer" in warning for warning in fit.warnings)
+
+
 STIFF_LAG = {
     "equations": "dq/dt = (gain*u - q)/fast; dx/dt = (q - x)/lag; y = x",
     "parameters": {"gain": 1, "lag": 1, "fast": {"start": 1e-5, "fixed": True}},
