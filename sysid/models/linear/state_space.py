@@ -28,8 +28,8 @@ FORGETS = 0.5
 """Distance from 1 beyond which the poles of a filter forget at once, as those of a recursion over past outputs do."""
 
 BEYOND = 2.0
-"""How far a run may begin from the output that stood, as a part of how far that was from its equilibrium: as far off, on
-the other side."""
+"""How far a run may begin from the output that stood, as a part of how far that was from its equilibrium: as far beyond
+that, on its other side."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
