@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, TraceError
 from sysid.models import AbstractModel, Cascade, History
+from sysid.traces import Trace
 
 if TYPE_CHECKING:
     Array = NDArray[np.float64]
@@ -40,6 +41,29 @@ def check_forecasts(model: AbstractModel | Cascade) -> tuple[AbstractModel, ...]
             remedy="sysid simulate begins by the measured outputs, without what is known of the noise",
         )
     return tuple(model.models)
+
+
+def check_follows(past: Trace, to_come: Trace, *, apart: float | None = None) -> None:
+    """Refuse inputs to come that do not begin one sample after the samples before, where their stamps say so.
+
+    Args:
+        past: The samples before.
+        to_come: The inputs to come; where their time begins at 0 it is of its own, and says nothing.
+        apart: Seconds from second 0 of the samples before to that of the inputs, where dates tell; else ``None``.
+
+    Raises:
+        TraceError: If their stamps leave samples out, or come again.
+    """
+    begins, due = to_come.start_time + (apart or 0.0), past.time[-1] + past.sample_time
+    if (apart is None and to_come.start_time == 0.0) or abs(begins - due) <= 0.5 * past.sample_time:
+        return
+    raise TraceError(
+        "the inputs to come do not follow the samples before",
+        where=to_come.name,
+        expected=f"a first sample at {due:.10g} s of {past.name}, one sample after its last",
+        got=f"{begins:.10g} s",
+        remedy="cut or fill the files so that one follows the other; stamps that begin at 0 are taken to follow",
+    )
 
 
 def forecast(

@@ -70,6 +70,7 @@ def test_samples_that_are_not_usable_do_not_count():
     found = evaluate_cascade(service(), TraceSet(name="set", traces=(spoilt,)), repeats=0)
     assert found.mse("BC")["case 0"] < 4.0 * NOISE**2
     assert np.isnan(found.outputs["BC"].cases["case 0"].run_time_s)
+    assert found.outputs["BC"].cases["case 0"].to_dict()["n_samples"] == 40
 
 
 def test_active_limits_are_reported_by_case(traces):

@@ -287,6 +287,15 @@ def test_a_data_set_is_summed_up(workspace: Path, capsys: pytest.CaptureFixture[
         assert word in told
 
 
+def test_many_channels_are_summed_up_a_line_each(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sysid.workbench.commands.ingest._SIDE_BY_SIDE", 2)
+    assert run_cli(["ingest", "rig"]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert any(line[1:5] == ["outlet", "│", "kPa", "gauge"] for line in lines)
+
+
 def test_untracked_results_are_done_but_not_code_0(
     workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

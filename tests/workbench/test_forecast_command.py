@@ -70,6 +70,28 @@ def test_the_command_writes_what_is_expected_after_the_last_measured_sample(
     np.testing.assert_allclose(written["y1"], expected, atol=1e-9)
 
 
+@pytest.mark.parametrize(("first", "code"), [(200, 0), (201, 2), (190, 2)])
+@pytest.mark.parametrize("dated", [False, True])
+def test_inputs_to_come_have_to_follow_where_their_stamps_say_when_they_are(
+    traces: TraceSet,
+    bundle: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    *,
+    first: int,
+    code: int,
+    dated: bool,
+) -> None:
+    record = traces.traces[0]
+    stamp = (lambda k: f"2024-10-27T02:00:{k / 10:04.1f}") if dated else (lambda k: f"{k / 10:.1f}")
+    for name, rows in (("past", range(190, 200)), ("next", range(first, first + 9))):
+        shift = 190 if dated else 0
+        lines = [f"{stamp(k - shift)},{record['u'][k]},{record['y1'][k]}" for k in rows]
+        (tmp_path / f"{name}.csv").write_text("\n".join([f"time{'' if dated else ' [s]'},u [V],y1 [1]", *lines]))
+    assert run_cli(["forecast", str(bundle), str(tmp_path / "past.csv"), str(tmp_path / "next.csv")]) == code
+    assert ("do not follow" in capsys.readouterr().err) == (code == 2)
+
+
 def test_a_past_of_another_sample_time_or_without_its_output_is_refused(
     traces: TraceSet, bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,6 @@ import numpy as np
 from sysid.errors import ReaderError
 from sysid.ingest.cells.calendar import is_calendar
 from sysid.ingest.readers.bounds import too_large
-from sysid.ingest.readers.json_series import series_in
 from sysid.ingest.readers.late import table_of
 from sysid.ingest.readers.leaves import Leaf, number_of, step_in
 from sysid.ingest.readers.reader import Reader, damaged
@@ -42,6 +41,8 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
 
 
 def _tree_in(path: Path, _: tuple[int, int]) -> Any:
+    from sysid.ingest.readers.json_series import series_in  # here: most files are none of such
+
     raw = path.read_bytes()
     _check_size(raw, path)
     try:

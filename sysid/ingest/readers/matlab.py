@@ -15,7 +15,6 @@ import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.extras import need
-from sysid.ingest.readers import hdf5
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.late import table_of
 from sysid.ingest.readers.leaves import Leaf, number_of, refused
@@ -29,11 +28,13 @@ _OBJECT = 0xDD000000
 _NOT_NUMBERS = {"cell", "struct", "char", "function_handle", "opaque", "object"}
 
 
-def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
+def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:  # noqa: ARG001 - one signature for all readers
     if _is_hdf5(path):
-        hdf5.check_claims(path)
-        if not hdf5.is_of_matlab(path):
-            return hdf5.READER.read(path, options, repairs)
+        from sysid.ingest.readers import hdf5_arrays  # here: most files are none of such
+
+        hdf5_arrays.check_claims(path)
+        if not hdf5_arrays.is_of_matlab(path):
+            return hdf5_arrays.read(path, options)
     variables = _load(path)
     notes = []
     if is_result(variables):

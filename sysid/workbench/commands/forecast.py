@@ -11,9 +11,10 @@ import numpy as np
 
 from sysid.errors import ChannelError, TraceError
 from sysid.export.bundle import channel_of
+from sysid.export.forecast import check_follows
 from sysid.export.inputs import InputOptions, read_inputs
 from sysid.export.reading import read_bundle
-from sysid.ingest import write_trace
+from sysid.ingest import read_table, write_trace
 from sysid.traces import Trace
 from sysid.workbench.commands.reader_options import as_typed, reading_options
 from sysid.workbench.commands.simulate import parse_constants
@@ -50,7 +51,7 @@ def forecast_command(wish: ForecastWish) -> None:
 
     Raises:
         BundleError: If the bundle is damaged or incomplete.
-        UserError: If a file cannot be read or written, or lacks a channel.
+        UserError: If a file cannot be read or written, lacks a channel, or does not follow the other by its stamps.
     """
     read, constants = read_bundle(meant(wish.bundle)), parse_constants(wish.constants)
     with as_typed():
@@ -60,6 +61,7 @@ def forecast_command(wish: ForecastWish) -> None:
     missing = [channel.name for channel in outputs if channel.name not in past.channel_names]
     if missing:
         raise ChannelError(missing, past.channel_names, where=f"{wish.past}, the samples before")
+    check_follows(past, to_come, apart=_apart(wish, options))
     before, names = _known(past, [channel.name for channel in outputs]), [str(entry["name"]) for entry in read.inputs]
     future = to_come.columns(names) if read.model.inputs else len(to_come)
     found = np.reshape(read.forecast(future, initial=before), (len(to_come), -1))
@@ -70,6 +72,16 @@ def forecast_command(wish: ForecastWish) -> None:
     shown = ", ".join(channel.name for channel in outputs)
     told = f"{len(to_come)} samples of {shown} written to {out}, expected after {len(before)} measured samples"
     console().print(told, soft_wrap=True, markup=False)
+
+
+def _apart(wish: ForecastWish, options: InputOptions) -> float | None:
+    """Seconds between the first dates of both files; ``None`` where one of them has none."""
+    began = []
+    for source in (wish.past, wish.inputs):
+        table = read_table(source, files=options.files, repairs=options.repairs)
+        name = options.files.time.column or table.time
+        began += [column.began for column in table.columns if column.name == name and column.began is not None]
+    return (began[1].micros - began[0].micros) / 1e6 if len(began) == 2 else None
 
 
 def _known(past: Trace, outputs: list[str]) -> Trace:

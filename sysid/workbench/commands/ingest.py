@@ -29,6 +29,9 @@ from sysid.workbench.schemas import schema_line
 _PATHS = {".yaml", ".yml", *(suffix for reader in READERS for suffix in reader.suffixes)}
 """Endings of what can be shown: a word that ends so is a path."""
 
+_SIDE_BY_SIDE = 6
+"""Channels whose ranges stand beside the cases; more of them have a table of their own."""
+
 
 def ingest_command(
     source: str, *, propose: Path | None, given: Mapping[str, Any] | None = None, split: str | None = None
@@ -169,17 +172,33 @@ def _picture(found: FileFinding, folder: Path) -> str:
     return kept_picture(folder / f"{bare_stem(found.path)}.ingest.svg", drawing)
 
 
+def _channel_table(traces: TraceSet) -> Table:
+    """A line a channel, with its range over all cases: side by side, many of them could not be read."""
+    table = Table(header_style="bold")
+    for heading in ("channel", "unit", "from", "to"):
+        table.add_column(heading, justify="left" if heading in {"channel", "unit"} else "right")
+    for index, channel in enumerate(traces.channels):
+        low, high = (end(float(end(trace.values[:, index])) for trace in traces) for end in (min, max))
+        reference = "" if channel.reference is Reference.NONE else f" {channel.reference.value}"
+        table.add_row(channel.name, f"{channel.unit}{reference}", f"{low:.4g}", f"{high:.4g}")
+    return table
+
+
 def _show_dataset(traces: TraceSet, path: Path) -> None:
     target = console()
     target.print(f"{traces.name}: {nearby(path)}, one sample every {traces.sample_time:g} s", soft_wrap=True)
     table = Table(header_style="bold")
-    for heading in ("case", "role", "samples", "seconds", *(channel.label for channel in traces.channels)):
+    wide = len(traces.channels) > _SIDE_BY_SIDE
+    across = () if wide else tuple(channel.label for channel in traces.channels)
+    for heading in ("case", "role", "samples", "seconds", *across):
         table.add_column(heading, justify="left" if heading in {"case", "role"} else "right")
     for trace in traces:
         low, high = trace.values.min(axis=0), trace.values.max(axis=0)
-        spans = [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)]
+        spans = [] if wide else [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)]
         table.add_row(trace.name, traces.roles[trace.name].value, str(len(trace)), f"{trace.duration:g}", *spans)
     target.print(table)
+    if wide:
+        target.print(_channel_table(traces))
     for trace in traces:
         for sentence in trace.provenance:
             target.print(f"{trace.name}: {sentence}", soft_wrap=True)

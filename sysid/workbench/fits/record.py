@@ -135,6 +135,7 @@ def read_scores(folder: Path) -> Scores:
             one_step=Figures.from_dict(fields["one_step"]),
             run_time_s=fields["run_time_s"],
             first=fields["begins_at"],
+            counted=fields["n_samples"],
             intervals=CaseIntervals.from_dict(fields["coverage"], *(arrays[f"{name}/{signal}"] for signal in INTERVAL))
             if "coverage" in fields
             else None,

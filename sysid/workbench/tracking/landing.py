@@ -1,4 +1,4 @@
-"""The bare address of the tracking server leads to the fits, and a comparison of runs to their outputs in one chart.
+"""The bare address of the tracking server leads to the fits, lists of runs to their figures, comparisons to outputs.
 
 MLflow's own page opens there in its mode for language models. What follows ``#`` in an address reaches no server; so
 the page itself is given a script more, which leads on where no page is asked for, and does what its own file says.
@@ -29,6 +29,9 @@ SETTINGS = {
 }
 """Settings of MLflow's page, as it keeps them in the browser: models before language models, an assistant that waits to
 be called, no telemetry. What somebody has set stays; a page that does not know some of them leaves them alone."""
+
+SCRIPTS = ("compare_page.js", "view_page.js")
+"""What the page is given; each says in its first lines what it does."""
 
 _STALE = {b"content-length", b"etag", b"last-modified", b"cache-control"}
 _CONDITIONS = {b"if-none-match", b"if-modified-since", b"accept-encoding", b"range"}
@@ -70,11 +73,11 @@ def with_lead(html: bytes, page: str) -> bytes:
         True
     """
     where = json.dumps(page).replace("<", "\\u003c")
-    compare = files(__package__).joinpath("compare_page.js").read_text(encoding="utf-8")
+    scripts = "\n".join(files(__package__).joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
     script = (
         f"<script>for (const [name, value] of Object.entries({json.dumps(SETTINGS)}))"
         " if (localStorage.getItem(name) === null) localStorage.setItem(name, value);"
-        f" if (location.hash.length < 3) location.hash = {where};\n{compare}</script>"
+        f" if (location.hash.length < 3) location.hash = {where};\n{scripts}</script>"
     )
     return html.replace(b"<head>", b"<head>" + script.encode(), 1)
 

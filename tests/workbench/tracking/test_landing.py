@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from sysid.workbench.tracking.landing import SETTINGS, leading_to, with_lead
+from sysid.workbench.tracking.mlflow_views import TAG, VIEW
 
 PAGE = b"<!doctype html><html><head><title>MLflow</title></head><body></body></html>"
 
@@ -50,6 +51,13 @@ def test_other_answers_are_left_alone(path, method, page):
     headers, body = asked(path, method=method, page=page)
     assert b"script" not in body
     assert headers[b"etag"] == b"1"
+
+
+def test_the_page_is_given_what_its_scripts_do():
+    text = with_lead(PAGE, "#/a").decode()
+    assert "#/compare-runs" in text
+    assert f'"{TAG.removesuffix(VIEW)}" + KEY' in text
+    assert f'KEY = "{VIEW}"' in text
 
 
 def test_settings_of_the_page_are_set_where_nobody_has_set_them():
