@@ -75,11 +75,12 @@ def source_of(text: str, *, folder: Path | None = None) -> Source:
     if (found := FUNCTION.fullmatch(text)) is not None and not path.is_file():
         return _of_function(text, found["home"], found["name"], place)
     if path.suffix == ".py":
-        names = _functions(path)
+        names, _ = _functions(path)
         raise ConfigError(
             "a file of Python is named without its function", where=text, expected=f"{text}:FUNCTION",
             got=f"the file alone, which has {', '.join(names) or 'no function'}",
-            remedy=f"say {text}:{names[0] if names else 'FUNCTION'}",
+            remedy=f"say {text}:{names[0]}" if names
+            else f"define one; of a program, write the whole command, as 'python {text} {{inputs}} {{outputs}}'",
         )  # fmt: skip
     return Source(text=text, name=path.stem, content={"reference": {"fmu": str((place / path).resolve())}})
 
@@ -88,19 +89,19 @@ def _of_function(text: str, home: str, name: str, place: Path) -> Source:
     if not home.endswith(".py"):
         return Source(text=text, name=name, content={"reference": {"python": text, "folder": str(place)}})
     file = (place / home).resolve()
-    names = _functions(file)
-    if name not in names:
+    names, others = _functions(file)
+    if name not in (*names, *others):
         raise ConfigError(
             f"the file has no function {name}", where=file, expected=f"one of {', '.join(names) or 'its functions'}",
-            got=name, remedy=did_you_mean(name, names, "correct the name"),
+            got=name, remedy=did_you_mean(name, (*names, *others), "correct the name"),
         )  # fmt: skip
     return Source(
         text=text, name=name, content={"reference": {"python": f"{file.name}:{name}", "folder": str(file.parent)}}
     )
 
 
-def _functions(file: Path) -> list[str]:
-    """What a file defines that may be called, by its text."""
+def _functions(file: Path) -> tuple[list[str], list[str]]:
+    """What a file defines that may be called, by its text: its functions, and what else it names that may be one."""
     try:
         body = ast.parse(file.read_text(encoding="utf-8-sig")).body
     except (OSError, ValueError, SyntaxError) as error:
@@ -108,10 +109,11 @@ def _functions(file: Path) -> list[str]:
             "the file of the function cannot be read", where=file, expected="a file of Python", got=error,
             remedy="check the path, and that Python runs it",
         ) from None  # fmt: skip
-    named = [node.name for node in body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
-    named += [alias.asname or alias.name for node in body if isinstance(node, ast.ImportFrom) for alias in node.names]
+    functions = [node.name for node in body if isinstance(node, ast.FunctionDef)]
+    others = [node.name for node in body if isinstance(node, ast.ClassDef)]
+    others += [alias.asname or alias.name for node in body if isinstance(node, ast.ImportFrom) for alias in node.names]
     assigned = [node.targets for node in body if isinstance(node, ast.Assign)]
-    return named + [one.id for targets in assigned for one in targets if isinstance(one, ast.Name)]
+    return functions, others + [one.id for targets in assigned for one in targets if isinstance(one, ast.Name)]
 
 
 def _of_program(text: str, place: Path) -> Source:

@@ -27,7 +27,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "slow").mkdir()
     (tmp_path / "slow" / "lag.py").write_text("import gain\n\ndef lag(time, u, p):\n    return gain.of * u\n")
     (tmp_path / "slow" / "gain.py").write_text("of = 3.0\n")
-    (tmp_path / "sim.py").write_text("raise SystemExit\n")
+    (tmp_path / "sim.py").write_text("import sys\n\nrows = sys.argv\nraise SystemExit\n")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -53,6 +53,7 @@ def test_a_reference_is_known_by_its_name(text: str, name: str, fields: dict[str
     [
         ("slow/lag.py", "say slow/lag.py:lag"),
         ("slow/lag.py:lga", "lag"),
+        ("sim.py", "'python sim.py {inputs} {outputs}'"),
         ("slow/log.py:lag", "check the path"),
         ("python sim.py {inputs}", "'solver --in {inputs} --out {outputs}'"),
         ("python 'sim.py {inputs} {outputs}", "correct the quotes"),
