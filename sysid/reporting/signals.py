@@ -17,7 +17,7 @@ MONTE_CARLO_FILE: Final = "monte-carlo.npz"
 """Of an assembly: the random sequences that it is worst on."""
 
 _PARTS: Final = ("time", "target", "simulated")
-_OPTIONAL: Final = ("predicted", "low", "high")
+_OPTIONAL: Final = ("predicted", "low", "high", "counts")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,6 +31,7 @@ class CaseSignals:
         predicted: One step ahead, shape ``(n_samples,)``; ``None`` of an assembly, which has no such run.
         low: Lower end of the free run's interval, shape ``(n_samples,)``; ``None`` where there is none.
         high: Upper end of it.
+        counts: 1 where figures count the sample, 0 where it is masked; ``None`` where all count.
     """
 
     time: NDArray[np.float64]
@@ -39,6 +40,12 @@ class CaseSignals:
     predicted: NDArray[np.float64] | None = None
     low: NDArray[np.float64] | None = None
     high: NDArray[np.float64] | None = None
+    counts: NDArray[np.float64] | None = None
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Which samples figures count, shape ``(n_samples,)``: not those that are masked."""
+        return np.ones(len(self.target), dtype=np.bool_) if self.counts is None else np.asarray(self.counts > 0.0)
 
     @property
     def error(self) -> NDArray[np.float64]:

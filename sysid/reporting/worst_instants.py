@@ -71,6 +71,7 @@ def _badness(error: float) -> float:
 def _instants_of_case(case: str, signal: CaseSignals, count: int, share: float) -> list[Instant]:
     size = np.abs(signal.simulated - signal.target)
     size[~np.isfinite(size)] = np.inf
+    size[~signal.counted] = -1.0
     half = max(20, round(share * len(size)))
     found = []
     for _ in range(count):

@@ -133,7 +133,7 @@ def _case(cascade: Cascade, trace: Trace, role: Role, timed: _Timed, name: str) 
         target=target,
         simulated=run[name],
         predicted=predicted,
-        counted=int(counted.sum()),
+        counts=None if counted.all() else counted,
     )
 
 

@@ -40,7 +40,7 @@ class CaseResult:
             count; ``None`` where nobody said in which state a sample is.
         constants: Parameters that differ by case, as the run had them, by name; empty where none does.
         errors: Mean squared errors of the free run by part of the case, in the output's unit squared.
-        counted: Samples that figures count, without those that are masked; ``None`` where all do.
+        counts: Which samples figures count, shape ``(n_samples,)``: not those that are masked; ``None`` where all do.
     """
 
     case: str
@@ -57,7 +57,7 @@ class CaseResult:
     by_state: Dict[str, tuple[Figures, float]] | None = None
     constants: Dict[str, float] = field(default_factory=dict)
     errors: tuple[float, ...] = ()
-    counted: int | None = None
+    counts: NDArray[np.bool_] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Figures and run time as JSON values, without the signals."""
@@ -69,7 +69,7 @@ class CaseResult:
                 "free_run": self.free_run.to_dict(),
                 "one_step": self.one_step.to_dict(),
                 "run_time_s": self.run_time_s,
-                "n_samples": len(self.target) if self.counted is None else self.counted,
+                "n_samples": len(self.target) if self.counts is None else int(self.counts.sum()),
                 "begins_at": self.first,
                 "predicts": not bool(np.isnan(self.predicted).all()),
                 "simulated_s": float(self.time[-1] - self.time[0]),
@@ -217,7 +217,7 @@ def case_results(
             intervals=interval,
             constants=dict(zip(model.recursion.constants, history.constants, strict=True)),
             errors=parts_of((run - measured)[counted]),
-            counted=int(counted.sum()),
+            counts=None if counted.all() else counted,
         )
         for output, unit, measured, run, ahead, counted, interval in zip(
             model.mapping.outputs, model.ends.output_units, *columns, counts, intervals, strict=True

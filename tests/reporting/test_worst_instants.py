@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from sysid.reporting.sections.amplitude import bands
 from sysid.reporting.signals import CaseSignals
 from sysid.reporting.worst_instants import worst_instants
 
@@ -59,3 +62,13 @@ def test_no_more_than_asked_for() -> None:
 
 def test_a_perfect_free_run_has_no_worst_moment() -> None:
     assert worst_instants({"A": _case({})}, 5) == []
+
+
+def test_a_masked_sample_is_no_instant_and_in_no_band():
+    counts = np.ones(1000)
+    counts[500] = 0.0
+    masked = replace(_case({100: 1.0, 500: -3.0}), counts=counts)
+    assert [instant.sample for instant in worst_instants({"A": masked}, 5)] == [100]
+    ramp = replace(masked, target=np.arange(1000.0), simulated=np.arange(1000.0) + np.where(counts > 0.0, 0.5, 9.0))
+    assert sum(band.samples for band in bands({"A": ramp})) == 999
+    assert max(band.largest for band in bands({"A": ramp})) == 0.5

@@ -208,7 +208,7 @@ def regression_figure(signals: Dict[str, CaseSignals], r: Dict[str, float], *, l
             low, high = float(signal.target.min()), float(signal.target.max())
             axes.plot([low, high], [low, high], color=TARGET, linewidth=0.8, label="free run = target")
             axes.plot(
-                *distinct_points(signal.target, signal.simulated, 120),
+                *distinct_points(signal.target[signal.counted], signal.simulated[signal.counted], 120),
                 linestyle="none", marker=".", markersize=2.5, color=PALETTE[0], label="samples",
             )  # fmt: skip
             axes.set_title(f"{case}: R = {r[case]:.6f}" if np.isfinite(r[case]) else f"{case}: R is not defined")

@@ -53,8 +53,8 @@ def bands(signals: Dict[str, CaseSignals], count: int = BANDS) -> list[Band]:
     """
     if not signals:
         return []
-    target = np.concatenate([signal.target for signal in signals.values()])
-    error = np.concatenate([signal.error for signal in signals.values()])
+    target = np.concatenate([signal.target[signal.counted] for signal in signals.values()])
+    error = np.concatenate([signal.error[signal.counted] for signal in signals.values()])
     low, high = float(target.min()), float(target.max())
     if not high > low:
         return []

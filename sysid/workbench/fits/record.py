@@ -32,6 +32,7 @@ from sysid.workbench.runner.events import FitReady
 from sysid.workbench.runner.store import read_arrays, read_json, write_arrays, write_json
 
 SIGNALS = ("time", "target", "simulated", "predicted")
+COUNTS = "counts"
 """What is kept of every case, sample by sample."""
 
 CHOSE = ("selection_rms_shares", "selection_errors", "estimation_errors")
@@ -84,6 +85,9 @@ def write_scores(folder: Path, scores: Scores) -> list[Path]:
         if case.intervals is not None
         for signal in INTERVAL
     }
+    arrays |= {
+        f"{name}/{COUNTS}": case.counts.astype(np.float64) for name, case in cases.items() if case.counts is not None
+    }
     write_arrays(folder / "signals.npz", arrays)
     figures = {name: case.to_dict() for name, case in cases.items()}
     chose = {"selection_mse": scores.selection_mse, **{name: list(getattr(scores, name)) for name in CHOSE}}
@@ -135,7 +139,7 @@ def read_scores(folder: Path) -> Scores:
             one_step=Figures.from_dict(fields["one_step"]),
             run_time_s=fields["run_time_s"],
             first=fields["begins_at"],
-            counted=fields["n_samples"],
+            counts=arrays[f"{name}/{COUNTS}"] > 0.0 if f"{name}/{COUNTS}" in arrays else None,
             intervals=CaseIntervals.from_dict(fields["coverage"], *(arrays[f"{name}/{signal}"] for signal in INTERVAL))
             if "coverage" in fields
             else None,
