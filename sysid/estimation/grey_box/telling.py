@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sysid.equations.units_checked import unit_contradictions
 from sysid.estimation.grey_box.by_case import case_notes
 from sysid.estimation.grey_box.finishing import Done
 from sysid.estimation.grey_box.profile import Profiler
@@ -20,6 +21,7 @@ from sysid.estimation.results.result import FitResult, Status
 from sysid.models import Start
 from sysid.models.blocks.built_model import BuiltModel
 from sysid.models.grey_box.grey_box import PROFILE
+from sysid.models.grey_box.grey_box_model import EquationModel
 from sysid.traces import Trace
 
 
@@ -63,7 +65,7 @@ def told(
             f"the squared error of the exact form is {done.softened:.3g} times that of the soft one."
         )
     notes += findings.profiled
-    warnings = list(findings.more_than_shown if built else findings.warnings)
+    warnings = list(findings.more_than_shown if built else [*_contradictions(model), *findings.warnings])
     if model.lowered.n_continuous and not done.stepping.enough:
         warnings.append(step_warning(model, done.stepping))
     return replace(
@@ -73,6 +75,15 @@ def told(
         notes=(*found.notes, *notes, *warnings),
         warnings=(*found.warnings, *warnings),
     )
+
+
+def _contradictions(model: EquationModel) -> list[str]:
+    """What contradicts itself in the units of the equations; a channel in ``1`` may be in anything."""
+    ends = model.ends
+    channels = zip((*ends.inputs, *ends.outputs), (*ends.input_units, *ends.output_units), strict=True)
+    units = {name: "" if unit == "1" else unit for name, unit in channels}
+    units |= {name: one.unit for name, one in model.grey.begins.items() if one.unit}
+    return unit_contradictions(model.grey.system, units | {one.name: one.unit for one in model.grey.named})
 
 
 def _posterior(done: Done, traces: Sequence[Trace], selection: Sequence[Trace], start: Start) -> Posterior | None:

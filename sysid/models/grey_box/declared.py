@@ -25,7 +25,7 @@ class Parameter:
         high: Greatest value.
         prior: Standard deviation of what is known of it before the data, around the start; ``None`` where nothing is.
         fixed: Whether it is known, and not estimated.
-        unit: Its unit, for people.
+        unit: Its unit; a fit says where the equations' units contradict each other.
         per: ``case`` where each case has a value of its own; ``None`` where all share one.
 
     Raises:
@@ -95,7 +95,7 @@ class InitialState:
         low: Least value.
         high: Greatest value.
         fixed: Whether every record begins at that value, and none is estimated.
-        unit: Its unit, for people.
+        unit: Its unit, as that of a parameter.
 
     Raises:
         ConfigError: If the numbers do not go together.

@@ -56,6 +56,15 @@ def fitted(
 LAG = "dx/dt = (gain*u - x)/lag; y = x"
 
 
+def test_units_that_contradict_each_other_are_told() -> None:
+    fits = [
+        fitted([first_order(3.0, 4.0)], LAG, parameters={"gain": 2.0, "lag": {"start": 3.0, "low": 0.1, "unit": unit}})
+        for unit in ("s", "min")
+    ]
+    told = [[text for text in fit.warnings if "nothing converts it" in text] for fit in fits]
+    assert told == [[], ["The rate of x is in V/s, and its equation gives V/min: nothing converts it."]]
+
+
 def test_parameters_and_initial_states_of_several_records_are_found() -> None:
     records = [first_order(3.0, 4.0, begin=begin, seed=seed) for begin, seed in ((5.0, 0), (-2.0, 7))]
     fit = fitted(records, LAG, parameters={"gain": 1, "lag": {"start": 1, "low": 0.01, "unit": "s"}})
