@@ -47,7 +47,10 @@ def suggestions(record: Record, findings: Sequence[Finding]) -> tuple[Suggestion
     if record.integrates:
         sums = NeuralStateSpace(states=2, neurons=2 if codes & NOT_LINEAR else 0, integrators=1)
         found.append(Suggestion(structure=sums, code="structure.integrates"))
-    if codes & NOT_LINEAR:
+    if codes & NOT_LINEAR and "sampling.at_once" in codes and len(record.mapping.inputs) == 1:
+        curve = NARX(input_delays=[0], output_delays=[], neurons=8)
+        found.append(Suggestion(structure=curve, code="structure.curve"))
+    elif codes & NOT_LINEAR:
         lags = max(arx.na, 2)
         late = 0 if "linearity.nothing_explained" in codes else max(arx.nk, default=0) + 1
         network = NARX(input_delays=max(lags, late), output_delays=lags, neurons=8)

@@ -374,6 +374,13 @@ def test_no_rate_is_proposed_that_loses_what_the_output_does() -> None:
     assert "sampling.fast" not in codes(found)
 
 
+def test_a_curve_without_memory_gets_a_network_without_memory() -> None:
+    u = np.repeat(np.random.default_rng(5).uniform(-2.0, 2.0, 100), 6) + noise(600, 6, 0.05)
+    found = look(trace(u, np.exp(u) + noise(600, 9, 0.02)))
+    assert [one.structure.label for one in found.suggestions if one.code == "structure.curve"] == ["NFIR 0:0/8"]
+    assert "structure.network" not in {one.code for one in found.suggestions}
+
+
 def test_an_answer_one_sample_later_is_not_at_once() -> None:
     u = steps(600, 8, 1)
     found = look(trace(u, np.asarray(lfilter([0.0, 1.425], [1.0, -0.05], u)) + noise(600, 8, 0.02)))

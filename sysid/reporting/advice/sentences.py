@@ -317,5 +317,8 @@ SAID: Final[dict[str, Words]] = {
         "{label}: a transfer function; what is left is noise on the output, which ARX takes for dynamics."
     ),
     "structure.integrates": Words("{label}: its output adds up exactly, as the plant's does."),
+    "structure.curve": Words(
+        "{label}: a network without memory, since a line is not enough and the output answers at once."
+    ),
     "structure.network": Words("{label}: a network, since a line is not enough."),
 }

@@ -223,7 +223,7 @@ def _narx_of(lags: int, neurons: int, looked: Looked) -> Try:
 
 def _around_narx(one: Try, _: Looked) -> list[Try]:
     network = cast("NARX", one.structure)
-    shortest = min(map(len, (*network.input_delays, network.output_delays)))
+    shortest = min(len(lags) for lags in (*network.input_delays, network.output_delays) if lags)
     moves: list[dict[str, Any]] = [
         {"neurons": round(1.6 * network.neurons) + 1},
         {"gated": not network.gated},
@@ -235,7 +235,7 @@ def _around_narx(one: Try, _: Looked) -> list[Try]:
 
 def _lags(network: NARX, more: int) -> dict[str, Any]:
     inputs, output = (
-        [list(range(lags[0], lags[0] + len(lags) + more)) for lags in some]
+        [list(range(lags[0], lags[0] + len(lags) + more)) if lags else [] for lags in some]
         for some in (network.input_delays, (network.output_delays,))
     )
     return {"input_delays": inputs, "output_delays": output[0]}
