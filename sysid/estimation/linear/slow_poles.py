@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 NEAR = 0.8
 """Time constant, in lengths of the longest record, from which a pole is one that the record cannot show whole."""
+REACH = 5.0
+"""Time constants in the longest record up to which a pole is asked about, whether it is one at 1."""
 SIGNIFICANT = 6.6
 """Drop of twice the log-likelihood that one more free parameter has by chance in one case of a hundred."""
 HANGS_TOGETHER = 0.9
@@ -55,6 +57,19 @@ def unseen(radius: float, lengths: Sequence[int]) -> bool:
         Whether it is.
     """
     return radius >= 1.0 - 1.0 / max(NEAR * max(lengths), 2.0)
+
+
+def undecided(radius: float, lengths: Sequence[int]) -> bool:
+    """Whether a pole stands at the bound or beyond it, and is not one at 1: no record says where it is.
+
+    Args:
+        radius: Magnitude of the slowest pole.
+        lengths: Of the records, in samples.
+
+    Returns:
+        Whether it does.
+    """
+    return largest_pole(lengths) - FAR <= radius <= 1.0 + FAR and abs(radius - 1.0) > INTEGRATES
 
 
 def stability(radius: float) -> str:
@@ -126,7 +141,8 @@ def notes(radius: float, lengths: Sequence[int], errors: Errors | None) -> tuple
         told.append(
             f"The slowest pole, of magnitude {radius:.6f}, is as slow as the longest record of {max(lengths)} samples, "
             "or slower: the plant may integrate, or a drift of the output is taken for its response, and these records "
-            "cannot tell. The level of the free run is not to be trusted."
+            "cannot tell. The level of the free run is not to be trusted: measure longer, or with inputs that bring "
+            "the output back; where it drifts by itself, take that off first (repairs: {drift: {y: line}})."
         )
     return (*told, *_together(errors or []))
 

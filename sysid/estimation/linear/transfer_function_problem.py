@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.delay_search import FEW
 from sysid.estimation.linear.integrators import all_at_one, with_integrators
 from sysid.estimation.linear.pole_starts import PoleStart
@@ -217,7 +218,7 @@ class AbstractProblem(ABC):
         Returns:
             The other one, with the loss that it has; see :mod:`sysid.estimation.linear.integrators`.
         """
-        near = 5.0 / max(len(record.target) for record in end.provider.records)
+        near = slow_poles.REACH / max(len(record.target) for record in end.provider.records)
         put = all_at_one if every else with_integrators
         return put(end, self.orders.domain, self.terms.sample_time, near)
 

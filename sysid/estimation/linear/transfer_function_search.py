@@ -15,6 +15,7 @@ import numpy as np
 from sysid.errors import FitDivergedError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.state import Iteration
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.delay_search import FEW, READ_BACKWARDS
 from sysid.estimation.linear.integrators import near_ones_put
 from sysid.estimation.linear.pole_moves import filled_up, next_smaller, slowness
@@ -230,12 +231,14 @@ def _free_poles(
     if free is None:
         return own, end
     domain, sample_time, provider = own.orders.domain, own.terms.sample_time, free.provider(delays)
-    edge = 1.0 - 1.0 / max(len(record.target) for record in provider.records)
+    # Where noise and wrong dynamics hide an integrator, a search among stable poles ends a few of them within the edge.
+    longest = max(len(record.target) for record in provider.records)
+    edge, asked_from = 1.0 - 1.0 / longest, 1.0 - slow_poles.REACH / longest
     slowest = slowness(end.sections, domain, sample_time)
     # A search among stable poles may put a dead time in place of an integrator: the shortest is asked, too.
     asked = {delays} if own.orders.delays is not None else {delays, (own.delay_range()[0],) * len(delays)}
     suggested = [free.free_starts(free.provider(one))[0].sections for one in sorted(asked)]
-    if max(slowest, *(slowness(sections, domain, sample_time) for sections in suggested)) < edge:
+    if max(slowest, *(slowness(sections, domain, sample_time) for sections in suggested)) < asked_from:
         return own, end
     at_end = replace(end, notes=(*end.notes, AT_EDGE)) if slowest >= edge else end
     told: tuple[str, ...] = ()
@@ -269,7 +272,7 @@ def _about_its_level(free: AbstractProblem, found: End, watch: Watch) -> tuple[A
 
     Without it a pole a little off 1 makes the ramp, from a state as far away: a plant that grows, or one that settles.
     """
-    near = 5.0 / max(len(record.target) for record in found.provider.records)
+    near = slow_poles.REACH / max(len(record.target) for record in found.provider.records)
     put = near_ones_put(found.sections, free.orders.domain, free.terms.sample_time, near)
     plain = replace(found, theta=found.provider.poles.theta(put))
     level = free.levelled(plain)
