@@ -171,6 +171,9 @@ class Determined:
         B, D = (np.zeros((len(old), len(mapping.inputs))) for old in (model.system.B, model.system.D))
         if self.moves:
             B[:, at], D[:, at] = model.system.B, model.system.D
+            offset = np.array(scaling.input_offset)
+            offset[at] = model.scaling.input_offset  # those that an integrator adds up are counted from its level
+            scaling = replace(scaling, input_offset=tuple(offset.tolist()))
         nk = np.full(len(mapping.inputs), own.shortest)
         nk[at] = own.nk or own.shortest
         orders = replace(own, nk=tuple(nk.tolist()) if own.nk else ())

@@ -50,7 +50,7 @@ class Chart:
     basis: Array
 
     @classmethod
-    def around(cls, base: Innovations, *, feedthrough: bool, noise: bool, intercept: bool) -> Chart:
+    def around(cls, base: Innovations, *, feedthrough: bool, noise: bool, intercept: bool, sums: int = 0) -> Chart:
         """All directions that change the system.
 
         Args:
@@ -58,33 +58,42 @@ class Chart:
             feedthrough: Whether ``D`` is fitted.
             noise: Whether ``K`` is fitted.
             intercept: Whether the constant is fitted.
+            sums: So many first states are sums: what makes them so is held.
 
         Returns:
             The chart.
         """
         n, fitted = base.n_state, _fitted(base, feedthrough=feedthrough, noise=noise, intercept=intercept)
-        changes = []
+        held = _holding(base, sums)
+        fitted = np.setdiff1d(fitted, held)
+        changes, breaks = [], []
         for a in range(n):
             for b in range(n):
                 E = np.zeros((n, n))
                 E[a, b] = 1.0
                 of_A, of_C = E @ base.A - base.A @ E, -base.C @ E
-                changes.append(_joined(of_A, E @ base.B, of_C, 0.0 * base.D, E @ base.K, 0.0 * base.constant)[fitted])
+                change = _joined(of_A, E @ base.B, of_C, 0.0 * base.D, E @ base.K, 0.0 * base.constant)
+                changes.append(change[fitted])
+                breaks.append(change[held])
         directions = np.eye(len(base.entries))[:, fitted]
         if not changes:
             return cls(base=base, basis=directions)
-        Q, R, _ = linalg.qr(np.array(changes).T, pivoting=True)
+        # Of changes of coordinates those that leave alone what is held; and no constant that a sum makes, too.
+        kept = linalg.null_space(np.array(breaks).T) if sums else np.eye(len(changes))
+        still = np.hstack([np.array(changes).T @ kept, _begins(base, sums)[fitted]])
+        Q, R, _ = linalg.qr(still, pivoting=True)
         sizes = np.abs(np.diag(R))
         rank = int(np.count_nonzero(sizes > 1e-12 * max(float(sizes[0]), 1e-300)))
         return cls(base=base, basis=directions @ Q[:, rank:])
 
     @classmethod
-    def linear(cls, base: Innovations, *, feedthrough: bool, intercept: bool) -> Chart:
-        """The directions in which the prediction is linear: ``B``, ``D`` and the constant."""
+    def linear(cls, base: Innovations, *, feedthrough: bool, intercept: bool, sums: int = 0) -> Chart:
+        """The directions in which the prediction is linear: ``B``, ``D`` and the constant; see :meth:`around`."""
         n, m, p = base.n_state, base.n_inputs, base.n_outputs
         parts = [np.zeros(n * n), np.ones(n * m), np.zeros(p * n), np.full(p * m, float(feedthrough))]
         kept = np.concatenate([*parts, np.zeros(n * p), np.full(p, float(intercept))]) > 0.0
-        return cls(base=base, basis=np.eye(len(kept))[:, kept])
+        basis = np.eye(len(kept))[:, kept]
+        return cls(base=base, basis=basis @ linalg.null_space(_begins(base, sums).T @ basis) if sums else basis)
 
     @property
     def n_parameters(self) -> int:
@@ -120,6 +129,28 @@ class Directions:
 
 def _joined(*parts: Array) -> Array:
     return np.concatenate([part.ravel() for part in parts])
+
+
+def _staying(base: Innovations, sums: int) -> int:
+    """How many of the first states, which are sums, stay where they are: all of those side by side, one of a chain."""
+    return min(sums, 1) if np.triu(base.A[:sums, :sums], 1).any() else sums
+
+
+def _holding(base: Innovations, sums: int) -> NDArray[np.intp]:
+    """Entries of ``A`` that make first states sums, apart from the others; in a chain one may add up the next."""
+    held = np.zeros_like(base.A, dtype=np.bool_)
+    held[:sums], held[:, :sums] = True, True
+    if _staying(base, sums) < sums:
+        held[np.triu_indices(sums, 1)] = False
+    return np.flatnonzero(held)
+
+
+def _begins(base: Innovations, sums: int) -> Array:
+    """The constants that sums make of where they begin: no record tells one from the other; as columns."""
+    staying = _staying(base, sums)
+    change = np.zeros((len(base.entries), staying))
+    change[len(change) - base.n_outputs :] = base.C[:, :staying]
+    return change
 
 
 def _fitted(base: Innovations, *, feedthrough: bool, noise: bool, intercept: bool) -> NDArray[np.intp]:

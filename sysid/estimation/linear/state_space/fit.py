@@ -17,7 +17,7 @@ from sysid.estimation.linear.arx import rests_of
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, side_by_side
 from sysid.estimation.linear.state_space.dead_times import behind_dead_times, late
-from sysid.estimation.linear.state_space.refinement import Found
+from sysid.estimation.linear.state_space.refinement import Found, Level
 from sysid.estimation.linear.state_space.search import around, search
 from sysid.estimation.linear.state_space.training import METHODS, StateSpaceTraining
 from sysid.estimation.linear.state_space.uncertainty import coordinates_root, state_space_uncertainty
@@ -78,7 +78,9 @@ def fit_state_space(
         fit = fit_state_space(traces, *own, training, start=start, rest_output=given)
         return determined.states(fit, mapping, scaling, input_units)
     orders, segments, told = behind_dead_times(segments, orders, training)
-    found = search(segments, orders, training)
+    found = search(segments, orders, training, _zero(scalings[0]))
+    if found.level is not None:
+        scaling = replace(scaling, input_offset=_offset(scaling, found.level))
     shared: dict[str, Any] = {
         "orders": orders,
         "system": found.system,
@@ -99,6 +101,16 @@ def fit_state_space(
 
 
 _TINY = 1e-300
+
+
+def _zero(scaling: Scaling) -> Level:
+    """What is zero of each input, in scaled numbers."""
+    return tuple((-np.array(scaling.input_offset) / np.array(scaling.input_scale)).tolist())
+
+
+def _offset(scaling: Scaling | VectorScaling, level: Level) -> tuple[float, ...]:
+    """The values of inputs, in their units, from which integrators add them up."""
+    return tuple((np.array(scaling.input_offset) + np.array(level) * np.array(scaling.input_scale)).tolist())
 
 
 def records_of(
@@ -153,7 +165,11 @@ def matrices_root(
         Shape ``(n_entries, n_directions)``, entries as :attr:`sysid.models.linear.innovations.Innovations.entries`.
     """
     rests = tuple(float(rest) for rest in model.ends.rest_outputs)
-    _, segments, _ = records_of(traces, model.mapping, model.orders, start=start, rests=rests)
+    scalings, segments, _ = records_of(traces, model.mapping, model.orders, start=start, rests=rests)
+    own, given = model.scaling, scalings[0]
+    if own.input_offset != given.input_offset:  # what integrates counts its inputs from a level, and begins anywhere
+        level = (np.array(own.input_offset) - np.array(given.input_offset)) / np.array(given.input_scale)
+        segments = tuple(replace(one, inputs=one.inputs - level, rest=None) for one in segments)
     found = around(model.system, late(segments, model.orders), model.orders)
     return np.asarray(found.chart.basis @ coordinates_root(found))
 
@@ -179,6 +195,7 @@ def _result(
         train_time_s=now() - began,
         uncertainty=None if by_subspace else state_space_uncertainty(model, found),
         notes=(*_notes(found, orders), *found.notes, slow_poles.stability(model.pole_radius)),
+        warnings=found.warnings,
     )
 
 

@@ -35,6 +35,7 @@ from sysid.models import LinearStateSpace
 from sysid.models.linear.innovations import Innovations
 
 Array = NDArray[np.float64]
+Level = tuple[float, ...]
 
 LONG = 100_000
 """Samples beyond which one solution is enough: rounding is far below the noise there."""
@@ -73,6 +74,9 @@ class Found:
         singular_values: Canonical correlations of past and future.
         notes: What a reader should know of slow poles.
         coloured: What its errors say of the parameters where they hang together; ``None`` where they are white.
+        level: Of each input the value from which integrators add it up, in scaled numbers; ``None`` where no pole is
+            held at 1.
+        warnings: Those of the notes that say what is wrong.
     """
 
     system: Innovations
@@ -86,6 +90,8 @@ class Found:
     singular_values: Array
     notes: tuple[str, ...] = ()
     coloured: Array | None = None
+    level: Level | None = None
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,6 +102,8 @@ class Problem:
     orders: LinearStateSpace
     stable: bool
     largest: float = EDGE
+    sums: int = 0
+    """So many first states of a system are integrators that stay so."""
 
     @property
     def lengths(self) -> list[int]:
@@ -159,7 +167,7 @@ class Problem:
 
     def _widened(self, system: Innovations) -> tuple[float, Innovations] | None:
         """A system with one more state, of the pole that helps most; and its loss."""
-        found = [fitted for pole in POLES if (fitted := self._with_inputs(_with_state(system, pole))) is not None]
+        found = [fitted for pole in POLES if (fitted := self.with_inputs(_with_state(system, pole))) is not None]
         return min(found, key=lambda entry: entry[0], default=None)
 
     def start(self, subspace: Subspace, weighting: str) -> tuple[Innovations, Weighting]:
@@ -172,7 +180,7 @@ class Problem:
                 system = subspace.estimate(self.orders.states, one)
             except (linalg.LinAlgError, ValueError):  # not finite, or no decomposition: another one may do
                 continue
-            fitted = judge._with_inputs(system)
+            fitted = judge.with_inputs(system)
             if fitted is not None:
                 found.append((fitted[0], len(found), fitted[1], one))
         if not found:
@@ -181,33 +189,53 @@ class Problem:
                 remedy="ask for fewer states, or for noise: true where the plant is unstable",
             )
         _, _, system, one = min(found, key=lambda entry: entry[:2])
-        fitted = None if judge is self else self._with_inputs(system)
+        fitted = None if judge is self else self.with_inputs(system)
         return (system if fitted is None else fitted[1]), one
 
     def begun(self) -> Problem:
         """The same problem over the first samples of each record, which are enough to choose by."""
         return replace(self, segments=tuple(segment.first(ENOUGH) for segment in self.segments))
 
-    def _with_inputs(self, system: Innovations) -> tuple[float, Innovations] | None:
-        """The loss and the system with the ``B``, ``D`` and constant that fit best; twice, for rounding."""
+    def with_inputs(self, system: Innovations) -> tuple[float, Innovations] | None:
+        """The loss and the system with the ``B``, ``D`` and constant that fit best; twice, for rounding.
+
+        Args:
+            system: The system.
+
+        Returns:
+            Both; ``None`` where its run is not finite.
+        """
         if self.stable:
             system = stabilised(system, self.largest)
         if not self.orders.intercept:
             system = replace(system, constant=np.zeros(system.n_outputs))
-        system = system.balanced()
+        system = self._laid(system)
         for _ in range(2 if sum(map(len, self.segments)) <= LONG else 1):
-            errors = self.errors(self.linear(system), np.eye(system.n_outputs))
-            at = errors.linearise(np.zeros(errors.chart.n_parameters))
-            if not errors.allowed(system) or not np.isfinite(at.loss) or not at.finite:
+            solved = self.solved(self.linear(system))
+            if solved is None:
                 return None
-            root, scaled = at.scaled()
-            step = -np.linalg.lstsq(scaled, at.gradient / root, rcond=1e-13)[0] / root
-            system = errors.chart.system(step)
+            system = solved
         errors = self.errors(self.linear(system), np.eye(system.n_outputs))
         covariance = errors.covariance(system)
         if not np.isfinite(covariance).all():
             return None
         return size_of(covariance), system
+
+    def solved(self, chart: Chart) -> Innovations | None:
+        """The system of least error in a chart in which predictions are linear.
+
+        Args:
+            chart: The chart.
+
+        Returns:
+            It; ``None`` where its run is not finite.
+        """
+        errors = self.errors(chart, np.eye(chart.base.n_outputs))
+        at = errors.linearise(np.zeros(chart.n_parameters))
+        if not errors.allowed(chart.base) or not np.isfinite(at.loss) or not at.finite:
+            return None
+        root, scaled = at.scaled()
+        return chart.system(-np.linalg.lstsq(scaled, at.gradient / root, rcond=1e-13)[0] / root)
 
     def errors(self, chart: Chart, whitening: Array) -> PredictionErrors:
         """The least-squares problem over a chart."""
@@ -218,11 +246,17 @@ class Problem:
     def around(self, system: Innovations) -> Chart:
         """All that changes a system."""
         o = self.orders
-        return Chart.around(system, feedthrough=o.feedthrough, noise=o.noise, intercept=o.intercept)
+        fitted = {"feedthrough": o.feedthrough, "noise": o.noise, "intercept": o.intercept}
+        return Chart.around(system, **fitted, sums=self.sums)
+
+    def _laid(self, system: Innovations) -> Innovations:
+        """The system in the coordinates in which a chart is laid: balanced, but where sums have to stay apart."""
+        return system if self.sums else system.balanced()
 
     def linear(self, system: Innovations) -> Chart:
         """The part in which its predictions are linear."""
-        return Chart.linear(system, feedthrough=self.orders.feedthrough, intercept=self.orders.intercept)
+        o = self.orders
+        return Chart.linear(system, feedthrough=o.feedthrough, intercept=o.intercept, sums=self.sums)
 
     def refined(self, system: Innovations, iterations: int, seconds: float, *, tolerance: float = FINE) -> Found:
         """The system with the least prediction error nearby."""
@@ -230,7 +264,7 @@ class Problem:
         curve: list[Iteration] = []
         whitening = self._whitening(system)
         for _ in range(CHARTS):
-            system = system.balanced()
+            system = self._laid(system)
             chart = self.around(system)
             errors = self.errors(chart, whitening)
             zero = np.zeros(errors.chart.n_parameters)
@@ -251,7 +285,7 @@ class Problem:
             whitening = self._whitening(system)
         if status in {Status.NOT_IMPROVED, Status.STALLED} and curve:
             status = Status.CONVERGED  # a later chart found nothing more to gain
-        found = self.at(system.balanced(), minimised=iterations > 0)
+        found = self.at(self._laid(system), minimised=iterations > 0)
         return replace(found, status=status, curve=tuple(curve) or found.curve)
 
     def at(self, system: Innovations, *, minimised: bool = True) -> Found:

@@ -13,7 +13,8 @@ from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.segments import Segment, torn
 from sysid.estimation.linear.state_space.free_runs import free_run_error
-from sysid.estimation.linear.state_space.refinement import Found, Problem, size_of
+from sysid.estimation.linear.state_space.integrators import held_at_one
+from sysid.estimation.linear.state_space.refinement import Found, Level, Problem, size_of
 from sysid.estimation.linear.state_space.training import BEST, METHODS, StateSpaceTraining
 from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import Subspace
@@ -24,13 +25,17 @@ QUICK = 4
 """Steps after which dead times are compared, from one subspace estimate: that which feedback does not bias."""
 
 
-def search(segments: Sequence[Segment], orders: LinearStateSpace, training: StateSpaceTraining) -> Found:
+def search(
+    segments: Sequence[Segment], orders: LinearStateSpace, training: StateSpaceTraining, zero: Level | None = None
+) -> Found:
     """Find the state space of some records.
 
     Args:
         segments: The records, in scaled numbers, of one output or several.
         orders: The structure.
         training: How.
+        zero: What is zero of each input, in scaled numbers, for poles that may be those of integrators; ``None`` where
+            none is held at 1.
 
     Returns:
         What was found.
@@ -62,12 +67,16 @@ def search(segments: Sequence[Segment], orders: LinearStateSpace, training: Stat
             found = found_in(bounded)
             if slow_poles.unseen(found.system.radius, problem.lengths):
                 found = _better(found, found_in(problem), problem)
+            if iterations and zero and orders.intercept:  # without inputs or a constant nothing makes a ramp of them
+                left = began + training.max_time_s - now()
+                found, problem = held_at_one(found, problem, zero, iterations=iterations, seconds=left)
         errors = None if orders.noise else problem.around_errors(found.system)
         if iterations:
             found = problem.with_colour(found)
     told = slow_poles.notes(found.system.radius, problem.lengths, errors)
     told = (*told, *(torn(problem.segments, orders.states, records=len(segments)) if orders.noise else ()))
-    return replace(found, singular_values=subspace.singular_values(), notes=told)
+    warned = told[:1] if not orders.noise and slow_poles.undecided(found.system.radius, problem.lengths) else ()
+    return replace(found, singular_values=subspace.singular_values(), notes=told, warnings=warned)
 
 
 def quick_size(segments: Sequence[Segment], orders: LinearStateSpace, training: StateSpaceTraining) -> float:
