@@ -19,6 +19,7 @@ from sysid.reporting.benchmarks.findings import (
 )
 from sysid.reporting.html import readable
 from sysid.reporting.markdown import MARK, PAGE, facts_lines, machine, refuse_others, rows_lines
+from sysid.reporting.scores import Score
 
 _WORDS: Final = {True: "reached", False: "**missed**", None: ""}
 
@@ -44,6 +45,7 @@ def publish_benchmarks(name: str, into: Path, ran: Sequence[Benchmark]) -> Path:
     if (folder / FINDINGS_FILE).exists():
         kept = {benchmark.command: benchmark for benchmark in read_findings(folder).benchmarks}
     again = {finding.what for benchmark in ran for finding in benchmark.findings}
+    again |= {_scored(score) for benchmark in ran for score in benchmark.scores}
     by_command = {command: _without(older, again) for command, older in kept.items()}
     by_command |= {benchmark.command: benchmark for benchmark in ran}
     report = Benchmarks(name=name, benchmarks=[one for one in by_command.values() if one])
@@ -57,7 +59,12 @@ def publish_benchmarks(name: str, into: Path, ran: Sequence[Benchmark]) -> Path:
 def _without(older: Benchmark, again: Collection[str]) -> Benchmark | None:
     """What is left of a benchmark beside figures that were found again: two figures of one thing contradict."""
     left = [finding for finding in older.findings if finding.what not in again]
-    return older.model_copy(update={"findings": left}) if left or not older.findings else None
+    scores = [score for score in older.scores if _scored(score) not in again]
+    return older.model_copy(update={"findings": left, "scores": scores}) if left or not older.findings else None
+
+
+def _scored(score: Score) -> str:
+    return f"{score.model}: {score.mapping}"
 
 
 def _lines(report: Benchmarks) -> list[str]:

@@ -10,6 +10,7 @@ import pytest
 from sysid.errors import ConfigError
 from sysid.reporting import publish_benchmarks
 from sysid.reporting.benchmarks.findings import FINDINGS_FILE, Benchmark, Finding, read_findings
+from sysid.reporting.scores import Score
 
 NAN = float("nan")
 FINDINGS = [
@@ -101,10 +102,15 @@ def test_a_report_grows_and_a_benchmark_that_is_run_again_takes_its_own_place(tm
 
 
 def test_a_figure_that_another_command_found_again_stands_once(tmp_path: Path) -> None:
-    publish_benchmarks("all", tmp_path, [benchmark("all"), benchmark("some", findings=FINDINGS[:1])])
-    publish_benchmarks("all", tmp_path, [benchmark("last", findings=FINDINGS[:2])])
+    scores = [Score(mapping="u -> y", unit="V", model=model, mse={"test": 1.0}) for model in ("a peer", "another")]
+    older = [benchmark("all", scores=scores), benchmark("some", findings=FINDINGS[:1])]
+    publish_benchmarks("all", tmp_path, older)
+    publish_benchmarks("all", tmp_path, [benchmark("last", findings=FINDINGS[:2], scores=scores[:1])])
     kept = read_findings(tmp_path / "all").benchmarks
-    assert [(one.command, one.findings) for one in kept] == [("all", FINDINGS[2:]), ("last", FINDINGS[:2])]
+    assert [(one.command, one.findings, one.scores) for one in kept] == [
+        ("all", FINDINGS[2:], scores[1:]),
+        ("last", FINDINGS[:2], scores[:1]),
+    ]
 
 
 def test_damaged_figures_and_a_folder_of_somebody_else_are_refused(tmp_path: Path) -> None:
