@@ -59,13 +59,16 @@ def check_dynamics(record: Record) -> Iterator[Finding]:
             yield Finding(topic=Topic.DYNAMICS, code="effect.shared", verdict=Verdict.UNKNOWN, subject=(name,))
             continue
         if not dead.acts and not whole.dead_times[j].acts:
-            figures = {"odds": dead.odds}
-            yield Finding(
-                topic=Topic.DYNAMICS, code="effect.none", verdict=Verdict.LOOK, subject=(name,), figures=figures
-            )
+            yield _no_effect(name, dead.odds, alone=len(found.mapping.inputs) == 1)
             continue
         yield _dead_time(found, j, name)
         yield _settling(record, whole, j, name)
+
+
+def _no_effect(name: str, odds: float, *, alone: bool) -> Finding:
+    """What is said of an input that no lag shows: the only one is all that the output can be explained by."""
+    code, figures = "effect.unseen" if alone else "effect.none", {"odds": odds}
+    return Finding(topic=Topic.DYNAMICS, code=code, verdict=Verdict.LOOK, subject=(name,), figures=figures)
 
 
 def _runs_away(record: Record) -> Finding:

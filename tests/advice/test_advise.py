@@ -124,6 +124,13 @@ def test_an_input_that_does_nothing_is_told() -> None:
     assert finding(found, "effect.none").subject == ("u2",)
 
 
+def test_the_only_input_of_a_single_step_is_not_to_be_left_out() -> None:
+    u = np.repeat([0.0, 1.0], [30, 300])
+    found = look(trace(u, lfilter([0.0, 0.0, 0.06], [1.0, -0.96], u) + noise(330, 0, 0.12)))
+    assert "effect.none" not in codes(found)
+    assert "Keep it, as it is the only input that moves." in str(said(finding(found, "effect.unseen"), {}))
+
+
 def test_too_fast_and_too_slow_sampling() -> None:
     u = steps(3000, 8, hold=150)
     slow = lfilter([0.0, 0.01], [1.0, -0.99], u)

@@ -161,6 +161,12 @@ SAID: Final[dict[str, Words]] = {
         "{who} has no effect of its own that can be measured.",
         "Leave it out, unless it changes what other inputs do; or move it more than the noise hides.",
     ),
+    "effect.unseen": Words(
+        "No single lag of {who} shows what it does: noise hides it, or it moves too little, as in a single step, where"
+        " the response and a drift look alike.",
+        "Keep it, as it is the only input that moves. Of one step fit a transfer function of one or two poles; for more"
+        ", move it some twenty times (sysid excite prbs), and by more than the noise.",
+    ),
     "effect.shared": Words(
         "What {who} does: it moves as other inputs do, and nobody can tell what each of them brings.",
         "Leave out what is made of others, or move it independently.",
