@@ -158,16 +158,18 @@ def _of_inputs(groups: dict[str, list[Array]], target: Array, usable: Mask) -> s
     most = max(found.values())
     if not most > 0.0:
         return ""
-    share = f"{100 * most:.0f} % of what the free run of {{name}} leaves moves with earlier values of {{inputs}}"
+    earlier = "earlier values of "
     if found[LINEAR] >= MOSTLY * most:
         how = ": the model has too little memory, or not the right one. Try more lags or states, other orders, or more"
     elif found[CURVES] >= MOSTLY * most:
+        earlier = ""  # of the same sample, too
         how = " along a curve that the model lacks. Try a network, more neurons or pieces, another curve, or more"
     else:
         how = (
             " after a play, as with backlash, friction or hysteresis, which the model lacks. Try a network with more "
             "lags of the output, more states, or more"
         )
+    share = f"{100 * most:.0f} % of what the free run of {{name}} leaves moves with {earlier}{{inputs}}"
     return f"{share}{how} starts. (Or {{name}} is fed back to {{inputs}}.)"
 
 
