@@ -149,7 +149,8 @@ def _sampled(
         if not fastest * sample_time <= _FASTEST:
             return None
         systems = tuple(system.sampled(sample_time, moving=own) for system, own in zip(systems, moving, strict=True))
-    return systems if all(np.isfinite(system.A).all() for system in systems) else None
+    finite = all(np.isfinite(part).all() for one in systems for part in (one.A, one.B, one.C, one.D))
+    return systems if finite else None
 
 
 def _beginnings(bases: Bases, domain: Domain, sample_time: float, n_rows: int) -> NDArray[np.float64]:

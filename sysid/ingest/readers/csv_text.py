@@ -140,7 +140,10 @@ def _headers(layout: Layout, options: FileOptions, path: Path) -> list[Header]:
     texts: Sequence[str] = layout.names or [*(f"column_{i + 1}" for i in range(_filled(layout))), *[""] * width][:width]
     if options.names is not None:
         texts = _given_names(options.names, layout, path)
-    headers = parse_headers([re.sub(r"\s*[\r\n]+\s*", " ", from_csv_cell(text)) for text in texts])
+    # A spreadsheet breaks the lines of a long head; in a file of ours a name has what it has.
+    ours = any(text.lstrip().startswith("sysid:") for text in layout.comments)
+    plain = [from_csv_cell(text) for text in texts]
+    headers = parse_headers(plain if ours else [re.sub(r"\s*[\r\n]+\s*", " ", text) for text in plain])
     headers = [
         Header(name=header.name, unit=split_reference(suffix)[0]) if suffix and header.unit is None else header
         for header, suffix in zip(headers, layout.suffixes, strict=True)
