@@ -275,4 +275,11 @@ def _read(unit: str) -> _Known:
     plain = plain_unit(unit) if unit else None
     if plain is None:
         return None
-    return _Unit(registry().parse_units("dimensionless" if plain == "1" else plain))
+    import pint
+
+    found = _Unit(registry().parse_units("dimensionless" if plain == "1" else plain))
+    try:
+        _factor(found.of)
+    except pint.UndefinedUnitError:  # a ratio of decibels, for which pint has a name and no unit
+        return None
+    return found

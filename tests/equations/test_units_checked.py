@@ -49,6 +49,9 @@ APART = [
     pytest.param("x[k+1] = a*x + b", {"x": "m", "a": "m", "b": "m"}, "a * x is in m**2, and b in m", id="next sample"),
     pytest.param("y = 2*rho*v", DRAG, "y is in N, and its equation gives kg/m**2/s", id="a factor that is forgotten"),
     pytest.param("y = a*x", {"a": "fofo", "x": "V"}, "a is in fofo, which is no unit that is known", id="no unit"),
+    pytest.param(
+        "y = a*x", {"a": "dB/m", "x": "m"}, "a is in dB/m, which is no unit that is known", id="decibels over"
+    ),
 ]
 
 
