@@ -333,18 +333,22 @@ class StateSpace(AbstractForm):
         if (len(left) > rank and clean) or self._radius >= 1.0 - AT_ONE:
             return np.asarray(found / scale)
         spread = self._covariance(level)
-        with np.errstate(all="ignore"):
-            seen = observed @ spread @ observed.T
-        if not np.isfinite(seen).all():  # so near the edge that a covariance has no digits left
+        told = observed @ _root(spread)
+        if not np.isfinite(told).all():  # so near the edge that a covariance has no digits left
             return np.asarray(found / scale)
         if len(left) <= rank:
-            level = HISTORY_NOISE * max(float(np.trace(seen)) / len(seen), np.finfo(np.float64).tiny)
+            level = HISTORY_NOISE * max(float(np.mean(np.sum(told**2, axis=1))), np.finfo(np.float64).tiny)
         if self.n_inputs and self._radius < 1.0:  # the first input may not have been held always
             held = scipy.linalg.lstsq(np.eye(self.n_state) - self.A, self.B)[0]
             spread = spread + held @ held.T
-            seen = observed @ spread @ observed.T
+        root = _root(spread)
+        # Least squares with what was expected as rows of its own: of a long history no matrix of samples by samples.
         with np.errstate(all="ignore"):
-            moved = spread @ observed.T @ scipy.linalg.lstsq(seen + level * np.eye(len(seen)), missing)[0]
+            rows = np.concatenate([observed @ root, np.sqrt(level) * np.eye(self.n_state)])
+            if not np.isfinite(rows).all():
+                return np.asarray(found / scale)
+            right = np.concatenate([missing, np.zeros(self.n_state)])
+            moved = root @ scipy.linalg.lstsq(rows, right)[0]
         return np.asarray(moved if np.isfinite(moved).all() else found / scale)
 
     def _covariance(self, level: float) -> NDArray[np.float64]:
@@ -360,3 +364,11 @@ class StateSpace(AbstractForm):
 
     def _checked(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.scaling.scale_inputs(fitting_columns(inputs, self.n_inputs))
+
+
+def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``R`` with ``R R^T`` a covariance; not a number where that is none."""
+    if not np.isfinite(covariance).all():
+        return np.full_like(covariance, np.nan)
+    sizes, vectors = scipy.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))

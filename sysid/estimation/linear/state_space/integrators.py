@@ -1,4 +1,4 @@
-"""Poles at 1 of a state space without noise: those that the records do not tell from an integrator are held there.
+"""Poles at 1 of a state space: those that the records do not tell from an integrator are held there.
 
 A pole that is a little off 1 has an equilibrium, as far away as it is near: with a state before the record of its own
 it makes a ramp that no input does, and a run from rest is lost. What :mod:`sysid.estimation.linear.integrators` does
@@ -21,6 +21,7 @@ from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.free_runs import free_run_error
 from sysid.estimation.linear.state_space.refinement import Found, Level, Problem, size_of
+from sysid.estimation.linear.subspace.system import foreseeing
 from sysid.models.linear.innovations import Innovations
 
 Array = NDArray[np.float64]
@@ -112,10 +113,10 @@ def _candidates(system: Innovations, near: float) -> Iterator[tuple[Innovations,
             continue
         alone = replace(first, A=linalg.block_diag(np.eye(sums), first.A[sums:, sums:]))
         if sums <= min(system.n_inputs, system.n_outputs):  # as many as can be driven and read side by side
-            yield alone, sums
+            yield foreseeing(alone), sums
         if sums > 1:
             chain = np.eye(sums) + np.triu(first.A[:sums, :sums], 1)
-            yield replace(alone, A=linalg.block_diag(chain, first.A[sums:, sums:])), sums
+            yield foreseeing(replace(alone, A=linalg.block_diag(chain, first.A[sums:, sums:]))), sums
 
 
 def _sums_first(system: Innovations, reach: float, sums: int) -> Innovations | None:

@@ -67,9 +67,10 @@ def search(
             found = found_in(bounded)
             if slow_poles.unseen(found.system.radius, problem.lengths):
                 found = _better(found, found_in(problem), problem)
-            if iterations and zero and orders.intercept:  # without inputs or a constant nothing makes a ramp of them
-                left = began + training.max_time_s - now()
-                found, problem = held_at_one(found, problem, zero, iterations=iterations, seconds=left)
+        if training.stable is None and iterations and zero and orders.intercept:
+            # Without inputs or a constant nothing makes a ramp of them.
+            left = began + training.max_time_s - now()
+            found, problem = held_at_one(found, problem, zero, iterations=iterations, seconds=left)
         errors = None if orders.noise else problem.around_errors(found.system)
         if iterations:
             found = problem.with_colour(found)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
@@ -65,6 +67,21 @@ def _by_riccati(A: Array, C: Array, Q: Array, R: Array, S: Array) -> Array:
         return np.zeros((len(A), len(C)))
     K = np.asarray(linalg.solve(C @ P @ C.T + R, (A @ P @ C.T + S).T, assume_a="pos").T)
     return K if spectral_radius(A - K @ C) < 1.0 else np.zeros_like(K)  # there is next to no noise to tell it from
+
+
+def foreseeing(system: Innovations) -> Innovations:
+    """The same system with a gain whose predictor is stable, for innovations as large in each output.
+
+    Args:
+        system: The system, with a model of the noise or without.
+
+    Returns:
+        It as it is where its predictor is stable, or has no gain.
+    """
+    K, one = system.K, np.eye(system.n_outputs)
+    if not K.any() or system.predictor_radius < EDGE:
+        return system
+    return replace(system, K=_by_riccati(system.A, system.C, K @ K.T, one, K))
 
 
 def stabilised(system: Innovations, largest: float = EDGE) -> Innovations:

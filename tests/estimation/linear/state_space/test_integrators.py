@@ -1,4 +1,4 @@
-"""State spaces without noise of plants that integrate: a pole that records do not tell from 1 is held there.
+"""State spaces of plants that integrate: a pole that records do not tell from 1 is held there.
 
 A little off 1 it had an equilibrium far away, and with a constant of the output a ramp that no input made: runs from
 rest were lost, and nothing said so.
@@ -72,11 +72,32 @@ def test_sums_are_held_at_one_and_a_run_from_rest_is_right(
     assert not [one for one in fit.warnings if "slowest pole" in one]
 
 
-def test_a_slow_lag_stays_one() -> None:
+@pytest.mark.parametrize(
+    ("plant", "sums", "seed"),
+    [
+        pytest.param(LAG, 1, 0, id="behind a lag"),
+        pytest.param(DOUBLE, 2, 0, id="a chain"),
+        pytest.param(DOUBLE, 2, 7, id="a chain, whose old gain has no stable predictor beside poles at 1"),
+    ],
+)
+def test_a_model_of_the_noise_holds_them_too(plant: Plant, sums: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    u, v = held(rng, 800, 6), held(rng, 600, 9)
+    fit = sysid.fit(
+        sysid.data((u, noisy(rng, plant(u), 0.02)), sample_time=T), "u -> y", sysid.LinearStateSpace(states=2)
+    )
+    assert fit.status.usable
+    assert np.std(fit.simulate(v) - plant(v)) < 0.1 * np.std(plant(v))
+    assert np.sort(np.abs(fit.model.system.poles() - 1.0))[sums - 1] < 1e-12
+    assert fit.posterior is not None
+
+
+@pytest.mark.parametrize("noise", [True, False])
+def test_a_slow_lag_stays_one(*, noise: bool) -> None:
     rng = np.random.default_rng(0)
     u = held(rng, 1500, 6)
     traces = sysid.data((u, noisy(rng, SLOW(u), 0.01)), sample_time=T)
-    fit = sysid.fit(traces, "u -> y", sysid.LinearStateSpace(states=1, noise=False))
+    fit = sysid.fit(traces, "u -> y", sysid.LinearStateSpace(states=1, noise=noise))
     assert fit.model.pole_radius == pytest.approx(np.exp(-T / 50.0), abs=1e-4)
 
 
