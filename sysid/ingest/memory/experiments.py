@@ -179,6 +179,8 @@ def _two_dimensional(values: Any, *, where: str) -> NDArray[Any]:
             got=f"{type(values).__name__} of shape {np.shape(array)} and type {array.dtype}",
             remedy="give its real part, array.real, or both parts as channels of their own"
             if array.dtype.kind == "c"
+            else "several experiments are a list of records: list(zip(u, y)) of arrays (experiment, sample, channel)"
+            if array.ndim == 3
             else "give numbers; several experiments are a list of records",
         )
     if not len(array):

@@ -165,6 +165,11 @@ def _filled(layout: Layout) -> int:
 
 def _given_names(names: Sequence[str], layout: Layout, path: Path) -> list[str]:
     width = len(layout.kinds)
+    # A spreadsheet leaves empty columns between tables and remarks; they are no columns of the record.
+    held = layout.names or [""] * width
+    used = [i for i, kind in enumerate(layout.kinds) if held[i] or kind is not Kind.NOTHING]
+    if len(names) == len(used):
+        return [names[used.index(i)] if i in used else "" for i in range(width)]
     if len(names) not in {_filled(layout), width}:
         raise ReaderError(
             "names does not fit the columns",

@@ -13,6 +13,7 @@ from sysid.errors import ReaderError
 from sysid.ingest.readers.joining import joined_signals
 from sysid.ingest.readers.leaves import Leaf, Whole, leaf_of, number_of, refused, texts_of
 from sysid.ingest.readers.records import role_of
+from sysid.ingest.readers.stacks import taken_apart
 from sysid.ingest.tables.joining import Signal
 
 _SECONDS = {
@@ -43,6 +44,7 @@ def understood(node: Any, notes: list[str]) -> Any:
     for is_one, columns in _FORMS:
         if is_one(node):
             return columns(node)
+    node = taken_apart(node, notes) or node
     found = {str(key): understood(value, notes) for key, value in node.items()}
     clocked = [str(key) for key, value in node.items() if isinstance(value, Mapping) and _is_clocked(value)]
     return _on_one_clock(found, clocked, notes) if len(clocked) > 1 else found

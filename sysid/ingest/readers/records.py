@@ -18,7 +18,7 @@ from sysid.ingest.tables.time_columns import recognise_time
 
 _ROLES = {
     "estimation": {"est", "estimation", "estim", "id", "ident", "idn", "identification", "train", "training", "trn"},
-    "validation": {"val", "valid", "validation", "vali", "ver", "verification", "check", "chk"},
+    "validation": {"val", "valid", "validation", "vali", "ver", "verification", "vrf", "vld", "check", "chk"},
     "test": {"test", "testing", "tst"},
     "selection": {"sel", "selection"},
 }

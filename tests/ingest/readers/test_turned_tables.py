@@ -114,15 +114,6 @@ def test_answers_of_data_bases_of_time_series_are_series(tmp_path: Path, apart: 
         loaded(tmp_path / name, u="u", y="y")
 
 
-def test_an_array_of_three_dimensions_is_refused_by_that_and_its_remedy_works(tmp_path: Path) -> None:
-    np.save(tmp_path / "a.npy", np.stack([TABLE, TABLE[::-1]]))
-    with pytest.raises(ReaderError, match="an array of 3 dimensions") as refused:
-        sysid.load(tmp_path / "a.npy")
-    assert "called run_1, run_2" in str(refused.value.remedy)
-    np.savez(tmp_path / "a.npz", run_1=TABLE, run_2=TABLE[::-1])
-    assert [len(record.table) for record in read_table(tmp_path / "a.npz").records] == [N, N]
-
-
 def test_a_clock_beside_a_group_of_signals_is_not_simulinks(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["rec/time"], file["rec/signals/u"], file["rec/signals/y"] = T, U, Y
