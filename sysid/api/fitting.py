@@ -92,9 +92,11 @@ def fit(
     estimators.estimator_of(structure)
     estimators.check_given(initial, stability)
     rest = levels_at_rest(rest_output, mapped.outputs)
+    estimation, selection = traces.estimation, traces.with_role(Role.SELECTION)
+    for trace in estimation:  # before the structure: "u1, u2" as one name would be told as orders that do not match
+        trace.require(mapped.channels)
     structure = structure.for_outputs(len(mapped.outputs))
     chosen = structure.mappings(mapped)
-    estimation, selection = traces.estimation, traces.with_role(Role.SELECTION)
     structure.check_records([one.name for one in estimation], traces.names, start)
     fits: list[Fit] = []
     for one in chosen:

@@ -152,6 +152,19 @@ class Trace:
                 remedy="give one truth value per sample, or one per sample and channel",
             )
 
+    def require(self, names: Sequence[str]) -> None:
+        """Refuse names that no channel has.
+
+        Args:
+            names: Channel names.
+
+        Raises:
+            ChannelError: If one is missing; all missing ones are named.
+        """
+        missing = [name for name in names if name not in self]
+        if missing:
+            raise ChannelError(missing, self.channel_names, where=f"trace {self.name}")
+
     def check_sizes(self, names: Sequence[str]) -> None:
         """Refuse channels whose squares are no numbers any more: no sum of squares, and so no fit, would be right.
 
@@ -162,9 +175,7 @@ class Trace:
             ChannelError: If a channel is missing.
             TraceError: If the largest magnitude of one is neither 0 nor between 1e-150 and 1e150.
         """
-        missing = [name for name in names if name not in self]
-        if missing:
-            raise ChannelError(missing, self.channel_names, where=f"trace {self.name}")
+        self.require(names)
         for name, column in ((name, self[name]) for name in names):
             largest = float(max(column.max(), -column.min()))  # without a copy: records are long
             if not (largest == 0.0 or SMALLEST <= largest <= LARGEST):
@@ -367,9 +378,7 @@ class Trace:
         Raises:
             ChannelError: If one is missing; all missing ones are named.
         """
-        missing = [name for name in names if name not in self.channel_names]
-        if missing:
-            raise ChannelError(missing, self.channel_names, where=f"trace {self.name}")
+        self.require(names)
         return np.ascontiguousarray(self.values[:, [self.index(name) for name in names]])
 
 

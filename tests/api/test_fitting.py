@@ -10,7 +10,7 @@ import pytest
 
 import sysid
 from sysid import api
-from sysid.errors import ConfigError
+from sysid.errors import ChannelError, ConfigError
 from sysid.estimation import fit_arx, fit_narx
 from sysid.export import read_bundle
 from sysid.models import Mapping, Start, StartKind
@@ -37,6 +37,12 @@ def test_the_words_are_there_and_lazy() -> None:
 
 def test_a_single_order_may_be_a_number() -> None:
     assert sysid.ARX(na=2, nb=2, nk=3) == sysid.ARX(na=2, nb=(2,), nk=(3,))
+
+
+def test_a_list_with_commas_is_a_missing_channel_and_not_orders_that_do_not_match(traces: TraceSet) -> None:
+    with pytest.raises(ChannelError, match="missing channel u, y") as refused:
+        sysid.fit(traces, "u, y -> y", sysid.ARX(na=1, nb=(1, 1), nk=(1, 1)))
+    assert "write u+y in a mapping" in str(refused.value.remedy)
 
 
 def test_an_unknown_word_is_an_attribute_error() -> None:
