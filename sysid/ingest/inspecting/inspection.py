@@ -17,6 +17,7 @@ from sysid.ingest.inspecting.attempts import Attempt, read_somehow
 from sysid.ingest.inspecting.column_findings import column_finding
 from sysid.ingest.inspecting.events import are_events
 from sysid.ingest.inspecting.findings import CaseFinding, ColumnFinding, FileFinding, counted, listed
+from sysid.ingest.inspecting.over_frequency import frequencies_in, over_frequency
 from sysid.ingest.inspecting.restarts import finer_than_clock, of_few_digits, records_by_clock
 from sysid.ingest.inspecting.second_clocks import without_second_clocks
 from sysid.ingest.inspecting.time_findings import find_time, finite_of, needs_of_time, step_beside, without_copies
@@ -129,6 +130,8 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         told_apart = tuple(replace(c, aside="says the sample time") if c.name == said[0] else c for c in told_apart)
         if clock.time.step == said[1] and not table.step:
             notes = (*notes, f"sample time {clock.step:g} s, from column {said[0]}")
+    frequencies = frequencies_in(table.columns) if clock.time.column is None and table.step is None else None
+    notes = (*notes, over_frequency(frequencies)) if frequencies is not None else notes
     columns = tuple(column_finding(column) for column in told_apart if column.name != clock.column) + others
     needed = {
         "ragged": repairs.ragged,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.ingest.assembling.timing import Timing, even_step, round_step, rounded_step, survey
 from sysid.ingest.cells.headers import unit_in_name
+from sysid.ingest.inspecting.over_frequency import frequencies_in
 from sysid.ingest.inspecting.second_clocks import counts_rows
 from sysid.ingest.readers.leaves import step_in
 from sysid.ingest.tables.clocks import clock_of, since_1970
@@ -105,11 +106,17 @@ def finite_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _rising(columns: Sequence[RawColumn]) -> str | None:
     """A column that rises like a clock: nearly always, and by much the same step, or from 1970 on."""
+    frequencies = frequencies_in(columns)
     # A clock goes before a counter, and one that says the date before any.
     for column in sorted(columns, key=lambda c: (not since_1970(c.values), is_counter(c.name) or counts_rows(c))):
         with np.errstate(invalid="ignore"):
             steps = np.diff(column.values)
-        if column.problem is not None or not len(steps) or np.mean(steps > 0.0) < _RISING_SHARE:
+        if (
+            column is frequencies
+            or column.problem is not None
+            or not len(steps)
+            or np.mean(steps > 0.0) < _RISING_SHARE
+        ):
             continue
         usual = np.median(steps)
         if since_1970(column.values) or np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
