@@ -1,7 +1,7 @@
 """The functions of the language: what each takes, and the operations that it becomes.
 
 A function is a row of :data:`FUNCTIONS`. Those that remember (``relay``, ``latch``, ``hold``) and ``net`` have states
-or weights of their own, and are in :mod:`sysid.equations.lowering`.
+or weights of their own, and become operations in :mod:`sysid.equations.lowering`.
 """
 
 from __future__ import annotations
@@ -30,21 +30,42 @@ class Values(Protocol):
         """A switch on a value."""
 
 
+ALIKE, PURE, ANGLE, SECONDS, ANY = "alike", "pure", "angle", "seconds", ""
+"""Units of arguments and values: one unit for all that are alike, a pure number, radians, seconds, and what may be."""
+ROOT = "root"
+"""The unit of a value that is the square root of its argument's."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Function:
     """A function.
 
     Args:
         arguments: Names of its arguments, in order.
-        lower: Its operations.
-        more: Whether there may be more arguments than have names.
         says: What it is, for people.
+        lower: Its operations; ``None`` where it has states or weights of its own.
+        units: What each argument is in; the last one is that of all that may follow.
+        gives: What its value is in.
+        more: Whether there may be more arguments than have names.
     """
 
     arguments: tuple[str, ...]
-    lower: Callable[..., int]
     says: str
+    lower: Callable[..., int] | None = None
+    units: tuple[str, ...]
+    gives: str
     more: bool = False
+
+    def unit_of(self, place: int) -> str:
+        """What an argument is in.
+
+        Args:
+            place: Which, from 0.
+
+        Returns:
+            One of the kinds above.
+        """
+        return self.units[min(place, len(self.units) - 1)]
 
 
 def _unary(operation: int) -> Callable[[Values, int], int]:
@@ -91,46 +112,94 @@ def _log10(g: Values, x: int) -> int:
     return g.apply(machine.MUL, g.constant(1.0 / math.log(10.0)), g.apply(machine.LOG, x))
 
 
-_X = ("x",)
-LIMITS = ("x", "low", "high")
+_X, _ONE_UNIT = ("x",), (ALIKE,)
+LIMITS, _ONE_UNIT_EACH = ("x", "low", "high"), (ALIKE, ALIKE, ALIKE)
 """What a function takes that has limits."""
 
+
+def _of_number(lower: Callable[..., int], says: str, units: str = PURE) -> Function:
+    """A function that makes a pure number of one."""
+    return Function(arguments=_X, lower=lower, units=(units,), gives=PURE, says=says)
+
+
+def _limited(lower: Callable[..., int], says: str) -> Function:
+    return Function(arguments=LIMITS, lower=lower, units=_ONE_UNIT_EACH, gives=ALIKE, says=says)
+
+
+def _most(operation: int, says: str) -> Function:
+    return Function(arguments=("a", "b"), lower=_many(operation), units=_ONE_UNIT, gives=ALIKE, more=True, says=says)
+
+
 FUNCTIONS: dict[str, Function] = {
-    "abs": Function(arguments=_X, lower=_unary(machine.ABS), says="magnitude"),
+    "abs": Function(arguments=_X, lower=_unary(machine.ABS), units=_ONE_UNIT, gives=ALIKE, says="magnitude"),
     "sqrt": Function(
-        arguments=_X, lower=lambda g, x: g.switch(machine.SQRT, x), says="square root; 0 of what is below 0"
+        arguments=_X,
+        lower=lambda g, x: g.switch(machine.SQRT, x),
+        units=_ONE_UNIT,
+        gives=ROOT,
+        says="square root; 0 of what is below 0",
     ),
-    "exp": Function(arguments=_X, lower=_unary(machine.EXP), says="exponential"),
-    "log": Function(arguments=_X, lower=_unary(machine.LOG), says="natural logarithm"),
-    "log10": Function(arguments=_X, lower=_log10, says="decimal logarithm"),
-    "tanh": Function(arguments=_X, lower=_unary(machine.TANH), says="hyperbolic tangent"),
-    "sinh": Function(arguments=_X, lower=_hyperbolic(machine.SUB), says="hyperbolic sine"),
-    "cosh": Function(arguments=_X, lower=_hyperbolic(machine.ADD), says="hyperbolic cosine"),
-    "sin": Function(arguments=_X, lower=_unary(machine.SIN), says="sine, of radians"),
-    "cos": Function(arguments=_X, lower=_unary(machine.COS), says="cosine, of radians"),
-    "tan": Function(arguments=_X, lower=_tan, says="tangent, of radians"),
-    "atan": Function(arguments=_X, lower=_unary(machine.ATAN), says="arc tangent, in radians"),
-    "min": Function(arguments=("a", "b"), lower=_many(machine.MIN), more=True, says="the least"),
-    "max": Function(arguments=("a", "b"), lower=_many(machine.MAX), more=True, says="the greatest"),
-    "sign": Function(arguments=_X, lower=lambda g, x: g.switch(machine.SIGN, x), says="-1, 0 or 1"),
-    "clamp": Function(arguments=LIMITS, lower=_clamp, says="held within limits"),
-    "saturate": Function(arguments=LIMITS, lower=_clamp, says="the same as clamp"),
-    "deadzone": Function(arguments=LIMITS, lower=_deadzone, says="0 between limits, and what is beyond them"),
-    "where": Function(arguments=("condition", "yes", "no"), lower=_where, says="one of two, by a condition"),
+    "exp": _of_number(_unary(machine.EXP), "exponential"),
+    "log": _of_number(_unary(machine.LOG), "natural logarithm"),
+    "log10": _of_number(_log10, "decimal logarithm"),
+    "tanh": _of_number(_unary(machine.TANH), "hyperbolic tangent"),
+    "sinh": _of_number(_hyperbolic(machine.SUB), "hyperbolic sine"),
+    "cosh": _of_number(_hyperbolic(machine.ADD), "hyperbolic cosine"),
+    "sin": _of_number(_unary(machine.SIN), "sine, of radians", ANGLE),
+    "cos": _of_number(_unary(machine.COS), "cosine, of radians", ANGLE),
+    "tan": _of_number(_tan, "tangent, of radians", ANGLE),
+    "atan": _of_number(_unary(machine.ATAN), "arc tangent, in radians"),
+    "min": _most(machine.MIN, "the least"),
+    "max": _most(machine.MAX, "the greatest"),
+    "sign": Function(
+        arguments=_X, lower=lambda g, x: g.switch(machine.SIGN, x), units=_ONE_UNIT, gives=PURE, says="-1, 0 or 1"
+    ),
+    "clamp": _limited(_clamp, "held within limits"),
+    "saturate": _limited(_clamp, "the same as clamp"),
+    "deadzone": _limited(_deadzone, "0 between limits, and what is beyond them"),
+    "where": Function(
+        arguments=("condition", "yes", "no"),
+        lower=_where,
+        units=(ANY, ALIKE, ALIKE),
+        gives=ALIKE,
+        says="one of two, by a condition",
+    ),
+    "relay": Function(
+        arguments=("x", "on", "off"),
+        units=_ONE_UNIT_EACH,
+        gives=PURE,
+        says="relay(x, on=2, off=1): 1 from above on until below off, then 0",
+    ),
+    "latch": Function(
+        arguments=("set", "reset"),
+        units=(ANY, ANY),
+        gives=PURE,
+        says="latch(set, reset): 1 from when set holds until reset holds",
+    ),
+    "hold": Function(
+        arguments=("x", "when"),
+        units=(ALIKE, ANY),
+        gives=ALIKE,
+        says="hold(x, when): x where the condition holds, and what it was then afterwards",
+    ),
+    "net": Function(
+        arguments=_X,
+        units=(ANY,),
+        gives=ANY,
+        more=True,
+        says="net(x1, u, neurons=8): a network, for what is not known",
+    ),
+    "delay": Function(
+        arguments=("x", "tau"), units=(ALIKE, SECONDS), gives=ALIKE, says="delay(x, 0.5): x some seconds ago"
+    ),
 }
 """By name."""
 
+OWN = {name: one for name, one in FUNCTIONS.items() if one.lower is None}
+"""Functions that have states or weights of their own."""
+
 CONSTANTS = {"pi": math.pi}
 """Names of numbers."""
-
-OWN = {
-    "relay": "relay(x, on=2, off=1): 1 from above on until below off, then 0",
-    "latch": "latch(set, reset): 1 from when set holds until reset holds",
-    "hold": "hold(x, when): x where the condition holds, and what it was then afterwards",
-    "net": "net(x1, u, neurons=8): a network, for what is not known",
-    "delay": "delay(x, 0.5): x some seconds ago",
-}
-"""Functions that have states or weights of their own, and how each is written."""
 
 
 MOST_FACTORS = 4

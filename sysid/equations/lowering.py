@@ -103,9 +103,11 @@ class _Lowering(Names):
         arguments = [self.value(one) for one in node.parts]
         if name in self.terms.tables:
             return self.apply(machine.TABLE, arguments[0], own=list(self.terms.tables).index(name))
-        if FUNCTIONS[name].arguments == LIMITS:
+        function = FUNCTIONS[name]
+        assert function.lower is not None  # noqa: S101 - those without are OWN
+        if function.arguments == LIMITS:
             self._check_limits(node, *map(self.value_of, arguments[1:]))
-        return FUNCTIONS[name].lower(self, *arguments)
+        return function.lower(self, *arguments)
 
     def _check_limits(self, node: Call, low: float | None, high: float | None) -> None:
         if low is not None and high is not None and low > high:
@@ -117,8 +119,9 @@ class _Lowering(Names):
                 remedy=f"exchange them: {high:g}, {low:g}",
             )
 
-    def _taken(self, node: Call, names: tuple[str, ...]) -> list[Node]:
+    def _taken(self, node: Call) -> list[Node]:
         """Arguments and options of a function with states, in order."""
+        names = OWN[node.function].arguments
         options = dict(node.options)
         found = list(node.arguments) + [options[name] for name in names[len(node.arguments) :] if name in options]
         if len(found) != len(names) or len(node.parts) != len(names):
@@ -126,7 +129,7 @@ class _Lowering(Names):
                 f"{node.function} takes {', '.join(names)}",
                 self.system.text,
                 node.at,
-                expected=OWN[node.function],
+                expected=OWN[node.function].says,
                 remedy="give it those",
             )
         return found
@@ -151,14 +154,14 @@ class _Lowering(Names):
         return self.remembering[key]
 
     def _relay(self, node: Call) -> int:
-        x, on, off = (self.value(one) for one in self._taken(node, ("x", "on", "off")))
+        x, on, off = (self.value(one) for one in self._taken(node))
         upper, lower_ = self.value_of(on), self.value_of(off)
         if upper is not None and lower_ is not None and lower_ > upper:
             raise equation_error(
                 "the relay goes off above where it goes on",
                 self.system.text,
                 node.at,
-                expected=OWN["relay"],
+                expected=OWN["relay"].says,
                 remedy="exchange on and off; for the opposite write 1 - relay(...)",
             )
         set_ = self.switch(machine.GREATER, self.apply(machine.SUB, x, on))
@@ -166,7 +169,7 @@ class _Lowering(Names):
         return self._remember("relay", (x, on, off), lambda before: self._set_or_kept(set_, kept, before))
 
     def _latch(self, node: Call) -> int:
-        set_, reset = (self.value(one) for one in self._taken(node, ("set", "reset")))
+        set_, reset = (self.value(one) for one in self._taken(node))
         kept = self.apply(machine.SUB, self.constant(1.0), reset)
         return self._remember("latch", (set_, reset), lambda before: self._set_or_kept(set_, kept, before))
 
@@ -175,11 +178,11 @@ class _Lowering(Names):
         return self.apply(machine.SELECT, set_, self.constant(1.0), still)
 
     def _hold(self, node: Call) -> int:
-        x, when = (self.value(one) for one in self._taken(node, ("x", "when")))
+        x, when = (self.value(one) for one in self._taken(node))
         return self._remember("hold", (x, when), lambda before: self.apply(machine.SELECT, when, x, before))
 
     def _delay(self, node: Call) -> int:
-        inside, seconds = self._taken(node, ("x", "tau"))
+        inside, seconds = self._taken(node)
         lag = self.samples(node, self._number(seconds, "a delay"))
         value = self.value(inside)
         if lag == 0.0:

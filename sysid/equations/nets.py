@@ -35,7 +35,7 @@ def asked(node: Call, text: str, number: Callable[[Node, str], float]) -> tuple[
             "a network takes what it sees, and neurons",
             text,
             node.at,
-            expected=f"{OWN['net']}, and a scale where one is known",
+            expected=f"{OWN['net'].says}, and a scale where one is known",
             remedy="write for example net(x, u, neurons=5)",
         )
     neurons = number(options["neurons"], "neurons")

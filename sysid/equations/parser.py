@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from sysid.equations.functions import CONSTANTS, FUNCTIONS, OWN
+from sysid.equations.functions import CONSTANTS, FUNCTIONS
 from sysid.equations.lexer import Word, words_of
 from sysid.equations.syntax import (
     CONTINUOUS,
@@ -276,7 +276,7 @@ class _Parser:
     def _past(self, word: Word) -> Node:
         """``u(t)`` or ``u(t - 0.5)``, from ``t`` on."""
         time = self.take()
-        if word.kind == "name" and word.text in {*FUNCTIONS, *OWN}:
+        if word.kind == "name" and word.text in FUNCTIONS:
             raise self._no_time(time)
         if self.now.text == ")":
             self.take()

@@ -238,7 +238,7 @@ class System:
                     remedy=f"leave the names out: {name}({', '.join(wanted)})",
                 )
             return
-        known = (*FUNCTIONS, *OWN, *self.tables)
+        known = (*FUNCTIONS, *self.tables)
         value = name in {*self.states, *self.definitions, *self.parameters}
         raise equation_error(
             f"there is no function {name}",
@@ -303,7 +303,7 @@ MOST_DEFINITIONS = 300
 """Names that are computed from others: they may need each other in a row."""
 
 
-WORDS = frozenset({*FUNCTIONS, *OWN, *CONSTANTS, *RESERVED})
+WORDS = frozenset({*FUNCTIONS, *CONSTANTS, *RESERVED})
 """Words of the language: in double quotes they are names like any other."""
 
 

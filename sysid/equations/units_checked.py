@@ -13,6 +13,7 @@ from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeAlias
 
+from sysid.equations.functions import ALIKE, ANGLE, ANY, FUNCTIONS, PURE, ROOT, SECONDS, Function
 from sysid.equations.syntax import CONTINUOUS, Call, Delayed, Equation, Name, Node, Number, Operation, nodes_of
 from sysid.equations.system import System
 from sysid.equations.written import written
@@ -22,19 +23,7 @@ _SAME: Final = 1e-3
 """Units of one thing are the same up to this: some have been rounded differently, as psi in Pa."""
 _PURE: Final = frozenset({1.0, 2.0, 3.0, 4.0, 0.5, 0.25, math.pi})
 """Factors that are of geometry, and convert nothing."""
-_ALIKE: Final = {
-    "min": (0, 1), "max": (0, 1), "clamp": (0, 1, 2), "saturate": (0, 1, 2), "deadzone": (0, 1, 2),
-    "where": (1, 2), "relay": (0, 1, 2),
-}  # fmt: skip
-"""Arguments, in order and by name, that are of one unit; of ``min`` and ``max`` all are."""
-_KEPT: Final = frozenset({"min", "max", "clamp", "saturate", "deadzone", "where", "abs", "hold", "delay"})
-"""Functions whose value has the unit of what they are of."""
-_NUMBERS: Final = frozenset({"exp", "log", "log10", "tanh", "sinh", "cosh", "sin", "cos", "tan", "atan"})
-"""Functions of pure numbers."""
 _SUMS, _PRODUCTS, _POWERS, _LOGIC = ("+", "-"), ("*", "/"), ("^", "**"), ("and", "or")
-_ANGLES: Final = frozenset({"sin", "cos", "tan"})
-_PURE_VALUES: Final = _NUMBERS | {"sign", "relay", "latch"}
-"""Functions whose value is a pure number."""
 
 
 @dataclass(frozen=True)
@@ -210,34 +199,35 @@ class _Check:
         return first[1] if first and not apart else None
 
     def _call(self, node: Call) -> _Known:
-        name = node.function
-        if name in self.system.tables or name == "net":
-            for one in node.parts:
-                self.unit(one)
-            return None
-        if name in _ALIKE:
-            chosen = range(len(node.parts)) if name in {"min", "max"} else _ALIKE[name]
-            common = self._alike([one for i, one in enumerate(node.parts) if i in chosen])
-            for i, one in enumerate(node.parts):
-                if i not in chosen:
-                    self.unit(one)
-            return common if name in _KEPT else _number()
-        inside = [self.unit(one) for one in node.parts]
-        if name in _NUMBERS and inside[0]:
-            self._pure(node, inside[0])
-        if name == "delay" and len(inside) > 1 and (late := inside[1]) and late.contradicts(_Unit(registry().second)):
-            self.told.append(f"{written(node)} is late by what is in {late}: seconds are meant.")
-        if name == "sqrt" and inside[0]:
-            return _Unit(inside[0].of ** 0.5, inside[0].exact)
-        if name in _PURE_VALUES:
+        one = FUNCTIONS.get(node.function, FUNCTIONS["net"])  # of a table nobody knows what it makes of what
+        alike: list[Node] = []
+        for asked, part in _asked(one, node):
+            if asked == ALIKE:
+                alike.append(part)
+            elif found := self.unit(part):
+                self._as_asked(node, found, asked)
+        common = self._alike(alike)
+        if one.gives == PURE:
             return _number()
-        return inside[0] if name in _KEPT else None
+        if one.gives == ROOT and common:
+            return _Unit(common.of**0.5, common.exact)
+        return common if one.gives == ALIKE else None
 
-    def _pure(self, node: Call, unit: _Unit) -> None:
-        if unit.of.dimensionality:
+    def _as_asked(self, node: Call, unit: _Unit, asked: str) -> None:
+        """Tell of an argument that is not what its function is of."""
+        if asked == SECONDS and unit.contradicts(_Unit(registry().second)):
+            self.told.append(f"{written(node)} is late by what is in {unit}: seconds are meant.")
+        elif asked in {PURE, ANGLE} and unit.of.dimensionality:
             self.told.append(f"{written(node)} is of what is in {unit}, where a pure number is meant.")
-        elif node.function in _ANGLES and unit.contradicts(_Unit(registry().radian)):
+        elif asked == ANGLE and unit.contradicts(_Unit(registry().radian)):
             self.told.append(f"{written(node)} is of what is in {unit}: radians are meant.")
+
+
+def _asked(function: Function, node: Call) -> list[tuple[str, Node]]:
+    """Arguments, each with what its function takes it to be in: those by name by theirs, in whatever order."""
+    by_name = dict(zip(function.arguments, map(function.unit_of, range(len(function.arguments))), strict=True))
+    found = [(function.unit_of(place), one) for place, one in enumerate(node.arguments)]
+    return found + [(by_name.get(name, ANY), one) for name, one in node.options]
 
 
 def _chain(node: Operation, operators: Collection[str]) -> list[tuple[str, Node]]:

@@ -31,8 +31,8 @@ from sysid.equations.written import rewritten, written
 from sysid.errors import ConfigError
 from sysid.models import Mapping
 
-_REMEMBER = {"relay": ("x", "on", "off"), "latch": ("set", "reset"), "hold": ("x", "when")}
-"""What each function reads that may be the whole of an equation."""
+_REMEMBER = frozenset({"relay", "latch", "hold"})
+"""Functions that may be the whole of an equation."""
 
 _COMPARED = frozenset({"<", "<=", ">", ">=", "and", "or", "not"})
 
@@ -160,7 +160,7 @@ def _without_memory(node: Node, name: str, text: str) -> Node:
     """A relay, a latch or a value that is held, by what the output was a sample ago."""
     if not isinstance(node, Call) or node.function not in _REMEMBER:
         return node
-    names = _REMEMBER[node.function]
+    names = OWN[node.function].arguments
     if node.function == "relay" and len(node.parts) > len(names):
         names = (*names, "slope")
     given = dict(zip(names, node.arguments, strict=False)) | dict(node.options)
@@ -169,7 +169,7 @@ def _without_memory(node: Node, name: str, text: str) -> Node:
             f"{node.function} has other arguments",
             text,
             node.at,
-            expected=OWN[node.function] + ("; or with a slope" if node.function == "relay" else ""),
+            expected=OWN[node.function].says + ("; or with a slope" if node.function == "relay" else ""),
             remedy="give each of them once",
         )
     before = Delayed(name=name, lag=1.0, seconds=False, at=node.at)
