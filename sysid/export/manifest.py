@@ -114,7 +114,7 @@ def describe(
         "n_parameters": source.n_parameters,
         "state": surrogate.state_text(),
         "initialisation": _initialisation(surrogate, example_of(traces)),
-        "fit": stages[0]["fit"] if single else None,
+        "fit": stages[0]["fit"] if len(stages) == 1 else None,
         "cases_start": _begun(start, several=not single),
         "metrics": None if metrics is None else _metrics(metrics),
         "provenance": {**provenance, "data": _data(recorded or traces), "software": software()},

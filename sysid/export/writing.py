@@ -116,7 +116,8 @@ def export_bundle(
     known = dict(fits or {}) if isinstance(fit, Cascade) else {str(fit.model.mapping): fit}
     surrogate = _surrogate(source, traces, outputs)
     cases, sequences = parity_cases(surrogate, traces, start or Start()), random_cases(surrogate)
-    stability = None if source.single is None else check_free_run(source.single, traces)
+    alone = source.models[0].single if len(source.models) == 1 else None
+    stability = None if alone is None else check_free_run(alone, traces)
     manifest = describe(
         surrogate, known, traces, start=start, metrics=metrics, provenance=provenance or {}, recorded=recorded
     )

@@ -26,6 +26,7 @@ class ExportConfig(BaseModel):
         case: Of parameters that differ by case, the case whose values the files have; by default they are inputs.
         unstable: Whether a fit whose free run is unstable (status ``UNSTABLE``) may leave. Without, ``best`` is the
             best of the others, and nothing is exported where there is none.
+        rest: What inputs stood at before a run from rest, by channel, in their units; by default what they begin at.
     """
 
     model_config = STRICT
@@ -36,6 +37,7 @@ class ExportConfig(BaseModel):
     run_times: bool = False
     case: str | None = None
     unstable: bool = True
+    rest: dict[str, float] = Field(default_factory=dict)
 
 
 class ReportConfig(BaseModel):

@@ -309,18 +309,20 @@ def export(
     if config.export is None:
         raise ConfigError("the pipeline exports nothing", where=config.name, remedy="add export: {fit: best}")
     figures = {output: one.evaluation for output, one in scores.items()}
-    several, case = len(fits) > 1, config.export.case
+    several, case = len(fits) > 1 or bool(config.export.rest), config.export.case
     if case is not None:
         fits = [for_case(fit, case) for fit in fits]
     return export_bundle(
-        Cascade(models=tuple(fit.model for fit in fits)) if several else fits[0],
+        Cascade(models=tuple(fit.model for fit in fits), rest=dict(config.export.rest)) if several else fits[0],
         data.traces,
         folder,
         start=config.start,
         outputs=config.mapping.outputs if several else None,
         formats=wanted_formats(config.export.formats).names,
         tolerance=config.export.tolerance,
-        metrics=next(iter(figures.values())) if len(figures) == 1 else CascadeEvaluation(outputs=figures, activity={}),
+        metrics=CascadeEvaluation(outputs=figures, activity={})
+        if several or len(figures) > 1
+        else figures.popitem()[1],
         fits={str(fit.model.mapping): fit for fit in fits} if several else None,
         provenance=provenance,
     )

@@ -22,13 +22,14 @@ from sysid.references.runs import Case, Outcome, Progress, ReferenceRuns
 from sysid.references.told import reasons_of
 from sysid.reporting.judging.results import CurveRecord, JudgementRecord, QuantityRecord, SceneRecord
 from sysid.traces import TraceSet
+from sysid.workbench.surrogates.beginning import begun_elsewhere
 
 SEED = 77_001
 """Of the proof, behind the design's: no experiment that taught is drawn from it."""
 DRAWN, POINTS = (3, 10), 400
 """The worst experiments that are drawn: a tenth of them, but so many at least and at most; and points of a line."""
-FEWEST = 20
-"""Experiments of a proof, whatever the time."""
+FEWEST, ELSEWHERE = 20, 6
+"""Experiments of a proof, whatever the time; and of those that begin elsewhere, of which there are a tenth as many."""
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
 
 
@@ -52,6 +53,8 @@ class Proof:
         dropped_s: Processor seconds of that run.
         dropped_reference_s: Of the reference on the same experiment.
         drawn: How many of the worst are drawn, at most.
+        elsewhere: Errors, as ``errors``, of experiments that begin at other inputs than all others do; ``None`` where
+            there are none.
     """
 
     errors: NDArray[np.float64]
@@ -68,6 +71,7 @@ class Proof:
     dropped_s: float = float("nan")
     dropped_reference_s: float = float("nan")
     drawn: int = DRAWN[1]
+    elsewhere: NDArray[np.float64] | None = None
 
     @property
     def share(self) -> float:
@@ -78,6 +82,16 @@ class Proof:
     def share_everywhere(self) -> float:
         """Share in which every output is at every sample."""
         return float((self.largest <= self.tolerance).all(axis=1).mean())
+
+    @property
+    def n_elsewhere(self) -> int:
+        """Experiments that begin at other inputs than all others do."""
+        return 0 if self.elsewhere is None else len(self.elsewhere)
+
+    @property
+    def share_elsewhere(self) -> float:
+        """Share within the tolerance of those that begin at other inputs; NaN without any."""
+        return float("nan") if self.elsewhere is None else float((self.elsewhere <= self.tolerance).all(axis=1).mean())
 
     @property
     def diverged(self) -> int:
@@ -103,6 +117,11 @@ class Proof:
                 else ""
             )
         ]
+        if self.elsewhere is not None:
+            told.append(
+                f"Of {self.n_elsewhere} more that begin at other inputs than those do, "
+                f"{100.0 * self.share_elsewhere:.1f} % are"
+            )
         for name, values in self.quantiles().items():
             said = ", ".join(f"{q:.0%}: {100.0 * v:.3g} %" for q, v in zip(QUANTILES, values, strict=True))
             told.append(f"Error of {name} by quantile, as a share of its range: {said}")
@@ -189,7 +208,10 @@ def prove(
     """
     cases = drawn_cases(config, design, count, seed=(design.seed, SEED), prefix="N")
     with ReferenceRuns(config=config, workers=workers) as runs:
-        done = runs.run(cases, progress, until=_begun_until(until, bundle, runs, cases[0]), fewest=FEWEST)
+        ends = _begun_until(until, bundle, runs, cases[0])
+        done = runs.run(cases, progress, until=ends, fewest=FEWEST)
+        others = begun_elsewhere(config, cases[: max(ELSEWHERE, count // 10)])
+        begun = [one for one in runs.run(others, until=ends, fewest=ELSEWHERE) if one.trace is not None]
     there = [one for one in done if one.trace is not None]
     if not there:
         raise ConfigError(
@@ -201,15 +223,12 @@ def prove(
     spans = np.where(spans > 0.0, spans, 1.0)
     began, runs_of = time.process_time(), [_run(bundle, config, one.case) for one in there]
     spent = (time.process_time() - began) / len(there)
-    errors, largest = [], []
-    for one, found in zip(there, runs_of, strict=True):
-        assert one.trace is not None  # noqa: S101 - checked above
-        measured = one.trace.columns(outputs)
-        errors.append(rms_shares(found, measured, spans))
-        largest.append(_shares(found, measured, spans).max(axis=0))
+    off = [_shares(found, _measured(one, outputs), spans) for one, found in zip(there, runs_of, strict=True)]
+    elsewhere = [rms_shares(_run(bundle, config, one.case), _measured(one, outputs), spans) for one in begun]
     dropped = _drop_in(bundle, config, there[0], runs_of[0], spans)
     proof = Proof(
-        errors=np.array(errors), largest=np.array(largest), outcomes=there, failed=len(done) - len(there),
+        errors=np.array([_rms(one) for one in off]), largest=np.array([one.max(axis=0) for one in off]),
+        elsewhere=np.array(elsewhere) if elsewhere else None, outcomes=there, failed=len(done) - len(there),
         why=reasons_of(done), tolerance=tolerance, outputs=outputs, spans=spans, surrogate_s=max(spent, 1e-7),
         reference_s=float(np.nanmean([one.cpu_s for one in there])), drawn=min(drawn, DRAWN[1]), **dropped,
     )  # fmt: skip
@@ -248,7 +267,16 @@ def rms_shares(
     Returns:
         Shape ``(n_outputs,)``; infinite where the run left all numbers.
     """
-    return np.asarray(np.sqrt(np.mean(_shares(found, measured, spans) ** 2, axis=0)))
+    return _rms(_shares(found, measured, spans))
+
+
+def _rms(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(np.mean(shares**2, axis=0)))
+
+
+def _measured(one: Outcome, outputs: Sequence[str]) -> NDArray[np.float64]:
+    assert one.trace is not None  # noqa: S101 - those without have been left out
+    return one.trace.columns(outputs)
 
 
 def surrogate_inputs(config: ReferenceConfig, case: Case) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -71,6 +72,27 @@ def unlike(folder: Path) -> list[str]:
     with suppress(OSError):
         return [read_bounded(folder / UNLIKE).decode(errors="replace").strip()]
     return []
+
+
+def elsewhere(shown: Proof, begun: Dict[str, float]) -> list[str]:
+    """That a surrogate is poor where its inputs begin at others than in its experiments; nothing of one that is not.
+
+    Args:
+        shown: How it does on new experiments.
+        begun: What the inputs begin at in these.
+
+    Returns:
+        A sentence, or none.
+    """
+    chance = 2.0 * (shown.share * (1.0 - shown.share) / max(shown.n_elsewhere, 1)) ** 0.5
+    if not shown.share_elsewhere < min(GOOD, shown.share - chance):
+        return []
+    at = ", ".join(f"{name} {value:.6g}" for name, value in begun.items())
+    return [
+        f"begun at other inputs than {at} only {100.0 * shown.share_elsewhere:.0f} % of {shown.n_elsewhere} "
+        f"new experiments are within {100.0 * shown.tolerance:g} %: begin its runs there, or say settling, which lets "
+        "every experiment begin at rest"
+    ]
 
 
 def poor(shown: Proof, minutes: float, needs_s: float = 0.0) -> list[str]:

@@ -42,13 +42,14 @@ from sysid.workbench.fits.config import PipelineConfig
 from sysid.workbench.fits.data import data_of
 from sysid.workbench.runner.events import StepDone, StepProgress, StepStarted, Watcher
 from sysid.workbench.runner.program import Program
+from sysid.workbench.surrogates.beginning import stood_at
 from sysid.workbench.surrogates.grown import GROWN, Ground, grow
 from sysid.workbench.surrogates.grown import program_of as grown_program
 from sysid.workbench.surrogates.known import pipeline_of
 from sysid.workbench.surrogates.known import program_of as known_program
 from sysid.workbench.surrogates.plan import PROOF, RUNNING, SEARCHING, Times, times
 from sysid.workbench.surrogates.proof import FEWEST, Proof, fmu_of, prove
-from sysid.workbench.surrogates.told import beginning_of, failed, restless, unlike, without_effect
+from sysid.workbench.surrogates.told import beginning_of, elsewhere, failed, restless, unlike, without_effect
 from sysid.workbench.written import Written
 from sysid.yaml_files import read_yaml
 
@@ -192,7 +193,7 @@ class Work:
         grower, grown = grow(ground, self.growth, searched, seconds=seconds, say=self.say)
         place = self.folder / (GROWN if grown.best.added else "model")
         if grown.best.added:
-            self.perform(grown_program(ground, grower, grown, EXPORT), place)
+            self.perform(grown_program(ground, grower, grown, self.export(found)), place)
         else:
             write_record(place / FILE, grown.record)
         return place, grown.record.sentence
@@ -203,6 +204,12 @@ class Work:
         if page.stat().st_mtime < (place / FOLDER / "proof.json").stat().st_mtime:
             page = write_report(place)
         return page
+
+    def export(self, found: Experimented) -> dict[str, Any]:
+        """What leaves the workbench, begun where the reference begins."""
+        fitted = found.traces.with_role(Role.ESTIMATION)
+        spans = [span_of(fitted, name) for name in self.mapping.outputs]
+        return {**EXPORT, "rest": stood_at(self.reference, found.outcomes["estimation"][0].case, spans)}
 
     def delivered(self, place: Path) -> Path | None:
         """The FMU where it is looked for, beside the folders; ``None`` where there is none."""
@@ -218,7 +225,11 @@ class Work:
         """What the surrogate itself shows: where it begins, and what moves none of its outputs."""
         moving = not self.config.fits and restless(found, self.mapping)
         begun = beginning_of(bundle, found.traces.with_role(Role.SELECTION)) if moving else []
-        return [*begun, *without_effect(bundle, found.traces.with_role(Role.ESTIMATION), shown)]
+        inputs = {name: port.begin for name, port in self.reference.inputs.items()}
+        return [
+            *begun, *elsewhere(shown, inputs),
+            *without_effect(bundle, found.traces.with_role(Role.ESTIMATION), shown),
+        ]  # fmt: skip
 
     def searched(
         self, found: Experimented, minutes: float, before_page: Callable[[], object] | None, *, whole: float
@@ -229,7 +240,7 @@ class Work:
             **{"mapping": self.mapping, "start": Start(), "rest": dict(found.before), "seed": self.seed},
             **({"iterations": self.iterations} if self.iterations else {"minutes": minutes}),
             **{"workers": self.config.workers, "tolerance": TOLERANCE},
-            **{"export": EXPORT, "report": {"drawn": drawn_in(60.0 * whole, len(self.mapping.outputs))}},
+            **{"export": self.export(found), "report": {"drawn": drawn_in(60.0 * whole, len(self.mapping.outputs))}},
         }
         search = check(AutoConfig, fields, where=self.pipeline)
         auto = replace(auto_of(search, load=lambda: data_of(found.traces, self.mapping)), before_page=before_page)
@@ -241,7 +252,8 @@ class Work:
         seconds = None if minutes is None or self.iterations else 60.0 * minutes
         return pipeline_of(
             self.config, self.mapping, where=self.pipeline, data=data, rest={} if found is None else found.before,
-            seconds=seconds, seed=self.seed, export=EXPORT, tolerance=TOLERANCE,
+            seconds=seconds, seed=self.seed, export=EXPORT if found is None else self.export(found),
+            tolerance=TOLERANCE,
         )  # fmt: skip
 
     def fitted(self, found: Experimented, minutes: float) -> None:

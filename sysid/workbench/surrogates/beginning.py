@@ -1,0 +1,60 @@
+"""Where a reference begins: at a state of its own whatever its inputs are first, or at rest at these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sysid.references.config import ReferenceConfig
+from sysid.references.runs import Case, ReferenceRuns
+from sysid.workbench.auto.look import MOVED
+
+
+def stood_at(config: ReferenceConfig, like: Case, spans: Sequence[float]) -> dict[str, float]:
+    """What the inputs of a surrogate stand at before its first sample, so that it begins where its reference does.
+
+    Experiments all begin at the same inputs, and do not tell a reference that begins at rest at any from one that
+    begins at one state. It is run once more, at other inputs that stay: it stands still there, or it does not.
+
+    Args:
+        config: The reference, with whole paths.
+        like: An experiment, whose length and parameters are taken.
+        spans: Range of each output over the experiments.
+
+    Returns:
+        By name the inputs that experiments begin at; none of a reference that begins at rest at whatever its inputs
+        are first, that has none, or that settles first.
+    """
+    if not config.inputs or config.settling:
+        return {}
+    farther = [max(port.range, key=lambda end: abs(end - port.begin)) for port in config.inputs.values()]
+    held = replace(like, name="beginning", inputs=np.tile(farther, (len(like.inputs), 1)), told="inputs that stay")
+    with ReferenceRuns(config=config, workers=1) as runs:
+        (found,) = runs.run([held])
+    if found.trace is None:
+        return {name: port.begin for name, port in config.inputs.items()}
+    values = found.trace.columns(tuple(config.outputs))
+    still = (np.ptp(values, axis=0) <= MOVED * np.asarray(spans)).all()
+    return {} if still else {name: port.begin for name, port in config.inputs.items()}
+
+
+def begun_elsewhere(config: ReferenceConfig, cases: Sequence[Case]) -> list[Case]:
+    """Experiments that begin at other inputs than all others do: from where theirs are farthest from there.
+
+    Args:
+        config: The reference.
+        cases: Experiments.
+
+    Returns:
+        The second part of each, half of it at least; none where no input moves.
+    """
+    ranges = np.array([port.range for port in config.inputs.values()]).reshape(-1, 2)
+    found = []
+    for case in cases:
+        away = np.abs(case.inputs - config.begin) / np.ptp(ranges, axis=1) if len(ranges) else np.zeros((1, 0))
+        at = int(np.argmax(away[: len(away) // 2].sum(axis=1))) if len(away) > 1 else 0
+        if at:
+            found.append(replace(case, name=f"{case.name}-elsewhere", inputs=case.inputs[at:]))
+    return found
