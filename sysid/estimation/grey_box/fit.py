@@ -19,7 +19,7 @@ from sysid.estimation.grey_box.layout import Begun, EquationLayout
 from sysid.estimation.grey_box.preparing import (
     WINDOW,
 )
-from sysid.estimation.grey_box.readying import common, no_run, ready_for
+from sysid.estimation.grey_box.readying import common, no_run, power_remedy, ready_for
 from sysid.estimation.grey_box.record import Record
 from sysid.estimation.grey_box.shot import (
     AUTO,
@@ -159,7 +159,7 @@ def fit_equations(
     training = multistart.training
     candidates = [settled(one, ready.provider) for one in reversed(run_race(multistart))]
     if not ready.runs and not any(np.isfinite(one.loss) for one in candidates):
-        raise no_run()
+        raise no_run(power_remedy(template.grey.system))
     choice = choose(candidates, _chosen_by(training, ready), vet)
     if windows.samples:
         race = choice.chosen

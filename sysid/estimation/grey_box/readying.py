@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.equations import ROSENBROCK, RUNGE_KUTTA, Lowered
+from sysid.equations import ROSENBROCK, RUNGE_KUTTA, Lowered, System
+from sysid.equations.broken_powers import broken_powers
 from sysid.errors import TraceError
 from sysid.estimation.grey_box.finishing import Ready
 from sysid.estimation.grey_box.preparing import WINDOW, first_terms, norms_for, provider_for, seen_terms, widths_for
@@ -138,7 +139,7 @@ def ready_for(
         if parted := bool(np.isfinite(other[0].loss(other[1]))):
             provider, theta, stepping = other
     if not np.isfinite(provider.loss(theta)) or hides_growth(provider, theta):
-        raise no_run(_stiff_remedy(template.grey, provider, theta))
+        raise no_run(_stiff_remedy(template.grey, provider, theta) + power_remedy(template.grey.system))
     seen = provider.form
     template = replace(
         template,
@@ -171,6 +172,12 @@ def no_run(more: str = "") -> TraceError:
         remedy="start the parameters and initial states at values with which the equations run: look for "
         f"a sign, a division by 0, or the logarithm of what is not above 0{more}",
     )
+
+
+def power_remedy(system: System) -> str:
+    """What helps where a power in equations may be no number, to stand behind other remedies; nothing without one."""
+    broken = broken_powers(system)
+    return "" if not broken else f"; {broken[0][0]} is no number where what is raised is below 0: write {broken[0][1]}"
 
 
 def _looked_at(

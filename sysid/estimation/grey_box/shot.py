@@ -22,7 +22,7 @@ from sysid.estimation.networks.starts.advancing import PRETRAINED
 from sysid.estimation.networks.starts.multistart import Candidate, Multistart
 from sysid.estimation.networks.training import Training
 from sysid.estimation.parameters.named import FLAT_ALPHA, Named
-from sysid.estimation.results.result import FitResult
+from sysid.estimation.results.result import FitResult, Status
 from sysid.models.blocks.built_model import BuiltModel
 from sysid.models.grey_box.grey_box_model import EquationModel
 
@@ -140,7 +140,8 @@ def with_way(found: FitResult, chosen: Candidate, way: str, begun: Training, ask
     declared = chosen.number < (2 if way == AUTO else 1)
     multiple = way == MULTIPLE or (way == AUTO and chosen.number == 1)
     how = "a growing part of each record" if way == GROW else f"{MULTIPLE if multiple else SINGLE} shooting"
-    note = f"The minimum was found by {how} from {'the declared start' if declared else f'start {chosen.number + 1}'}"
+    what = "The minimum was" if found.status is Status.CONVERGED else "What is told was"
+    note = f"{what} found by {how} from {'the declared start' if declared else f'start {chosen.number + 1}'}"
     if begun.n_starts < asked.n_starts:
         note += f", and what it leaves is white: {begun.n_starts} of {asked.n_starts} starts were needed"
     return replace(found, notes=(*found.notes, f"{note}."))

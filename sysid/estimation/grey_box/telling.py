@@ -11,7 +11,9 @@ from sysid.equations.units_checked import unit_contradictions
 from sysid.estimation.grey_box.by_case import case_notes
 from sysid.estimation.grey_box.finishing import Done
 from sysid.estimation.grey_box.profile import Profiler
+from sysid.estimation.grey_box.readying import power_remedy
 from sysid.estimation.grey_box.stepping import step_note, step_warning
+from sysid.estimation.least_squares.minimum import at_minimum
 from sysid.estimation.networks.posterior import Posterior, calibrate, laplace
 from sysid.estimation.parameters.findings import Findings
 from sysid.estimation.parameters.named import Named
@@ -23,6 +25,9 @@ from sysid.models.blocks.built_model import BuiltModel
 from sysid.models.grey_box.grey_box import PROFILE
 from sysid.models.grey_box.grey_box_model import EquationModel
 from sysid.traces import Trace
+
+NEAR = 0.1
+"""How near a minimum intervals are told: within a third of a standard deviation, squared."""
 
 
 def told(
@@ -44,6 +49,8 @@ def told(
     built = isinstance(model, BuiltModel)
     findings = Findings.of(solution, done.provider, named, built=built)
     notes = []
+    n = max(done.provider.n_samples - model.n_parameters, 1)
+    there = at_minimum(solution.state, done.provider, NEAR / n)
     if model.grey.intervals == PROFILE and solution.status is Status.CONVERGED:
         try:
             findings = replace(findings, profiles=Profiler(provider=done.provider, solution=solution).all(named))
@@ -51,7 +58,6 @@ def told(
             found = replace(found, status=Status.INTERRUPTED)
     elif model.grey.intervals == PROFILE:
         notes.append("No intervals by profile likelihood: the fit has not come to a minimum from which they are told.")
-    n = max(done.provider.n_samples - model.n_parameters, 1)
     variance = 2.0 * solution.at.loss / n * model.scaling.error_unit
     notes += [step_note(model, done.stepping)] if model.lowered.n_continuous else []
     notes += shown_note([one.name for one in done.provider.records if one.shows is not None])
@@ -65,7 +71,12 @@ def told(
             f"the squared error of the exact form is {done.softened:.3g} times that of the soft one."
         )
     notes += findings.profiled
-    warnings = list(findings.more_than_shown if built else [*_contradictions(model), *findings.warnings])
+    if not there and not built and model.grey.free:
+        findings = replace(findings, covariance=np.full_like(findings.covariance, np.nan))
+        warnings = [*_contradictions(model), *_not_there(model)]
+        found = replace(found, status=Status.STALLED) if found.status is Status.CONVERGED else found
+    else:
+        warnings = list(findings.more_than_shown if built else [*_contradictions(model), *findings.warnings])
     if model.lowered.n_continuous and not done.stepping.enough:
         warnings.append(step_warning(model, done.stepping))
     return replace(
@@ -75,6 +86,14 @@ def told(
         notes=(*found.notes, *notes, *warnings),
         warnings=(*found.warnings, *warnings),
     )
+
+
+def _not_there(model: EquationModel) -> list[str]:
+    """Why there are no intervals, and what of the equations may have no value where the fit would go."""
+    return [
+        "The fit has not come to a minimum, and intervals are told of one alone: these parameters are a place on the "
+        f"way. Start others, narrow their bounds, or allow more iterations{power_remedy(model.grey.system)}."
+    ]
 
 
 def _contradictions(model: EquationModel) -> list[str]:

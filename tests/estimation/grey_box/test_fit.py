@@ -296,6 +296,29 @@ def test_a_bent_power_has_a_value_at_0_whatever_its_exponent(written: str) -> No
     assert fit.model.parameters == pytest.approx({"g": 2.0, "n": 0.7}, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("raised", "told"),
+    [
+        pytest.param("x", "; x^p is no number where what is raised is below 0: write max(x, 0)^p.", id="stuck"),
+        pytest.param("max(x, 0)", "", id="at a minimum"),
+    ],
+)
+def test_intervals_are_told_of_a_minimum_alone(raised: str, told: str) -> None:
+    u, x, y = steps(150, 3) * (steps(150, 4) > 0.8), 0.0, []
+    for value in u:
+        y.append(x)
+        for _ in range(5):
+            x += 0.1 * (value - 0.8 * np.sqrt(max(x, 0.0)))
+    record = a_trace(u, np.array(y) + 0.01 * np.random.default_rng(0).standard_normal(150))
+    starts = {"a": {"start": 0.5, "low": 0}, "b": {"start": 0.5, "low": 0}, "p": {"start": 0.9, "low": 0.1}}
+    training = sysid.Training(starts=1, shooting="single")
+    fit = fitted([record], f"dx/dt = a*u - b*{raised}^p; y = x", training, parameters=starts, start=Start())
+    assert fit.uncertainty is not None
+    assert np.isfinite(fit.uncertainty.covariance).all() == (fit.status is Status.CONVERGED) == (not told)
+    said = [one for one in fit.warnings if "has not come to a minimum" in one]
+    assert [one.endswith(told) for one in said] == [True] * bool(told)
+
+
 @pytest.mark.parametrize("solver", ["runge-kutta", "rosenbrock"])
 def test_an_input_that_moves_between_samples_leaves_no_error_where_that_is_said(solver: str) -> None:
     """A forced Duffing oscillator beside SciPy's solver, whose force goes straight from sample to sample."""
