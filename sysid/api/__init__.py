@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from sysid.models import LinearStateSpace as LinearStateSpace
     from sysid.models import NeuralStateSpace as NeuralStateSpace
     from sysid.models import PolynomialNARX as PolynomialNARX
+    from sysid.models import ProcessModel as ProcessModel
     from sysid.models import Start as Start
     from sysid.models import TransferFunction as TransferFunction
     from sysid.models import VectorGreyBox as VectorGreyBox

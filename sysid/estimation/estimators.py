@@ -27,6 +27,7 @@ from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.estimation.least_squares.checkpoint import Checkpoint
 from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polynomial
+from sysid.estimation.linear.process.fit import fit_process
 from sysid.estimation.linear.state_space.fit import fit_state_space
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
@@ -34,6 +35,7 @@ from sysid.estimation.linear.transfer_function_training import TransferFunctionT
 from sysid.estimation.linear_posteriors import (
     arx_posterior,
     polynomial_posterior,
+    process_posterior,
     state_space_posterior,
     transfer_function_posterior,
 )
@@ -65,6 +67,7 @@ from sysid.models import (
     Mapping,
     NeuralStateSpace,
     PolynomialNARX,
+    ProcessModel,
     Start,
     TransferFunction,
     VectorGreyBox,
@@ -162,6 +165,15 @@ ESTIMATORS: dict[str, Estimator] = {
             "free run, and its residuals need not be white, only independent of the inputs.",
             posterior=transfer_function_posterior,
             no_posterior=f"{GROWING}, or it was fitted through a predictor, whose covariance is not known",
+        ),
+        _linear(
+            structure=ProcessModel,
+            name="a process model",
+            fit=fit_process,
+            of_residuals="A process model has no model of the noise: one step ahead it does what it does in free run, "
+            "and its residuals need not be white, only independent of the inputs.",
+            posterior=process_posterior,
+            no_posterior=GROWING,
         ),
         *(
             _linear(

@@ -18,6 +18,7 @@ from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import (
     AbstractModel,
     ARXModel,
+    FittedProcess,
     LinearStateSpaceModel,
     Start,
     TransferFunctionModel,
@@ -104,6 +105,18 @@ def transfer_function_posterior(
     factor = np.zeros((len(names), root.shape[1]))
     for i, name in enumerate(known.names):  # an input that the records do not determine is not among them
         factor[names.index(name)] = root[i]
+    return Posterior(factor=factor, noise=Noise(free_run=known.noise_variance, one_step=float("nan")))
+
+
+def process_posterior(
+    model: FittedProcess, known: Uncertainty, traces: Sequence[Trace], start: Start
+) -> Posterior | None:
+    """Of a process model: its parameters, under white errors of the free run, of which the fit knows all."""
+    del traces, start
+    root, names = _root(known.covariance), [*model.parameters, "constant"]
+    factor = np.zeros((len(names), root.shape[1]))
+    for i, name in enumerate(known.names):  # the last is the constant, or the level of what integrates
+        factor[names.index(name) if name in names else -1] = root[i]
     return Posterior(factor=factor, noise=Noise(free_run=known.noise_variance, one_step=float("nan")))
 
 

@@ -64,6 +64,8 @@ from sysid.models.networks.neural_state_space import VectorNeuralStateSpaceModel
 from sysid.models.orders.lags import Lagged as Lagged
 from sysid.models.orders.lags import Lags as Lags
 from sysid.models.orders.structure import AbstractStructure as AbstractStructure
+from sysid.models.process.fitted_process import FittedProcess as FittedProcess
+from sysid.models.process.structure import ProcessModel as ProcessModel
 from sysid.models.store import cascade_from_dict as cascade_from_dict
 from sysid.models.store import model_from_dict as model_from_dict
 from sysid.models.store import structure_from_dict as structure_from_dict

@@ -31,6 +31,8 @@ from sysid.models.networks.neural_state_space import (
     VectorNeuralStateSpaceModel,
 )
 from sysid.models.orders.structure import AbstractStructure
+from sysid.models.process.fitted_process import FittedProcess
+from sysid.models.process.structure import ProcessModel
 
 _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
     (ARX, ARXModel),
@@ -38,6 +40,7 @@ _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
     (NeuralStateSpace, NeuralStateSpaceModel),
     (VectorNeuralStateSpace, VectorNeuralStateSpaceModel),
     (TransferFunction, TransferFunctionModel),
+    (ProcessModel, FittedProcess),
     (GreyBox, GreyBoxModel),
     (VectorGreyBox, VectorGreyBoxModel),
     (LinearStateSpace, LinearStateSpaceModel),

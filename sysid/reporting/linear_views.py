@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.linear.process.uncertainty import drawn_polynomials
 from sysid.estimation.results.uncertainty import Uncertainty
-from sysid.models import AbstractModel
+from sysid.models import AbstractModel, FittedProcess
 from sysid.models.contract.ratio import Ratio
 
 DRAWS = 200
@@ -26,7 +27,7 @@ class LinearView:
         target: Which output.
         discrete: Whether the polynomials are in ``1/z``.
         sample_time: Seconds.
-        delay: Dead time in samples.
+        delay: Dead time in samples; a whole number of a discrete one.
         B: Numerators: the model's first, then those drawn from its uncertainty, shape ``(1 + n_draws, n_b)``.
         F: Denominators, shape ``(1 + n_draws, n_f)``.
     """
@@ -37,7 +38,7 @@ class LinearView:
     target: int
     discrete: bool
     sample_time: float
-    delay: int
+    delay: float
     B: NDArray[np.float64]
     F: NDArray[np.float64]
 
@@ -130,7 +131,7 @@ def linear_views(model: AbstractModel, uncertainty: Uncertainty | None, seed: in
             continue
         name = f"{ends.outputs[o]} from {ends.inputs[j]}" if several else ends.inputs[j]
         Bs, Fs = ratio.B[np.newaxis], ratio.F[np.newaxis]
-        if uncertainty is not None and (drawn := _drawn(uncertainty, ratio, seed)) is not None:
+        if uncertainty is not None and (drawn := _drawn(model, uncertainty, j, ratio, seed)) is not None:
             drawn_B, drawn_F = drawn
             Bs, Fs = np.concatenate([Bs, drawn_B]), np.concatenate([Fs, drawn_F])
         views.append(
@@ -142,11 +143,15 @@ def linear_views(model: AbstractModel, uncertainty: Uncertainty | None, seed: in
     return views
 
 
-def _drawn(uncertainty: Uncertainty, ratio: Ratio, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def _drawn(
+    model: AbstractModel, uncertainty: Uncertainty, j: int, ratio: Ratio, seed: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Numerators and denominators of one input drawn from their joint distribution, ascending powers.
 
     ``None`` where the records do not determine one of them: to draw the others alone would say that it is known.
     """
+    if isinstance(model, FittedProcess):
+        return drawn_polynomials(model, uncertainty, j, draws=DRAWS, seed=seed)
     b = [i for i, text in enumerate(uncertainty.names) if text.startswith(ratio.of_numerator)]
     f = [i for i, text in enumerate(uncertainty.names) if text.startswith(ratio.of_denominator)]
     chosen = np.array(b + f, dtype=np.intp)

@@ -34,7 +34,8 @@ _ALSO = {"TF": "TransferFunction"}
 """Words of reports and of ``sysid orders`` that are no names of classes."""
 
 _ELSEWHERE = {
-    **dict.fromkeys(("tfest", "idtf", "procest", "idproc"), ("TransferFunction",)),
+    **dict.fromkeys(("tfest", "idtf"), ("TransferFunction",)),
+    **dict.fromkeys(("procest", "idproc", "fopdt", "sopdt", "p1d", "process"), ("ProcessModel",)),
     **dict.fromkeys(("ssest", "n4sid", "idss", "statespace"), ("LinearStateSpace",)),
     **dict.fromkeys(("nlarx", "idnlarx", "narxnet", "nnarx"), ("NARX",)),
     **dict.fromkeys(("nlhw", "idnlhw", "hammerstein", "wiener", "hw"), ("HammersteinWiener",)),
@@ -48,7 +49,7 @@ _ELSEWHERE = {
 _EXAMPLES = {
     **dict.fromkeys(("poles", "nb", "nf"), "[2]"), **dict.fromkeys(("zeros", "nk"), "[1]"), "na": "2", "nc": "1",
     "nd": "1", "states": "2", "neurons": "10", "input_delays": "2", "output_delays": "2", "first": "1", "second": "1",
-    "equations": '"y[k+1] = a*y + b*u"',
+    "type": "P1D", "equations": '"y[k+1] = a*y + b*u"',
 }  # fmt: skip
 """What a field may look like, for one input."""
 

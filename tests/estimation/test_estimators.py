@@ -71,6 +71,7 @@ def test_a_row_says_what_its_function_knows() -> None:
     assert {kind for kind, row in ESTIMATORS.items() if row.linear} == {
         "ARX",
         "TransferFunction",
+        "ProcessModel",
         "SS",
         "OE",
         "BJ",

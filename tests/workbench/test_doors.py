@@ -63,6 +63,7 @@ HW = {"kind": "HammersteinWiener", "states": 1, "input": ["saturation", "none"],
 WH = {"kind": "WienerHammerstein", "first": 1, "second": 1, "curve": "network 2"}
 POLYNOMIAL_NARX = {"kind": "PolynomialNARX", "input_delays": 1, "output_delays": 1, "terms": 4}
 VECTOR_GREY = GREY | {"kind": "VectorGreyBox"}
+PROCESS = {"kind": "ProcessModel", "type": "P1", "parameters": {"Tp1(valve)": {"start": 2, "low": 0.1, "high": 20}}}
 TF = {"kind": "TransferFunction", "poles": [1, 1], "zeros": [0, 0], "delays": [1, 1]}
 
 EVERYWHERE = ("python", "fits", "sweep", "member")
@@ -74,6 +75,7 @@ FITS = [
     pytest.param(ARX | {"intercept": False, "na": 4}, None, ALONE, id="ARX of another order"),
     pytest.param(ARX | {"nb": 1, "nk": 1}, None, ALONE, id="ARX, one number for all inputs"),
     pytest.param(TF, {"seed": 7, "scattered_starts": 1}, ALONE, id="TransferFunction"),
+    pytest.param(PROCESS, None, ALONE, id="ProcessModel"),
     pytest.param(SS, None, ALONE, id="SS"),
     pytest.param(
         SS | {"noise": False, "nk": "auto"}, {"method": "subspace", "weighting": "CVA"}, ALONE, id="SS by CVA, nk auto"

@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from sysid.estimation.linear.process.uncertainty import of_polynomials
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel
 from sysid.models.contract.ratio import Ratio
@@ -60,6 +61,7 @@ def modes(model: AbstractModel, uncertainty: Uncertainty | None, probability: fl
     Returns:
         One entry a real pole or pair, the slowest first, denominator by denominator; dead times are not among them.
     """
+    uncertainty = of_polynomials(model, uncertainty)
     found: list[Mode] = []
     seen: set[str] = set()
     ratios = model.ratios

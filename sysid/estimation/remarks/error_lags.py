@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid.estimation.least_squares.correlation import products
 from sysid.estimation.records.informative import SAME, by_chance, by_chance_of_signs, informative, unit, with_past
 from sysid.estimation.remarks.fitted_run import FreeRun
-from sysid.models import AbstractModel, GreyBox, TransferFunction
+from sysid.models import AbstractModel, GreyBox, ProcessModel, TransferFunction
 from sysid.models.converting.orthonormal_basis import Domain
 from sysid.models.orders.intersample import MOVING
 
@@ -128,6 +128,8 @@ def at_lag(model: AbstractModel, lag: int) -> str:
         The words; empty where it cannot.
     """
     structure = model.structure
+    if isinstance(structure, ProcessModel):
+        return "D in its type" if lag else "a type without D"
     if hasattr(structure, "input_delays"):
         return f"input_delays from {lag}"
     if lag == 0 and hasattr(structure, "feedthrough"):

@@ -15,7 +15,7 @@ class Ratio:
     Args:
         B: Numerator; empty for an input without any parameter.
         F: Denominator.
-        delay: Dead time in samples.
+        delay: Dead time in samples; a whole number where the polynomials are in ``1/z``.
         discrete: Whether the polynomials are in ``1/z``.
         of_numerator: How the names of the numerator's parameters begin in the uncertainty of a fit.
         of_denominator: How those of the denominator begin.
@@ -25,7 +25,7 @@ class Ratio:
 
     B: NDArray[np.float64]
     F: NDArray[np.float64]
-    delay: int
+    delay: float
     discrete: bool
     of_numerator: str
     of_denominator: str

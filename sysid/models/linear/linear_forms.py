@@ -38,7 +38,7 @@ class LinearForms(AbstractModel):
             discrete = ratio.discrete
             B = ratio.B if len(ratio.B) else np.zeros(1)
             if discrete:
-                pairs.append(in_powers_of_z(np.concatenate([np.zeros(ratio.delay), B]), ratio.F))
+                pairs.append(in_powers_of_z(np.concatenate([np.zeros(int(ratio.delay)), B]), ratio.F))
             else:
                 pairs.append(delayed((B[::-1], ratio.F[::-1]), ratio.delay * self.sample_time, pade_order))
         return transfer_function(pairs, self.mapping, self.sample_time if discrete else 0.0)
@@ -59,14 +59,15 @@ class LinearForms(AbstractModel):
         parts: dict[str, Ratios] = {}
         delays = [0.0] * m
         for (_, j), ratio in self.ratios.items():
-            late = max(ratio.delay - 1, 0)  # what is sampled and held comes one sample late by itself
+            delay = int(ratio.delay)
+            late = max(delay - 1, 0)  # what is sampled and held comes one sample late by itself
             delays[j] = late * T
-            B = np.concatenate([np.zeros(ratio.delay - late), ratio.B])
+            B = np.concatenate([np.zeros(delay - late), ratio.B])
             if len(B) > len(ratio.F):
                 raise ConfigError(
                     "no continuous system of this order gives the discrete one",
                     where=f"the input {self.mapping.inputs[j]}",
-                    expected=f"at most {len(ratio.F) - ratio.delay + late} coefficients behind its dead time, since "
+                    expected=f"at most {len(ratio.F) - delay + late} coefficients behind its dead time, since "
                     f"there are {len(ratio.F) - 1} poles",
                     got=len(ratio.B),
                     remedy="fit it with fewer coefficients (nb, zeros), or a transfer function with domain: continuous",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.kernels import linear as kernel
+from sysid.models.process.process_run import held, parted
 from sysid.reporting.linear_views import LinearView
 
 Matrix = NDArray[np.float64]
@@ -82,7 +84,7 @@ def settling(view: LinearView) -> int:
     poles = view.roots(view.F[0])
     rate = poles.real * view.sample_time if not view.discrete else np.log(np.maximum(np.abs(poles), 1e-6))
     slowest = float(rate.max(initial=-1.0))
-    return int(np.clip(np.ceil(-5.0 / slowest), 50, 20_000)) + view.delay if slowest < 0.0 else 300
+    return int(np.clip(np.ceil(-5.0 / slowest), 50, 20_000) + np.ceil(view.delay)) if slowest < 0.0 else 300
 
 
 def step_response(A: Matrix, B: Matrix, C: Matrix, D: Matrix, n: int) -> Matrix:
@@ -99,14 +101,19 @@ def step_responses(view: LinearView, n: int) -> Matrix:
     found = np.zeros((len(view.B) - 1, n))
     with np.errstate(over="ignore", invalid="ignore"):
         if view.discrete:
-            filter_step(view.B[1:], view.F[1:], found[:, view.delay :])
+            filter_step(view.B[1:], view.F[1:], found[:, int(view.delay) :])
         else:
             # To import it takes longer than all these pictures, and few models are continuous.
             from scipy import signal
 
-            time = np.arange(max(n - view.delay, 0)) * view.sample_time
+            k, part = parted(view.delay, 1.0)
+            arrived = np.column_stack([np.arange(n) >= k, np.arange(n) > k]).astype(np.float64)
             for row, b, f in zip(found, view.B[1:], view.F[1:], strict=True):
-                row[view.delay :] = signal.step((b[::-1], f[::-1]), T=time)[1]
+                A, B, C, D = signal.tf2ss(b[::-1], f[::-1])
+                P, now, before = held(A, B[:, 0], view.sample_time, part)
+                reads, y = D * ([0.0, 1.0] if part else [1.0, 0.0]), np.empty((n, 1))
+                kernel.state_space(P, np.column_stack([now, before]), C, reads, arrived, np.zeros(len(A)), y)
+                row[:] = y[:, 0]
     return np.nan_to_num(found)
 
 

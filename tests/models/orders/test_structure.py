@@ -16,6 +16,7 @@ ONE: dict[str, tuple[dict[str, Any], str]] = {
     "OE": ({"nb": 1, "nf": 1, "nk": 1}, "OE [1 1 1; 1 1 1; 1 1 1]"),
     "BJ": ({"nb": 1, "nc": 1, "nd": 1, "nf": 1, "nk": 1}, "BJ [1 1 1; 1; 1; 1 1 1; 1 1 1]"),
     "TransferFunction": ({"poles": 1, "zeros": 0}, "TF [1 1 1; 0 0 0; 1 1 1]"),
+    "ProcessModel": ({"type": "P1"}, "P1 P1 P1"),
     "SS": ({"states": 1, "nk": 1}, "SS 1 nk 1 1 1"),
     "VectorSS": ({"states": 1, "nk": 1}, "VectorSS 1 nk 1 1 1"),
 }

@@ -46,6 +46,7 @@ PLAIN: dict[str, dict[str, Any]] = {
     **{kind: {"states": 1} for kind in ("SS", "VectorSS")},
     **{kind: {"states": 1, "neurons": 2} for kind in ("NSS", "VectorNSS")},
     "TransferFunction": {"poles": 1, "zeros": 0, "delays": 1},
+    "ProcessModel": {"type": "P1D"},
     "HammersteinWiener": {"states": 1, "input": "piecewise 3"},
     "WienerHammerstein": {"first": 1, "second": 1, "curve": "polynomial 3"},
     "PolynomialNARX": {"input_delays": 1, "output_delays": 1, "degree": 2},

@@ -1,0 +1,1 @@
+"""Process models: plants by gain, time constants, damping, zero and dead time."""
