@@ -53,6 +53,10 @@ SPACES = {
         [{"kind": "TransferFunction", "poles": {"from": 1, "to": 2}, "zeros": {"from": 1, "to": 2}, "delays": 1}],
         ["TF [1 1; 1 1; 1 1]", "TF [2 2; 1 1; 1 1]", "TF [2 2; 2 2; 1 1]"],
     ),
+    "types of process models": (
+        [{"kind": "ProcessModel", "type": {"among": ["P1D", "P2DU"]}}],
+        ["P1D P1D", "P2DU P2DU"],
+    ),
     "several structures": (
         [
             {"kind": "ARX", "na": {"from": 1, "to": 2}, "nb": 1, "nk": 1},

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import FitDivergedError, TraceError
+from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.process.problem import Bounds, Problem, ProcessRecord
-from sysid.estimation.linear.process.search import End, search
+from sysid.estimation.linear.process.search import End, finished, raced
 from sysid.estimation.linear.process.starts import Begun, begun_at, starts
 from sysid.estimation.linear.process.uncertainty import process_uncertainty
 from sysid.estimation.linear.process.words import of_bounds, of_errors, of_open, of_parameters
@@ -75,14 +75,13 @@ def fit_process(
         "output_unit": traces[0].channel(mapping.output).unit,
         "rest_output": rest,
     }
-    part = stretches(whole)
-    begun = _begun(process, mapping, scaling, traces[0].sample_time, part or whole)
+    part, sample_time = stretches(whole), traces[0].sample_time
+    begun: Begun | End = raced(_begun(process, mapping, scaling, sample_time, part or whole))
     if part is not None:
-        problem = _problem(process, mapping, scaling, traces[0].sample_time, whole)
-        begun = [begun_at(problem.rows_for(one.values), one.values, one.problem.offset(one.theta)) for one in begun]
-    if not any(np.isfinite(one.loss) for one in begun):
-        raise FitDivergedError("no start gives a finite free run", remedy="look at the records: sysid inspect")
-    end = search(begun)
+        values = begun.problem.values(begun.theta)
+        problem = _problem(process, mapping, scaling, sample_time, whole).rows_for(values)
+        begun = begun_at(problem, values, begun.problem.offset(begun.theta))
+    end = finished(begun)
     found = _result(process, end, scaling, channels)
     told = () if part is None else (told_of(part),)
     return replace(found, notes=(*told, *found.notes), train_time_s=now() - began)

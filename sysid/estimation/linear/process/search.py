@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.errors import FitDivergedError
 from sysid.estimation.linear.process.problem import Problem
 from sysid.estimation.linear.process.starts import Begun, begun_at
 from sysid.estimation.results.result import Status
@@ -52,19 +53,37 @@ class End:
         return self.problem.criterion(self.loss)
 
 
-def search(begun: Sequence[Begun]) -> End:
-    """The least error from some starts, each on the rows that its dead times leave.
+def raced(begun: Sequence[Begun]) -> End:
+    """The best of some starts after some steps, each on the rows that its dead times leave.
 
     Args:
         begun: Starts.
 
     Returns:
-        The end.
+        Where the best one got to.
+
+    Raises:
+        FitDivergedError: If none has a finite free run.
     """
     ends: Sequence[End | Begun] = [one for one in begun if np.isfinite(one.loss)]
     for steps, kept in RACE:
         ends = sorted((settled(one, steps) for one in ends), key=lambda one: one.criterion)[:kept]
-    return _in_order(_among_dead_times(settled(ends[0], LONG)))
+    if not ends:
+        raise FitDivergedError("no start gives a finite free run", remedy="look at the records: sysid inspect")
+    assert isinstance(ends[0], End)  # noqa: S101 - the race has rounds
+    return ends[0]
+
+
+def finished(begun: Begun | End) -> End:
+    """The least error from the best start.
+
+    Args:
+        begun: The start.
+
+    Returns:
+        The end, below which no dead time some samples away leads.
+    """
+    return _in_order(_among_dead_times(settled(begun, LONG)))
 
 
 def settled(begun: Begun | End, steps: int) -> End:

@@ -8,7 +8,7 @@ from sysid.estimation.linear.process.search import End
 from sysid.estimation.linear.process.uncertainty import at_bounds
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import FittedProcess
-from sysid.models.process.process_type import DAMPING, DEAD_TIME
+from sysid.models.process.process_type import DAMPING, DEAD_TIME, GAIN
 from sysid.models.process.structure import shown
 from sysid.units import in_unit
 
@@ -86,17 +86,24 @@ def of_open(model: FittedProcess, known: Uncertainty) -> tuple[str, ...]:
         known: What is known of its parameters.
 
     Returns:
-        A sentence for each time constant that may as well be nothing, and one for all others without an interval.
+        A sentence for each gain or time constant that may as well be nothing.
     """
     inputs = model.mapping.inputs
     lags = {shown(name, of, inputs) for kind, of in zip(model.process.types, inputs, strict=True)
             for name in kind.constants if name != DAMPING}  # fmt: skip
-    low = known.interval(0.95)[:, 0]
+    low, high = known.interval(0.95).T
+    gains = {shown(GAIN, of, inputs) for of in inputs}
+    lost = [name for name, a, b in zip(known.names, low, high, strict=True) if name in gains and a <= 0.0 <= b]
     told = [
         f"{name} may as well be 0 by these records, and others may make up for it: take a type with a pole less, or "
         f"give {name}."
         for name, end in zip(known.names, low, strict=True)
         if name in lags and end <= 0.0
+    ]
+    told += [
+        f"{name} may as well be 0 by these records. Where they begin at rest, start: rest tells more; else record more "
+        "of what its input does."
+        for name in lost
     ]
     return tuple(told)
 
