@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 NEAR = 0.8
 """Time constant, in lengths of the longest record, from which a pole is one that the record cannot show whole."""
+SLOWEST, AT_BOUND = 5.0, 0.02
+"""Longest time constant of a stable pole of a transfer function, in lengths of the longest record; and by what share of
+a bound a pole that stands there may be off."""
 REACH = 5.0
 """Time constants in the longest record up to which a pole is asked about, whether it is one at 1."""
 SIGNIFICANT = 6.6
@@ -30,6 +33,20 @@ ROUNDING = 1e-6
 INTEGRATES, FAR = 1e-9, 1e-6
 """Distance of a pole's magnitude from 1 within which it is one, and beyond which six digits tell it from 1. Above 1 it
 is one up to there: of two poles at 1 rounding makes 1.00000002, and no status calls that growth."""
+
+BOUND = (
+    "it stands at its bound. The plant may integrate, or a drift of the output is taken for its response, and these "
+    "records cannot tell. The level of the free run is not to be trusted: measure longer, or with inputs that bring "
+    "the output back; where it drifts by itself, take that off first (repairs: {drift: {y: line}})."
+)
+ONE = (
+    "the plant is taken to integrate, from which these records do not tell it. A drift of the output by itself looks "
+    "the same: take that off first (repairs: {drift: {y: line}})."
+)
+SEEN = (
+    "its interval says how well these records tell it from an integrator, unless the output drifts by itself, which "
+    "looks the same: take that off first (repairs: {drift: {y: line}})."
+)
 
 Errors = Sequence[NDArray[np.float64]]
 
@@ -60,7 +77,9 @@ def unseen(radius: float, lengths: Sequence[int]) -> bool:
 
 
 def undecided(radius: float, lengths: Sequence[int]) -> bool:
-    """Whether a pole stands at the bound or beyond it, and is not one at 1: no record says where it is.
+    """Whether a pole stands at a bound, which holds it back: no record says where it is.
+
+    One between the bounds and 1 is where the records put it, beyond chance.
 
     Args:
         radius: Magnitude of the slowest pole.
@@ -69,7 +88,8 @@ def undecided(radius: float, lengths: Sequence[int]) -> bool:
     Returns:
         Whether it does.
     """
-    return largest_pole(lengths) - FAR <= radius <= 1.0 + FAR and abs(radius - 1.0) > INTEGRATES
+    constants = (1.0 - radius) * max(*lengths, 2)  # records in a time constant
+    return any(abs(times * constants - 1.0) < AT_BOUND for times in (1.0, SLOWEST))
 
 
 def stability(radius: float) -> str:
@@ -94,6 +114,27 @@ def stability(radius: float) -> str:
     digits = 6 if abs(radius - 1.0) > FAR else 9
     verdict = "stable" if radius < 1.0 else "not stable"
     return f"The free run is {verdict}: the largest pole has magnitude {radius:.{digits}f}."
+
+
+def _of(radius: float, lengths: Sequence[int]) -> str:
+    """What is to be said of a slow pole by where it stands."""
+    if undecided(radius, lengths):
+        return BOUND
+    return ONE if abs(radius - 1.0) <= FAR else SEEN
+
+
+def warnings(radius: float, lengths: Sequence[int], told: tuple[str, ...]) -> tuple[str, ...]:
+    """Which of :func:`notes` say what is wrong: that of a pole at its bound.
+
+    Args:
+        radius: Magnitude of the slowest pole.
+        lengths: Of the records, in samples.
+        told: The notes.
+
+    Returns:
+        One or none.
+    """
+    return told[:1] if undecided(radius, lengths) else ()
 
 
 def _autocorrelation(errors: Errors) -> float:
@@ -140,9 +181,7 @@ def notes(radius: float, lengths: Sequence[int], errors: Errors | None) -> tuple
     if unseen(min(radius, 2.0 - radius), lengths):
         told.append(
             f"The slowest pole, of magnitude {radius:.6f}, is as slow as the longest record of {max(lengths)} samples, "
-            "or slower: the plant may integrate, or a drift of the output is taken for its response, and these records "
-            "cannot tell. The level of the free run is not to be trusted: measure longer, or with inputs that bring "
-            "the output back; where it drifts by itself, take that off first (repairs: {drift: {y: line}})."
+            f"or slower: {_of(radius, lengths)}"
         )
     return (*told, *_together(errors or []))
 

@@ -17,6 +17,7 @@ from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.begun_at_rest import Beginning, at_rest, left_out
 from sysid.estimation.linear.delay_search import check_max_delay, without_dead_time
 from sysid.estimation.linear.determined import Determined
+from sysid.estimation.linear.pole_moves import slowness
 from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
 from sysid.estimation.linear.segments import delayed_inputs, scaling_of
 from sysid.estimation.linear.stretches import stretches, told_of
@@ -223,12 +224,12 @@ class _Problem(AbstractProblem):
         return likely(self.experiments, self.orders.poles, most, least)
 
     def told(self, end: End) -> tuple[str, ...]:
-        """Whether errors hang together; see the base class."""
+        """Of slow poles, and of errors that hang together; see the base class."""
         separated = end.provider.separated(end.theta)
         if separated is None or separated.mirrored:
             return ()
-        errors = end.errors
-        return slow_poles.notes(0.0, [len(one) for one in errors], errors)  # the search has told of slow poles itself
+        radius = slowness(end.sections, self.orders.domain, self.terms.sample_time)
+        return slow_poles.notes(radius, end.lengths, end.errors)
 
     def unbounded(self) -> _Problem:
         """With inputs as they are: the offset of an input adds up in an integrator, and no constant undoes it."""

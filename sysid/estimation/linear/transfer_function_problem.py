@@ -24,9 +24,6 @@ from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel
 from sysid.models.converting.orthonormal_basis import Domain
 
-SLOWEST = 5.0
-"""Longest time constant of a stable pole, in lengths of the longest record."""
-
 Score = Callable[[AbstractModel], float] | None
 
 
@@ -146,9 +143,9 @@ class AbstractProblem(ABC):
             longest: Length of the longest record in samples.
 
         Returns:
-            Poles whose time constants stay below ``SLOWEST`` records.
+            Poles whose time constants stay below :data:`slow_poles.SLOWEST` records.
         """
-        rate = 1.0 / (SLOWEST * longest)
+        rate = 1.0 / (slow_poles.SLOWEST * longest)
         discrete = self.orders.domain is Domain.DISCRETE
         return PoleParameters(
             n_poles=self.orders.poles,

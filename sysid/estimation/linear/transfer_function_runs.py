@@ -97,12 +97,17 @@ class End:
         return total / max(self.provider.n_samples, 1)
 
     @property
+    def lengths(self) -> list[int]:
+        """Samples of each record."""
+        return [len(record.target) for record in self.provider.records]
+
+    @property
     def errors(self) -> list[NDArray[np.float64]]:
         """Weighted, of each record, shape ``(n_rows, 1)``; none where the model runs away."""
         separated = self.provider.separated(self.theta)
         if separated is None:
             return []
-        ends = np.cumsum([len(record.target) for record in self.provider.records])
+        ends = np.cumsum(self.lengths)
         return [one[:, np.newaxis] for one in np.split(separated.residual, ends[:-1])]
 
     def worse_than(self, other: End, *, free: int = 0) -> bool:

@@ -23,7 +23,7 @@ from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_delays import delays_of_least_error, found_delays
 from sysid.estimation.linear.transfer_function_problem import AbstractProblem, Score
 from sysid.estimation.linear.transfer_function_runs import EXACT, Candidate, End, Watch, long_run, short_run, tried
-from sysid.estimation.linear.transfer_function_words import AT_EDGE, of_level, of_speed, of_stability, of_starts
+from sysid.estimation.linear.transfer_function_words import of_level, of_speed, of_stability, of_starts
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.estimation.nonparametric.dead_time import descend
 from sysid.estimation.results.result import FitResult, Loop
@@ -80,7 +80,8 @@ def solve(own: AbstractProblem, began: float, on_iteration: Callable[[Iteration]
         raise FitDivergedError("no start gives a finite free run", remedy="lower the number of poles")
     end, unit = reached.end, own.scaling.output_scale**2
     model, uncertainty = reached.problem.model(end)
-    fast = of_speed(model)
+    fast, slow = of_speed(model), own.told(end)
+    radius = slowness(end.sections, own.orders.domain, own.terms.sample_time)
     return FitResult(
         model=model,
         status=end.status,
@@ -98,12 +99,16 @@ def solve(own: AbstractProblem, began: float, on_iteration: Callable[[Iteration]
             + intersample.told(own.orders.moving(own.terms.mapping.inputs), own.terms.mapping.inputs),
             *(told if reached.problem is own else ()),
             *end.notes,
-            *own.told(end),
+            *slow,
             *of_level(model),
             of_stability(model),
             *fast,
         ),
-        warnings=(*fast, *(one for one in told if one == READ_BACKWARDS)),
+        warnings=(
+            *fast,
+            *slow_poles.warnings(radius, end.lengths, slow),
+            *(one for one in told if one == READ_BACKWARDS),
+        ),
     )
 
 
@@ -120,9 +125,12 @@ def _from_part(
     if own.orders.delays is None and max(delays) + FEW >= part.delay_range()[1]:
         return None
     found = _reached(part, delays, watch.unseen(), score, {})
-    if found is None or found.problem is not part or AT_EDGE in found.end.notes:
+    if found is None or found.problem is not part:
         return None
     sections = found.end.sections
+    radius = slowness(sections, own.orders.domain, own.terms.sample_time)
+    if radius >= slow_poles.largest_pole(found.end.lengths):
+        return None
     if own.orders.delays is None:
         delays = _delays_near(own, delays, sections)
     provider = own.provider(delays)
@@ -232,15 +240,13 @@ def _free_poles(
         return own, end
     domain, sample_time, provider = own.orders.domain, own.terms.sample_time, free.provider(delays)
     # Where noise and wrong dynamics hide an integrator, a search among stable poles ends a few of them within the edge.
-    longest = max(len(record.target) for record in provider.records)
-    edge, asked_from = 1.0 - 1.0 / longest, 1.0 - slow_poles.REACH / longest
+    asked_from = 1.0 - slow_poles.REACH / max(end.lengths)
     slowest = slowness(end.sections, domain, sample_time)
     # A search among stable poles may put a dead time in place of an integrator: the shortest is asked, too.
     asked = {delays} if own.orders.delays is not None else {delays, (own.delay_range()[0],) * len(delays)}
     suggested = [free.free_starts(free.provider(one))[0].sections for one in sorted(asked)]
     if max(slowest, *(slowness(sections, domain, sample_time) for sections in suggested)) < asked_from:
         return own, end
-    at_end = replace(end, notes=(*end.notes, AT_EDGE)) if slowest >= edge else end
     told: tuple[str, ...] = ()
     if own.orders.delays is None:  # those of a plant that cannot integrate need not be those of one that does
         delays, told = delays_of_least_error(free)
@@ -249,13 +255,13 @@ def _free_poles(
     runs = (short_run(start, delays, provider, free.training) for start in starts)
     best = min(runs, key=lambda run: run.loss)
     if not np.isfinite(best.loss):
-        return own, at_end
+        return own, end
     found = replace(long_run(best, free.training, watch), notes=told)
     free, found = _about_its_level(free, found, watch)
     # Poles may be anywhere in a plant that few samples say much of, but not for the sake of their noise: beyond
     # chance, the gain must be one that as many parameters as there are, fitted to it, could not have.
-    if not at_end.worse_than(found, free=sum(own.orders.poles) + provider.n_taps):
-        return own, at_end
+    if not end.worse_than(found, free=sum(own.orders.poles) + provider.n_taps):
+        return own, end
     # Free poles are fitted from a free state. What begins where a start says has to follow from there as well: a
     # pole that is off 1 by little has an equilibrium where no plant ever was.
     judge = score or own.as_scored
@@ -263,7 +269,7 @@ def _free_poles(
         there = (found, free.at_one(found), free.at_one(found, every=True))
         found = min(there, key=lambda one: judge(free.model(one)[0]))
         if not judge(free.model(found)[0]) < judge(own.model(end)[0]):
-            return own, at_end
+            return own, end
     return free, found
 
 

@@ -14,11 +14,6 @@ from sysid.models import TransferFunctionModel
 from sysid.models.converting.orthonormal_basis import Domain
 from sysid.units import in_unit
 
-AT_EDGE = (
-    "The slowest pole stands at the end of its range, a time constant of five records: the plant may integrate, and "
-    "these records cannot tell."
-)
-
 TOO_FAST = 10.0
 """How many times faster than half of the sampling rate a pole is that no record shows: it settles within a sample."""
 

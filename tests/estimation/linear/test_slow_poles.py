@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -9,7 +11,6 @@ from scipy.signal import lfilter
 import sysid
 from sysid.estimation import fit_polynomial, fit_state_space, fit_transfer_function
 from sysid.estimation.linear import slow_poles
-from sysid.estimation.linear.transfer_function_problem import SLOWEST
 from sysid.estimation.results.result import FitResult
 from sysid.models import OE, History, LinearStateSpace, Mapping, Scaling, Start, StartKind, TransferFunction
 from sysid.models.linear.innovations import Innovations
@@ -27,6 +28,11 @@ def oe(trace: Trace, order: int) -> FitResult:
 
 def ss(trace: Trace, order: int) -> FitResult:
     return fit_state_space([trace], ONE, LinearStateSpace(states=order, noise=False), start=FREE)
+
+
+def tf(trace: Trace, order: int) -> FitResult:
+    orders = TransferFunction(poles=order, zeros=order - 1, delays=1)
+    return fit_transfer_function([trace], ONE, orders, start=FREE)
 
 
 STRUCTURES = pytest.mark.parametrize("fit", [oe, ss])
@@ -48,10 +54,34 @@ def test_a_drift_is_told_and_bounds_the_free_run(fit: object, seed: int) -> None
     found = fit(trace, 3)  # type: ignore[operator]
     assert any("hang together" in note for note in found.notes) or any("slowest pole" in note for note in found.notes)
     # The bound is on eigenvalues; the roots of the polynomial are the same but for rounding.
-    bound = 1.0 - 1.0 / (SLOWEST * N) if fit is oe else slow_poles.largest_pole([N])
+    bound = 1.0 - 1.0 / (slow_poles.SLOWEST * N) if fit is oe else slow_poles.largest_pole([N])
     assert found.model.pole_radius <= bound + 1e-12
     # The level is lost to the drift, which has a range of about two; beyond it nothing grows.
     assert np.abs(found.model.simulate(u)[N:] - clean[N:]).max() < 6.0 * np.ptp(trace["y"])
+
+
+@pytest.mark.parametrize("fit", [oe, ss, tf])
+def test_a_pole_that_its_bound_holds_back_is_warned_of(fit: Callable[[Trace, int], FitResult]) -> None:
+    trace, _, _ = drifting(2)
+    found = fit(trace, 3)
+    assert slow_poles.undecided(found.model.pole_radius, [N])
+    (warning,) = found.warnings
+    assert "slowest pole" in warning
+    assert warning in found.notes
+
+
+@pytest.mark.parametrize("fit", [oe, ss, tf])
+def test_a_pole_slower_than_the_record_that_stands_where_the_inputs_put_it_is_noted(
+    fit: Callable[[Trace, int], FitResult],
+) -> None:
+    """It had been said that the record cannot tell, of a pole that is right to its fifth digit."""
+    rng = np.random.default_rng(0)
+    u, pole = steps(N, 1, rng, held=8), 1.0 - 1.0 / (3.0 * N)
+    y = lfilter([0.0, 1.0 - pole], [1.0, -pole], u[:, 0])
+    found = fit(trace_of(u, y + 0.01 * y.std() * rng.standard_normal(N)), 1)
+    assert found.model.pole_radius == pytest.approx(pole, abs=5e-5)
+    assert not found.warnings
+    assert any("slowest pole" in note for note in found.notes)
 
 
 @STRUCTURES

@@ -130,7 +130,7 @@ def fit_polynomial(
         system = errors.chart.system(solution.theta)
         variance = float(errors.covariance(system)[0, 0])
         hang = None if orders.noise else coloured(errors, solution.theta)
-        told, lengths = None if orders.noise else errors.errors(system), [len(one) for one in errors.segments]
+        left, lengths = None if orders.noise else errors.errors(system), [len(one) for one in errors.segments]
     model = PolynomialModel(
         orders=orders,
         theta=solution.theta,
@@ -141,7 +141,7 @@ def fit_polynomial(
         output_unit=traces[0].channel(mapping.output).unit,
         rest_output=rest,
     )
-    unit = scaling.output_scale**2
+    unit, slow = scaling.output_scale**2, slow_poles.notes(model.pole_radius, lengths, left)
     fit = FitResult(
         model=model,
         status=Status.CONVERGED if solution.status in {Status.STALLED, Status.NOT_IMPROVED} else solution.status,
@@ -153,11 +153,12 @@ def fit_polynomial(
         train_time_s=now() - began,
         uncertainty=_uncertainty(model, at, hang, errors.n_samples, variance * unit),
         notes=(
-            *slow_poles.notes(model.pole_radius, lengths, told),
+            *slow,
             *(torn(errors.segments, system.n_state, records=len(traces)) if orders.noise else ()),
             *((told_of(part),) if part and from_part else ()),
             slow_poles.stability(model.pole_radius),
         ),
+        warnings=slow_poles.warnings(model.pole_radius, lengths, slow),
     )
     return fit if determined.moves else determined.polynomials(fit, orders, mapping, scaling, units)
 

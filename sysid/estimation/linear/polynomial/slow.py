@@ -24,7 +24,6 @@ from sysid.estimation.linear.segments import Segment, delayed_inputs, segments_o
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.transfer_function import fit_transfer_function
-from sysid.estimation.linear.transfer_function_problem import SLOWEST
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import Status
@@ -171,7 +170,7 @@ def of_transfer_function(
     longest = max(len(segment) for segment in errors.segments)
     if model.pole_radius > 1.0 + 1.0 / longest:  # it runs away within a record, where the bounded one does not
         return None
-    largest = 1.0 - 1.0 / (SLOWEST * longest)
+    largest = 1.0 - 1.0 / (slow_poles.SLOWEST * longest)
     problem = replace(errors, stable=model.pole_radius <= largest + ROUNDED, largest=largest)
     if not problem.stable:
         scaling = replace(scaling, input_offset=model.scaling.input_offset)

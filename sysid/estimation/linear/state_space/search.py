@@ -21,6 +21,8 @@ from sysid.estimation.linear.subspace.starts import Subspace
 from sysid.models import LinearStateSpace
 from sysid.models.linear.innovations import Innovations
 
+WORTH = 0.5
+"""How much larger, as a logarithm, errors may be without a model of the noise for one to be begun there."""
 QUICK = 4
 """Steps after which dead times are compared, from one subspace estimate: that which feedback does not bias."""
 
@@ -54,7 +56,9 @@ def search(
         iterations = training.max_iterations if training.method == METHODS[0] else 0
 
         def found_in(one: Problem) -> Found:
-            return one.best(subspace, training.weighting, iterations, began + training.max_time_s)
+            until = began + training.max_time_s
+            best = one.best(subspace, training.weighting, iterations, until)
+            return _from_white(best, one, iterations, until) if orders.noise and iterations else best
 
         bounded = replace(problem, stable=True, largest=slow_poles.largest_pole(problem.lengths))
         if training.stable is not None or (orders.noise and not iterations):
@@ -76,7 +80,7 @@ def search(
             found = problem.with_colour(found)
     told = slow_poles.notes(found.system.radius, problem.lengths, errors)
     told = (*told, *(torn(problem.segments, orders.states, records=len(segments)) if orders.noise else ()))
-    warned = told[:1] if not orders.noise and slow_poles.undecided(found.system.radius, problem.lengths) else ()
+    warned = slow_poles.warnings(found.system.radius, problem.lengths, told)
     return replace(found, singular_values=subspace.singular_values(), notes=told, warnings=warned)
 
 
@@ -135,6 +139,27 @@ def _better(inside: Found, beyond: Found, problem: Problem) -> Found:
     scale = float(np.mean([np.mean(segment.outputs**2) for segment in problem.segments]))
     size = beyond.chart.n_parameters
     return beyond if slow_poles.significantly_better(errors, than, parameters=size, scale=scale) else inside
+
+
+def _from_white(found: Found, problem: Problem, iterations: int, until: float) -> Found:
+    """What was found with a model of the noise, or what is nearer from where there is none.
+
+    White noise of a sensor is the commonest, and a gain of zeros says it; from the gain of a subspace estimate the
+    steps may end in a minimum that takes the noise for dynamics.
+    """
+    white = replace(problem, orders=replace(problem.orders, noise=False), stable=True)
+    begun = white.with_inputs(found.system.without_noise())
+    if begun is None:
+        return found
+    try:
+        still = white.refined(begun[1], iterations, until - now())
+        if size_of(still.covariance) > size_of(found.covariance) + WORTH:
+            return found
+        other = problem.refined(still.system, iterations, until - now())
+    except np.linalg.LinAlgError:  # a run from there is not finite
+        return found
+    better = size_of(other.covariance) < size_of(found.covariance)
+    return replace(other, weighting=found.weighting) if better else found
 
 
 def _quieter(beyond: Found, bounded: Problem, found_in: Callable[[Problem], Found]) -> Found:
