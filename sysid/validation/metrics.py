@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.traces.trace import LARGEST
 from sysid.units import squared
 
 
@@ -101,7 +102,8 @@ def figures(
 
     Args:
         target: Shape ``(n_samples,)``.
-        output: Shape ``(n_samples,)``; a value that is not finite makes every figure infinite or NaN.
+        output: Shape ``(n_samples,)``; a value that is not finite, or whose square is not, makes every figure
+            infinite or NaN.
         unit: Unit of both.
         counted: Which samples count; all by default. Where none does, every figure is NaN.
 
@@ -117,7 +119,7 @@ def figures(
     if len(target) == 0:
         return none(unit)
     still = is_constant(target)
-    if not np.isfinite(output).all():
+    if not np.abs(output).max() < LARGEST:  # NaN is not either
         return Figures(mse=np.inf, nrmse_fit=np.nan if still else -np.inf, max_abs_error=np.inf, r=np.nan, unit=unit)
     error = output - target
     spread = float(np.linalg.norm(target - target.mean()))

@@ -18,6 +18,13 @@ from sysid.validation.metrics import MERITS, Figures, figures, mean_fit, percent
 LEVELS = st.floats(-1e12, 1e12, allow_subnormal=False)
 
 
+@pytest.mark.parametrize("last", [1e200, -1e200, math.inf, math.nan])
+def test_a_run_that_has_left_has_no_figures_and_no_warning(last: float) -> None:
+    """Squares that overflow came as warnings of NumPy from ``sysid orders`` and ``sysid auto``."""
+    found = figures(np.arange(3.0), np.array([0.0, 1.0, last]), "V")
+    assert (found.mse, found.nrmse_fit, found.max_abs_error) == (math.inf, -math.inf, math.inf)
+
+
 def test_a_fit_is_as_compare_prints_it() -> None:
     target, output = np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.0, 1.0, 2.0, 2.0])
     found = figures(target, output, "V")
