@@ -19,6 +19,7 @@ from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import Training
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.remarks.equilibrium import equilibrium_notes
+from sysid.estimation.remarks.parameter_doubt import unsure
 from sysid.estimation.remarks.record_notes import (
     between_levels,
     contradicted,
@@ -263,6 +264,8 @@ class Estimator:
         trained = float(errors[-1]) if errors is not None and len(errors) else None
         against = contradicted(found.model, traces, start, options, uncertainty=found.uncertainty, trained=trained)
         few = (*outnumbered(found.model, traces), *underexcited(found.model, traces), *held(found.model, traces))
+        if found.posterior is not None and found.loop is Loop.OPEN:
+            few = (*few, *unsure(found.posterior, found.model, traces, start))
         switches, levels = between_levels(found.model, traces)
         warned = (*undetermined(traces, mapping), *lost, *few, *against, *off, *levels)
         notes = (*own, *told, *switches, *warned, *checked)

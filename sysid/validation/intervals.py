@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.errors import ConfigError, TraceError
+from sysid.errors import ConfigError, TraceError, shortened
 from sysid.estimation import FitResult, Loop, Posterior
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import AbstractModel, Start
@@ -214,6 +214,14 @@ def predict_interval(
         >>> bool(0.9 < interval.coverage(trace["y"]).share <= 1.0)
         True
     """
+    if not isinstance(fit, FitResult):
+        raise ConfigError(
+            "an interval is of one model",
+            where="fit",
+            expected="a fit, as sysid.fit gives for one output or for a structure of several",
+            got=shortened(fit),
+            remedy='of a fit with a model an output take each by its name: fit["y1"]',
+        )
     if fit.posterior is None:
         raise ConfigError(
             "the fit has no posterior",
