@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from sysid.errors import ConfigError
@@ -265,7 +265,8 @@ class Estimator:
         against = contradicted(found.model, traces, start, options, uncertainty=found.uncertainty, trained=trained)
         few = (*outnumbered(found.model, traces), *underexcited(found.model, traces), *held(found.model, traces))
         if found.posterior is not None and found.loop is Loop.OPEN:
-            few = (*few, *unsure(found.posterior, found.model, traces, start))
+            variance_of = partial(found.posterior.parameter_variance, found.model, loop=Loop.CLOSED)
+            few = (*few, *unsure(variance_of, found.model, traces, start))
         switches, levels = between_levels(found.model, traces)
         warned = (*undetermined(traces, mapping), *lost, *few, *against, *off, *levels)
         notes = (*own, *told, *switches, *warned, *checked)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sysid.estimation.networks.posterior import Posterior
 from sysid.estimation.records.experiment import Experiment
-from sysid.estimation.results.result import Loop
 from sysid.models import AbstractModel, Start
 from sysid.traces import Trace
 
@@ -19,14 +18,19 @@ UNSURE = 0.5
 interval as wide as the output moves."""
 
 
-def unsure(posterior: Posterior, model: AbstractModel, traces: Sequence[Trace], start: Start) -> tuple[str, ...]:
+def unsure(
+    variance_of: Callable[[Experiment], NDArray[np.float64]],
+    model: AbstractModel,
+    traces: Sequence[Trace],
+    start: Start,
+) -> tuple[str, ...]:
     """How far the free run over a record that was fitted is left open by the parameters.
 
     A fit of the free run keeps it near the record whatever its parameters are; one step ahead parameters that make
     hardly a difference there may move the free run by more than the output itself moves.
 
     Args:
-        posterior: What is known of the parameters.
+        variance_of: What of the free run's variance is due to the parameters, of the output's shape.
         model: The model.
         traces: Estimation traces.
         start: What stands before each.
@@ -40,7 +44,7 @@ def unsure(posterior: Posterior, model: AbstractModel, traces: Sequence[Trace], 
     counted = np.ones(shape[0], dtype=np.bool_) if experiment.weights is None else experiment.weights > 0.0
     if not counted.any():
         return ()
-    variance = posterior.parameter_variance(model, experiment, Loop.CLOSED).reshape(shape)[counted].mean(axis=0)
+    variance = variance_of(experiment).reshape(shape)[counted].mean(axis=0)
     moved = experiment.output.reshape(shape)[counted].var(axis=0)
     open_ = [
         f"that of {name} by ±{196 * np.sqrt(left / own):.0f} % of how far {name} moves"
