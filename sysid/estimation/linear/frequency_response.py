@@ -76,13 +76,14 @@ class Spectrum:
 
         Args:
             frequency: In rad/s, shape ``(n_points,)``.
-            response: Output unit per input unit, shape ``(n_points, n_inputs)``.
+            response: Output unit per input unit, shape ``(n_points, n_inputs)``, or ``(n_points,)`` of one input.
             weights: As in the class.
 
         Returns:
             One spectrum per input.
         """
         response = np.asarray(response, dtype=np.complex128)
+        response = response[:, np.newaxis] if response.ndim == 1 else response
         unit = np.eye(response.shape[1], dtype=np.complex128)
         return tuple(
             cls(

@@ -53,7 +53,7 @@ def backward(record: Record, repairs: RepairOptions) -> Record:
     first = int(bad[0])
     if repairs.backward is None:
         raise TraceError(
-            f"{len(bad)} time stamps step back",
+            "1 time stamp steps back" if len(bad) == 1 else f"{len(bad)} time stamps step back",
             where=record.where(first),
             expected=f"a time after {record.stamps[first - 1]:g} s",
             got=f"{record.stamps[first]:g} s",

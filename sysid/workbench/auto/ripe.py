@@ -160,4 +160,5 @@ def _count(iterations: float) -> str:
     """Iterations of each training, as a reader counts; the starts of some structures take what time there is."""
     if iterations < 1.0:
         return "less than one iteration" if iterations else "no iteration"
-    return "1 iteration" if iterations == 1.0 else f"{iterations:.2g} iterations"
+    whole = math.floor(iterations)  # 19.75 of 20 are fewer than 20, and are not shown as 20
+    return "1 iteration" if whole == 1 else f"{whole} iterations"

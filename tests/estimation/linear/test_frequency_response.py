@@ -78,7 +78,7 @@ def test_twenty_poles_are_found_exactly() -> None:
     z = np.exp(1j * w * T)[:, None]
     response = np.sum(weights / (z - poles) + weights.conj() / (z - poles.conj()), axis=1)
     twenty = TransferFunction(poles=(20,), zeros=(19,), delays=(1,), intercept=False)
-    fit = fit_spectra(Spectrum.of_response(w, response[:, None]), ONE, twenty, input_units=("1",), **TERMS)
+    fit = fit_spectra(Spectrum.of_response(w, response), ONE, twenty, input_units=("1",), **TERMS)
     found = np.sort_complex(fit.model.poles(0))
     np.testing.assert_allclose(found, np.sort_complex(np.concatenate([poles, poles.conj()])), atol=1e-9)
     np.testing.assert_allclose(fit.model.response(0, w), response, atol=1e-8 * np.abs(response).max())

@@ -38,7 +38,7 @@ REFUSED: dict[str, Refused] = {
     "backward time stamps": (
         {"stamps": BACKWARD},
         TraceError,
-        r"1 time stamps step back.*sample 6 \(line 8\).*after 0\.6 s.*0\.5 s.*backward: sort",
+        r"1 time stamp steps back.*sample 6 \(line 8\).*after 0\.6 s.*0\.5 s.*backward: sort",
     ),
     "jitter": (
         {"stamps": JITTER},

@@ -107,7 +107,8 @@ def test_what_says_little_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("iterations", "said"), [(0, "(no iteration)"), (1, "(less than one iteration)"), (9, "(2.2 iterations)")]
+    ("iterations", "said"),
+    [(0, "(no iteration)"), (1, "(less than one iteration)"), (9, "(2 iterations)"), (79, "(19 iterations)")],
 )
 def test_what_came_to_no_iteration_is_told_in_words(iterations: int, said: str) -> None:
     """The starts of block-oriented models alone can take the time of a trial."""
