@@ -132,6 +132,16 @@ class FittedProcess(TransferFunctionModel):
         ].integrates
         return "/".join([self.output_unit or "1", *(f"({one})" if "/" in one or "*" in one else one for one in below)])
 
+    @property
+    def units(self) -> dict[str, str]:
+        """By parameter its unit, with those of the constant and of the level of what integrates; ``1`` for none."""
+        inputs = self.mapping.inputs
+        found = {"constant": self.output_unit}
+        for j, (kind, of, unit) in enumerate(zip(self.process.types, inputs, self.input_units, strict=True)):
+            found |= {shown(name, of, inputs): self.unit_of(name, j) for name in kind.names}
+            found[shown("level", of, inputs)] = unit
+        return found
+
     def dead_time(self, j: int) -> float:
         """The dead time of an input in seconds.
 

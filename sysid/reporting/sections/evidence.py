@@ -9,6 +9,7 @@ from sysid.bounded_text import read_json
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult
 from sysid.estimation.estimators import ESTIMATORS
+from sysid.models import ProcessModel
 from sysid.reporting.curves import read_curves
 from sysid.reporting.figures.curves_figure import curves_figure
 from sysid.reporting.figures.linear_figures import bode_figure, pole_zero_figure, step_figure
@@ -45,7 +46,7 @@ def evidence_sections(folder: Path, results: Results) -> list[Section]:
     if any(residuals.values()):
         sections.append(_residuals(results, residuals))
     models = _models(results.fits)
-    tables = [table for fit in models if not _linear(fit) for table in _parameters(folder, fit)]
+    tables = [table for fit in models for table in _parameters(folder, fit)]
     if tables:
         sections.append(Section(anchor="parameters", title="Parameters", parts=tuple(tables)))
     shown = [part for fit in results.fits for part in _curves(folder, fit)]
@@ -190,7 +191,8 @@ def _responses(folder: Path, fit: FitRecord, unit: FrequencyUnit) -> list[Part]:
 
 
 def _parameters(folder: Path, fit: FitRecord) -> list[Table]:
-    if "equations" not in fit.structure:  # only names that somebody gave mean something
+    # Only names that somebody gave, or that the field has, mean something.
+    if "equations" not in fit.structure and fit.structure.get("kind") != ProcessModel.kind:
         return []
     stored = _read_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
     return [] if stored is None else parameter_tables(fit, stored)

@@ -1,13 +1,15 @@
-"""The parameters of equations as a table: values with their intervals, and by case where they differ."""
+"""The parameters of equations and of process models as a table: values with intervals, by case where they differ."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from sysid.estimation import FitResult
 from sysid.estimation.results.uncertainty import Uncertainty
+from sysid.models import AbstractModel, FittedProcess
 from sysid.models.grey_box.grey_box_model import EquationModel
 from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.numbers import number
@@ -30,8 +32,8 @@ def parameter_tables(fit: FitRecord, stored: FitResult) -> list[Table]:
     known = stored.uncertainty
     if known is None or not known.names:
         return []
-    tables = [_table(fit.name, known)]
     found = stored.model
+    tables = [_table(fit.name, _labelled(known, found), "of its equations" if isinstance(found, EquationModel) else "")]
     if isinstance(found, EquationModel) and found.case_values is not None:
         fitted = found.case_values
         rows = tuple(
@@ -54,7 +56,15 @@ def _of_others(name: str, names: Sequence[str], rows: tuple[tuple[Cell, ...], ..
     )
 
 
-def _table(name: str, known: Uncertainty) -> Table:
+def _labelled(known: Uncertainty, model: AbstractModel) -> Uncertainty:
+    """The same with each parameter's unit behind its name, which those of equations have already."""
+    if not isinstance(model, FittedProcess):
+        return known
+    units = model.units
+    return replace(known, names=tuple(one if units[one] == "1" else f"{one} [{units[one]}]" for one in known.names))
+
+
+def _table(name: str, known: Uncertainty, of: str) -> Table:
     deviations, ends = known.standard_deviations, known.interval(LEVEL)
     profiled = known.profile is not None
     rows = []
@@ -70,7 +80,7 @@ def _table(name: str, known: Uncertainty) -> Table:
         rows.append(tuple(cells))
     head = [("parameter", "unit"), ("value", ""), ("deviation", "standard"), ("95 % interval", "from the curvature")]
     return Table(
-        caption=f"{name}: parameters of its equations.",
+        caption=f"{name}: parameters{' ' * bool(of)}{of}.",
         head=(*head, *([("95 % interval", "by profile likelihood")] if profiled else [])),
         rows=tuple(rows),
         note="From the curvature at the minimum: short where the run is far from linear in a parameter, and none at a "

@@ -30,7 +30,7 @@ def of_parameters(model: FittedProcess, known: Uncertainty) -> str:
             label = shown(name, inputs[j], inputs)
             wide = half.get(label, np.nan)
             sure = " (given)" if label not in half else "" if np.isnan(wide) else f" ± {wide:.2g}"
-            told.append(in_unit(f"{label} = {value:.5g}{sure}", model.unit_of(name, j)))
+            told.append(in_unit(f"{label} = {value:.5g}{sure}", model.units[label]))
     return f"{', '.join(told)}."
 
 
@@ -52,7 +52,7 @@ def of_bounds(model: FittedProcess, end: End) -> tuple[str, ...]:
         label, of = shown(name, inputs[j], inputs), inputs[j]
         known = model.process.known(name, of)
         declared = known is not None and np.isfinite(known.low if side == "low" else known.high)
-        value = in_unit(f"{model.parameters[label]:.5g}", model.unit_of(name, j))
+        value = in_unit(f"{model.parameters[label]:.5g}", model.units[label])
         if declared:
             told.append(f"{label} stands at its bound, {value}: it has no interval. Widen the bound, or fix it there.")
         elif name == DEAD_TIME and side == "low":
