@@ -113,6 +113,20 @@ _FORM = re.compile(r"(str|int|float|bool|none)$|[a-z-]+\[")
 """What pydantic calls the forms that a field may have: ``str``, ``dict[str,float]``."""
 
 
+_ELSEWHERE = {"detrend": ("drift",), "resample": ("grid",), "misdata": ("nan", "gaps"), "merge": ("cases",)}
+"""What some fields are called in other tools, in small letters."""
+_FILTERS = ("filter", "prefilter", "idfilt", "focus", "weightingfilter", "lowpass", "highpass", "bandpass")
+_NO_FILTER = (
+    "no record is filtered: take a structure with a model of the noise (BJ), grid: {method: average}, or repairs: "
+    "{drift: ...} (docs/how/filters.md)"
+)
+
+
+def _elsewhere(known: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Those words of other tools that stand for fields which there are here."""
+    return {word: ones for word, ones in _ELSEWHERE.items() if set(ones) <= set(known)}
+
+
 def _in_data(loc: Loc, data: object) -> Loc:
     """A pydantic location as it is in the data: without the form that was tried of a field that may have several."""
     there: list[str | int] = []
@@ -140,7 +154,8 @@ def _config_error(found: list[dict[str, Any]], model: type[BaseModel], origins: 
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, loc[:-1])
         what, expected, got = f"unknown field {loc[-1]!r}", f"one of {', '.join(known)}", str(loc[-1])
-        remedy = did_you_mean(loc[-1], known, "remove it, or use one of the fields that are known")
+        otherwise = _NO_FILTER if loc[-1] in _FILTERS else "remove it, or use one of the fields that are known"
+        remedy = did_you_mean(loc[-1], known if loc[-1] not in _FILTERS else (), otherwise, also=_elsewhere(known))
     elif first["type"] == "missing":
         what, expected, got = (
             f"the field {loc[-1]!r} is missing",

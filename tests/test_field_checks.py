@@ -56,6 +56,23 @@ def test_a_field_at_fault_is_named_with_its_path(data: dict[str, object], where:
     assert str(caught.value.remedy).startswith(remedy)
 
 
+class Mended(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    drift: str = ""
+    jitter: str = ""
+
+
+@pytest.mark.parametrize(
+    ("field", "remedy"),
+    [("detrend", "did you mean drift?"), ("filter", "no record is filtered"), ("focus", "no record is filtered")],
+)
+def test_a_word_of_another_tool_leads_to_what_there_is(field: str, remedy: str) -> None:
+    """``filter`` was answered with jitter."""
+    with pytest.raises(ConfigError) as caught:
+        check(Mended, {field: 1}, where="x.yaml")
+    assert str(caught.value.remedy).startswith(remedy)
+
+
 class Truths(BaseModel):
     on: bool = False
     count: int | None = None
