@@ -140,6 +140,14 @@ def write_lvm(path: Path) -> None:
     path.write_text("\n".join([*head, *rows]))
 
 
+def write_codesys(path: Path) -> None:
+    lines = ["[key]; [value]", "Version; 0x03050000", "IecTaskName; MainTask"]
+    for number, (name, values) in enumerate((("BP [kPa gauge]", PIPE), ("u [V]", VOLT))):
+        lines += [f"{number}.Variable; {name}", f"{number}.Class; 14", f"{number}.Data; "]
+        lines += [f"; {1000 * t:.0f}; {x!r}" for t, x in zip(TIME.tolist(), values.tolist(), strict=True)]
+    path.write_text("\n".join(lines))
+
+
 def write_excel(path: Path) -> None:
     import openpyxl
 

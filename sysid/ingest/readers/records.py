@@ -30,6 +30,7 @@ _NUMBERED = re.compile(
     r"part|session|batch|shot)[ _.-]?\d+",
     re.IGNORECASE,
 )
+_MANY = 3  # names with both letters, from which on it is no chance
 _PIECES = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^A-Za-z\d]+")
 _INDEXED = re.compile(r".*\{\d+\}")
 
@@ -226,12 +227,20 @@ def _by_word(table: RawTable, found: list[Found]) -> list[RecordChoice]:
         tags = _agreeing(tags)
         lengths = [{len(item.column.values) for item in members.values()} for members in tags.values()]
         differ = len({frozenset(own) for own in lengths}) > 1
-        # Of like length, u and y once with each letter are two records; other names may be one of four channels.
-        told = tag_of is _short_tag and any({"u", "y"} == set(members) for members in tags.values())
+        told = tag_of is _short_tag and _are_told(set(next(iter(tags.values()), ())), len(plain))
         told = told or (tag_of is _number_tag and all(map(_is_numbered_matrix, tags.values())))
         if len(tags) > 1 and all(len(own) == 1 for own in lengths) and (differ or told or not needs_lengths):
             return [_column_record(table, tag, members) for tag, members in tags.items()]
     return []
+
+
+def _are_told(stems: set[str], count: int) -> bool:
+    """Whether channels of like length that end in e and in v are two records, and not one of twice as many channels.
+
+    So are ``u`` and ``y``, a matrix ``z`` of both, and many names of which each stands there once with each letter.
+    """
+    matrix = len(stems) > 1 and all(re.fullmatch(r"z_\d+", stem) for stem in stems)
+    return stems == {"u", "y"} or matrix or (len(stems) >= _MANY and 2 * len(stems) == count)
 
 
 def _is_numbered_matrix(members: Mapping[str, Found]) -> bool:

@@ -35,8 +35,19 @@ def records(tmp_path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
             {"zEst": np.column_stack([LONG, LONG]), "zVal": np.column_stack([SHORT, SHORT])},
             {"Est": {"z_1": "zEst_1", "z_2": "zEst_2"}, "Val": {"z_1": "zVal_1", "z_2": "zVal_2"}},
         ),
+        (
+            {"ze": np.column_stack([LONG, LONG]), "zv": np.column_stack([LONG, LONG])},
+            {"estimation": {"z_1": "ze_1", "z_2": "ze_2"}, "validation": {"z_1": "zv_1", "z_2": "zv_2"}},
+        ),
+        (
+            {"t1e": LONG, "s2e": LONG, "i3se": LONG, "t1v": LONG, "s2v": LONG, "i3sv": LONG, "Ts": 0.01},
+            {
+                "estimation": {"t1": "t1e", "s2": "s2e", "i3s": "i3se"},
+                "validation": {"t1": "t1v", "s2": "s2v", "i3s": "i3sv"},
+            },
+        ),
     ],
-    ids=["uEst", "est_u", "utrain", "ue", "u1", "matrices"],
+    ids=["uEst", "est_u", "utrain", "ue", "u1", "matrices", "ze", "three of both"],
 )
 def test_a_word_in_the_name_tells_records_apart(
     tmp_path: Path, arrays: dict[str, Any], expected: dict[str, dict[str, str]]
@@ -51,9 +62,10 @@ def test_a_word_in_the_name_tells_records_apart(
         {"value": LONG, "valve": LONG},
         {"u_est": LONG, "y_val": LONG},
         {"ue": LONG, "uv": LONG},
+        {"ie": LONG, "iv": LONG, "te": LONG, "tv": LONG},
         {"u": LONG, "y": LONG, "extra": SHORT},
     ],
-    ids=["numbers", "words in words", "other stems", "letters", "another length"],
+    ids=["numbers", "words in words", "other stems", "letters", "two with letters", "another length"],
 )
 def test_columns_that_only_look_alike_are_one_record(tmp_path: Path, arrays: dict[str, Any]) -> None:
     assert records(tmp_path, arrays) == {}
