@@ -139,7 +139,7 @@ def drifts_told(model: AbstractModel, traces: Sequence[Trace], runs: Sequence[Fr
     for i, mapping in enumerate(model.mapping.each if model.mapping.inputs else ()):
         outputs = [run.output[run.usable, i] for run in runs if run.usable.any()]
         spread = float(np.concatenate(outputs).std()) if outputs else 0.0
-        slow = (model.pole_radius or 0.0) > SLOW and not getattr(model.structure, "integrated", False)
+        slow = _slowest(model) > SLOW and not getattr(model.structure, "integrated", False)
         asked = [j for j, run in enumerate(runs) if spread > 0.0 and _may_drift(run, i, spread, slow=slow)]
         found = _drifts([traces[j] for j in asked], mapping, spread, model) if asked else []
         if found:
@@ -153,6 +153,11 @@ def drifts_told(model: AbstractModel, traces: Sequence[Trace], runs: Sequence[Fr
                 f"(repairs: {{drift: {{{mapping.output}: line}}}}), or give its cause as an input."
             )
     return told
+
+
+def _slowest(model: AbstractModel) -> float:
+    """Magnitude of the slowest pole, of a model of the noise too: a run from a state that the record shows has all."""
+    return max(model.pole_radius or 0.0, float(getattr(model.recursion, "radius", 0.0)))
 
 
 def _in(some: int, every: int) -> str:

@@ -156,7 +156,7 @@ class StateSpace(AbstractForm):
         inputs, output = self._checked(history.inputs), self._scaled(history.output)
         if len(inputs) == 1:
             return self.resting(inputs[0], output[0])
-        x = self.equilibrium(inputs[0]) if self._radius < 1.0 - AT_ONE else np.zeros(self.n_state)
+        x = self.equilibrium(inputs[0]) if self.radius < 1.0 - AT_ONE else np.zeros(self.n_state)
         return x + self._correction(inputs, output, x, history.known)
 
     @property
@@ -166,7 +166,7 @@ class StateSpace(AbstractForm):
         return self.n_state + moving + 1
 
     @cached_property
-    def _radius(self) -> float:
+    def radius(self) -> float:
         """Largest magnitude of an eigenvalue."""
         return float(np.abs(scipy.linalg.eigvals(self.A)).max(initial=0.0)) if self.n_state else 0.0
 
@@ -330,7 +330,7 @@ class StateSpace(AbstractForm):
         left = missing - (observed / scale) @ found
         level = float(left @ left) / max(len(left) - rank, 1)
         clean = level <= EXACT * max(float(np.mean(output**2)), np.finfo(np.float64).tiny)
-        if (len(left) > rank and clean) or self._radius >= 1.0 - AT_ONE:
+        if (len(left) > rank and clean) or self.radius >= 1.0 - AT_ONE:
             return np.asarray(found / scale)
         spread = self._covariance(level)
         told = observed @ _root(spread)
@@ -338,7 +338,7 @@ class StateSpace(AbstractForm):
             return np.asarray(found / scale)
         if len(left) <= rank:
             level = HISTORY_NOISE * max(float(np.mean(np.sum(told**2, axis=1))), np.finfo(np.float64).tiny)
-        if self.n_inputs and self._radius < 1.0:  # the first input may not have been held always
+        if self.n_inputs and self.radius < 1.0:  # the first input may not have been held always
             held = scipy.linalg.lstsq(np.eye(self.n_state) - self.A, self.B)[0]
             spread = spread + held @ held.T
         root = _root(spread)
@@ -357,7 +357,7 @@ class StateSpace(AbstractForm):
         Args:
             level: Variance of the innovations: what no input reaches, such as the level of a drift, they do.
         """
-        if self._radius >= 1.0:
+        if self.radius >= 1.0:
             return np.eye(self.n_state)
         drive = self.B @ self.B.T + level * (self.gain @ self.gain.T)
         return np.asarray(scipy.linalg.solve_discrete_lyapunov(self.A, drive))

@@ -16,6 +16,7 @@ STRUCTURES = {
     "OE": sysid.OE(nb=1, nf=1, nk=3),
     "TransferFunction": sysid.TransferFunction(poles=2, zeros=1, delays=3),
     "LinearStateSpace": sysid.LinearStateSpace(states=2),
+    "BJ, whose noise takes it": sysid.BJ(nb=1, nf=1, nc=1, nd=1, nk=3),
 }
 UNASKED = sysid.StabilityOptions(count=0)
 

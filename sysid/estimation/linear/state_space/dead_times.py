@@ -10,9 +10,10 @@ import numpy as np
 from sysid.errors import FitDivergedError, TraceError, UserError
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.begun_at_rest import left_out
-from sysid.estimation.linear.delay_search import check_max_delay, searched_delays
+from sysid.estimation.linear.delay_search import CHANCE, FEW, check_max_delay, searched_delays
 from sysid.estimation.linear.segments import Segment
-from sysid.estimation.linear.state_space.search import quick_size
+from sysid.estimation.linear.state_space.refinement import size_of
+from sysid.estimation.linear.state_space.search import quick_size, search
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.subspace.starts import ENOUGH
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
@@ -48,22 +49,60 @@ def behind_dead_times(
     most = longest_dead_time([len(one) for one in looked]) if training.max_delay is None else training.max_delay
     least, most = orders.shortest, max(orders.shortest, most)
     with one_blas_thread():
-
-        def loss(delays: tuple[int, ...], unknown: int) -> float:
-            tried = replace(orders, nk=delays)
-            try:
-                return quick_size(late(looked, tried, unknown=unknown - orders.shortest), tried, training)
-            except (
-                UserError,
-                FitDivergedError,
-                np.linalg.LinAlgError,
-                ValueError,
-            ):  # nothing that can be fitted, or run
-                return np.inf
-
-        delays, told = searched_delays(_places(looked, orders.states, most, least), least, most, loss)
+        places = _places(looked, orders.states, most, least)
+        delays, told = _searched(looked, orders, training, places, (least, most))
+        if orders.noise:
+            white = _searched(looked, replace(orders, noise=False), training, places, (least, most))
+            if white[0] != delays and not _clearly_better(delays, white[0], looked, orders, training):
+                delays, told = white
+        short = (least,) * m
+        if max(delays) > least + FEW and not _clearly_better(delays, short, looked, orders, training):
+            delays, told = short, ()
     found = replace(orders, nk=delays)
     return found, late(segments, found), (f"Dead times in samples: {', '.join(map(str, delays))}.", *told)
+
+
+def _searched(
+    segments: Sequence[Segment],
+    orders: LinearStateSpace,
+    training: StateSpaceTraining,
+    places: list[list[int]],
+    ends: tuple[int, int],
+) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Dead times of least error after a few steps, between a shortest and a longest, and what is to be said of them."""
+
+    def loss(delays: tuple[int, ...], unknown: int) -> float:
+        tried = replace(orders, nk=delays)
+        try:
+            size = quick_size(late(segments, tried, unknown=unknown - orders.shortest), tried, training)
+        except (UserError, FitDivergedError, np.linalg.LinAlgError, ValueError):  # nothing that can be fitted, or run
+            return np.inf
+        return float(np.exp(size))
+
+    gain = -float(np.expm1(-CHANCE / max(sum(map(len, segments)), 1)))
+    return searched_delays(places, *ends, loss, gain=gain)
+
+
+def _clearly_better(
+    delays: tuple[int, ...],
+    than: tuple[int, ...],
+    segments: Sequence[Segment],
+    orders: LinearStateSpace,
+    training: StateSpaceTraining,
+) -> bool:
+    """Whether a fit with some dead times is better than one with others by more than chance.
+
+    One step ahead a model of the noise makes up for a wrong dead time of a slow plant: what a free run says of it goes,
+    unless the errors speak against it, as under feedback.
+    """
+    unknown, sizes = max(*delays, *than) - orders.shortest, list[float]()
+    for one in (delays, than):
+        tried = replace(orders, nk=one)
+        try:
+            sizes.append(size_of(search(late(segments, tried, unknown=unknown), tried, training).covariance))
+        except (UserError, FitDivergedError, np.linalg.LinAlgError, ValueError):  # nothing that can be fitted, or run
+            sizes.append(np.inf)
+    return sum(map(len, segments)) * (sizes[1] - sizes[0]) > CHANCE
 
 
 def late(segments: Sequence[Segment], orders: LinearStateSpace, *, unknown: int | None = None) -> tuple[Segment, ...]:

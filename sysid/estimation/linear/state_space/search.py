@@ -148,10 +148,13 @@ def _from_white(found: Found, problem: Problem, iterations: int, until: float) -
     steps may end in a minimum that takes the noise for dynamics.
     """
     white = replace(problem, orders=replace(problem.orders, noise=False), stable=True)
-    begun = white.with_inputs(found.system.without_noise())
-    if begun is None:
-        return found
+    steady = found.system.steady()  # balanced for a predictor that forgets at once, a free run has no digits left
+    system = found.system if steady is None else found.system.in_coordinates(*steady)
     try:
+        with np.errstate(all="ignore"):
+            begun = white.with_inputs(system.without_noise())
+        if begun is None:
+            return found
         still = white.refined(begun[1], iterations, until - now())
         if size_of(still.covariance) > size_of(found.covariance) + WORTH:
             return found

@@ -49,6 +49,30 @@ def test_a_dead_time_is_found_where_hardly_anything_is_noise(states: int, size: 
 
 
 @pytest.mark.parametrize("noise", [True, False], ids=["K", "no K"])
+@pytest.mark.parametrize(("constant", "dead"), [(400.0, 1), (50.0, 21)])
+def test_a_single_step_of_a_slow_lag_shows_its_dead_time(constant: float, dead: int, noise: bool) -> None:
+    """One step ahead a gain made up for hundreds of samples, and the free run came out with another sign."""
+    rng, pole = np.random.default_rng(0), np.exp(-1.0 / constant)
+    u = np.repeat([0.0, 1.0], [100, 500])
+    y = lfilter([0.0] * dead + [1.0 - pole], [1.0, -pole], u)
+    traces = sysid.data((u, y + 0.01 * y.std() * rng.standard_normal(600)), sample_time=1.0)
+    fit = sysid.fit(traces, "u -> y", LinearStateSpace(states=1, noise=noise, nk="auto"))
+    assert fit.model.structure.nk == (dead,)
+
+
+def test_a_dead_time_that_no_error_asks_for_is_none() -> None:
+    """Nine samples had been found: after a few steps of three resonances they came out a little better."""
+    rng = np.random.default_rng(2)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 60), 25)
+    y = u
+    for w, r in ((0.03, 0.999), (0.12, 0.995), (0.3, 0.99)):
+        y = lfilter([0.0, 1.0, 1.0], [1.0, -2.0 * r * np.cos(w), r**2], y)
+    traces = sysid.data((u, y + 0.001 * y.std() * rng.standard_normal(1500)), sample_time=1.0)
+    fit = sysid.fit(traces, "u -> y", LinearStateSpace(states=6, noise=False, nk="auto"))
+    assert fit.model.structure.nk == (1,)
+
+
+@pytest.mark.parametrize("noise", [True, False], ids=["K", "no K"])
 @pytest.mark.parametrize(("start", "lead"), [(FREE, 50), (REST, 0)], ids=["free", "rest"])
 def test_the_coefficients_behind_a_given_dead_time_are_exact(start: Start, lead: int, noise: bool) -> None:
     structure = LinearStateSpace(states=2, noise=noise, nk=DEAD)
