@@ -9,6 +9,7 @@ import numpy as np
 
 from sysid.errors import TraceError
 from sysid.estimation.linear.arx import fit_arx
+from sysid.estimation.records.informative import informative
 from sysid.models import ARX, AbstractModel, ARXModel, Start, StartKind, beginning
 from sysid.traces import Trace
 from sysid.units import in_unit
@@ -71,13 +72,16 @@ def _few(told: list[str]) -> tuple[str, ...]:
 def _plain_models(traces: Sequence[Trace], model: AbstractModel) -> list[AbstractModel]:
     """An ARX model of the records, where they are long enough for one and none of its poles is slower than they are.
 
-    Such a one may be an integrator, which rests anywhere: its equilibrium is where no plant ever was.
+    Such a one may be an integrator, which rests anywhere: its equilibrium is where no plant ever was. Nor is one asked
+    of records that begin with their step: its rows begin behind it, and its gain is anything.
     """
     edge = 1.0 - 1.0 / max(len(trace) for trace in traces)
     m = len(model.mapping.inputs)
     lags = max(1, min(LAGS, min(len(trace) for trace in traces) // (4 * (1 + m))))
     orders = ARX(na=min(2, lags), nb=(lags,) * m, nk=(0,) * m)
     models: list[AbstractModel] = []
+    if len(informative(np.concatenate([trace.columns(model.mapping.inputs)[lags:] for trace in traces]))) < m:
+        return models
     for mapping in model.mapping.each:
         try:
             found = fit_arx(traces, mapping, orders, start=ESTIMATED).model

@@ -342,7 +342,10 @@ class TransferFunctionModel(LinearForms):
         """One input's dead time and basis, with the weighted taps as its output."""
         part = realise(self.basis(j), self.orders.domain)
         if self.orders.domain is Domain.CONTINUOUS:
-            part = part.sampled(self.sample_time, moving=self.orders.moving(self.mapping.inputs)[j])
+            # Over the sample time, states are of one size with those of a dead time, whatever the unit of time is.
+            T = self.sample_time
+            part = part.sampled(T, moving=self.orders.moving(self.mapping.inputs)[j])
+            part = replace(part, B=part.B / T, C=T * part.C)
         row, direct = self.taps[j] @ part.C, float(self.taps[j] @ part.D)
         n, k = len(part.A), self.delays[j]
         if k == 0:

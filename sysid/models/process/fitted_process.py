@@ -193,8 +193,8 @@ class FittedProcess(TransferFunctionModel):
         if not part:
             return super()._block(j)
         basis = realise(self.basis(j), Domain.CONTINUOUS)
-        P, now, before = held(basis.A, basis.B, self.sample_time, part)
-        row, direct = self.taps[j] @ basis.C, float(self.taps[j] @ basis.D)
+        P, now, before = held(basis.A, basis.B / self.sample_time, self.sample_time, part)
+        row, direct = self.sample_time * self.taps[j] @ basis.C, float(self.taps[j] @ basis.D)
         n, late = len(P), k + 1
         A, B, C = np.zeros((n + late, n + late)), np.zeros(n + late), np.zeros(n + late)
         A[:late, :late], B[0] = np.eye(late, k=-1), 1.0

@@ -137,3 +137,12 @@ def test_a_right_model_of_a_slow_plant_is_not_called_unstable(
     for trace in traces:
         error = evaluate_case(found.model, trace, Role.ESTIMATION, ESTIMATED, 1).free_run.max_abs_error
         assert error < 1e-4 * float(np.ptp(np.concatenate([t["y"] for t in traces])))
+
+
+def test_a_record_that_begins_with_its_step_is_asked_of_no_model_whose_rows_begin_behind_it() -> None:
+    """A reaction curve from rest was told to be 0.7 off, by a small ARX model that had seen one value of the input."""
+    u = np.concatenate([np.zeros(1), np.ones(120)])
+    y = 2.0 * (1.0 - 0.93 ** np.maximum(np.arange(121) - 5, 0)) + 0.01 * np.random.default_rng(1).standard_normal(121)
+    late = TransferFunction(poles=(1,), zeros=(0,), delays=(5,))
+    found = fit([trace_of(u[:, None], y)], MAPPING, late, start=Start(), stability=None)
+    assert not [note for note in found.notes if "does not begin" in note]

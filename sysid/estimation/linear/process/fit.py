@@ -129,7 +129,7 @@ def _result(process: ProcessModel, end: End, scaling: Scaling, channels: dict[st
         constant += scaling.output_scale * offset
     model = FittedProcess.of(process, own, constant=constant, level=level, scaling=scaling, **channels)
     known = process_uncertainty(model, end)
-    warned = (*of_bounds(model, end), *of_open(model, known))
+    warned = (*of_bounds(model, end), *of_open(model, known, end))
     unit = 2.0 * scaling.output_scale**2 / max(problem.n_counted, 1)
     return FitResult(
         model=model,

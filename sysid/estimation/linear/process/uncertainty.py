@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
@@ -17,6 +19,8 @@ Array = NDArray[np.float64]
 
 AT_END = 1e-6
 """Part of a parameter, or of a sample time, within which it stands at its bound."""
+EQUAL = 1e-3
+"""Part of a time constant within which another one is the same."""
 OPEN = 1e-12
 """Singular value of unit columns below which a direction is not shown, and part of a row in such directions."""
 
@@ -38,6 +42,23 @@ def at_bounds(end: End) -> list[str]:
         low, high = values[i] - bounds.low[i] <= near, bounds.high[i] - values[i] <= near
         found.append("low" if low else "high" if high else "")
     return found
+
+
+def merged(end: End) -> list[int]:
+    """Time constants of one input that came out equal: each is half of a pair, and has no interval of its own.
+
+    Args:
+        end: Where the search ended.
+
+    Returns:
+        Their places among all parameters.
+    """
+    problem, values, found = end.problem, end.problem.values(end.theta), set()
+    lags = [i for i in problem.free if problem.names[i][1].startswith("Tp")]
+    for a, b in itertools.combinations(lags, 2):
+        if problem.names[a][0] == problem.names[b][0] and abs(values[a] - values[b]) <= EQUAL * values[a]:
+            found |= {a, b}
+    return sorted(map(int, found))
 
 
 def process_uncertainty(model: FittedProcess, end: End) -> Uncertainty:
@@ -76,6 +97,7 @@ def process_uncertainty(model: FittedProcess, end: End) -> Uncertainty:
     covariance = variance * (moved @ moved.T)
     unknown = held.copy()
     unknown[~held] = lost
+    unknown[[list(problem.free).index(i) for i in merged(end)]] = True
     open_ = unknown[: len(rows)] | ~np.isfinite(np.diag(covariance))
     covariance[open_] = covariance[:, open_] = np.nan
     return Uncertainty(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sysid.estimation.linear.process.search import End
-from sysid.estimation.linear.process.uncertainty import at_bounds
+from sysid.estimation.linear.process.uncertainty import at_bounds, merged
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import FittedProcess
-from sysid.models.process.process_type import DAMPING, DEAD_TIME, GAIN
+from sysid.models.process.process_type import DAMPING, DEAD_TIME, GAIN, ZERO
 from sysid.models.process.structure import shown
 from sysid.units import in_unit
 
@@ -78,33 +78,46 @@ def of_bounds(model: FittedProcess, end: End) -> tuple[str, ...]:
     return tuple(told)
 
 
-def of_open(model: FittedProcess, known: Uncertainty) -> tuple[str, ...]:
+def of_open(model: FittedProcess, known: Uncertainty, end: End) -> tuple[str, ...]:
     """Parameters that the records hardly tell.
 
     Args:
         model: The model.
         known: What is known of its parameters.
+        end: Where the search ended.
 
     Returns:
-        A sentence for each gain or time constant that may as well be nothing.
+        A sentence for each gain or time constant that may as well be nothing, one for time constants that are equal,
+        and one for all that are not told apart.
     """
-    inputs = model.mapping.inputs
-    lags = {shown(name, of, inputs) for kind, of in zip(model.process.types, inputs, strict=True)
-            for name in kind.constants if name != DAMPING}  # fmt: skip
-    low, high = known.interval(0.95).T
-    gains = {shown(GAIN, of, inputs) for of in inputs}
-    lost = [name for name, a, b in zip(known.names, low, high, strict=True) if name in gains and a <= 0.0 <= b]
-    told = [
-        f"{name} may as well be 0 by these records, and others may make up for it: take a type with a pole less, or "
-        f"give {name}."
-        for name, end in zip(known.names, low, strict=True)
-        if name in lags and end <= 0.0
-    ]
-    told += [
-        f"{name} may as well be 0 by these records. Where they begin at rest, start: rest tells more; else record more "
-        "of what its input does."
-        for name in lost
-    ]
+    problem, inputs, told = end.problem, model.mapping.inputs, []
+    labels = {int(i): shown(problem.names[i][1], inputs[problem.names[i][0]], inputs) for i in problem.free}
+    equal = [labels[i] for i in merged(end)]
+    if equal:
+        told.append(
+            f"{' and '.join(equal)} came out equal, and have no intervals: two real poles are no better than a pair. "
+            "Try U in the type, or a pole less."
+        )
+    ends = dict(zip(known.names, known.interval(0.95), strict=True))
+    sides = dict(zip(labels.values(), at_bounds(end), strict=True))
+    lost = [one for one in labels.values() if np.isnan(ends[one][0]) and not sides[one] and one not in equal]
+    if lost:
+        told.append(
+            f"These records do not tell {', '.join(lost)}: others make up for each. Give one (fixed: true), or take a "
+            "letter out of the type; of records that begin at rest start: rest tells more."
+        )
+    for i, label in labels.items():
+        name, (low, high) = problem.names[i][1], ends[label]
+        if name.startswith("T") and name not in {DEAD_TIME, ZERO} and low <= 0.0:
+            told.append(
+                f"{label} may as well be 0 by these records, and others may make up for it: take a type with a pole "
+                f"less, or give {label}."
+            )
+        elif name == GAIN and low <= 0.0 <= high:
+            told.append(
+                f"{label} may as well be 0 by these records. Where they begin at rest, start: rest tells more; else "
+                "record more of what its input does."
+            )
     return tuple(told)
 
 

@@ -181,3 +181,25 @@ def test_masked_samples_do_not_count() -> None:
     hidden = {"channel": "y", "start": 100 * T, "stop": 129 * T}
     traces = sysid.data((u, y), inputs="u", outputs="y", sample_time=T, repairs={"mask": [hidden]})
     assert max(off(fitted("P1D", traces), dict(zip(("K", "Tp1", "Td"), PLANTS["P1D"], strict=True))).values()) < 3.0
+
+
+@pytest.mark.parametrize("unit", [1e-9, 86_400.0], ids=["nanoseconds", "days"])
+def test_the_unit_of_time_changes_nothing(unit: float) -> None:
+    u = steps(2)
+    y = output("P1D", PLANTS["P1D"], u, seed=3)
+    found = sysid.fit(sysid.data((u, y), sample_time=T * unit), "u -> y", sysid.ProcessModel(type="P1D"))
+    plain = fitted("P1D", (u, y))
+    assert found.model.parameters["Td"] == pytest.approx(unit * plain.model.parameters["Td"], rel=1e-5)
+    assert found.simulate(u) == pytest.approx(plain.simulate(u), rel=1e-6)
+
+
+def test_poles_that_come_out_equal_and_what_is_made_up_for_are_told_and_have_no_intervals() -> None:
+    u = steps(2)
+    pair = fitted("P2D", (u, output("P2DU", [2.0, 10.0, 0.8, 5.0], u, seed=3)))
+    assert any("Tp1 and Tp2 came out equal" in warned for warned in pair.warnings)
+    deviations = dict(zip(pair.uncertainty.names, pair.uncertainty.standard_deviations, strict=True))
+    assert np.isnan(deviations["Tp1"])
+    assert deviations["K"] > 0.0
+    # Of inputs that are held a zero beside one pole and a part of a sample do the same at all samples.
+    zero = fitted("P1DZ", (u, output("P1DZ", [2.0, 20.0, 8.0, 6.6], u, seed=3)))
+    assert any("do not tell Tz, Td" in warned for warned in zero.warnings)
