@@ -15,6 +15,7 @@ from itertools import chain
 from sysid.composite.active_learning import LEARNED, ActiveLearned, Round, learn_actively
 from sysid.composite.candidates import Candidates, Given, fit_candidates
 from sysid.composite.composite import Composite
+from sysid.composite.fixed.equations import unit_contradictions_of
 from sysid.composite.fixed_members import with_fixed
 from sysid.composite.keeper import Keeper, MakeAll, Task
 from sysid.composite.limit_check import LimitCheck, check_limits
@@ -81,6 +82,7 @@ class TrainedComposite:
         rounds: The rounds of training end to end, those of active learning among them.
         active_learning: What active learning brought; ``None`` without it.
         limits: What is declared of limits, beside all that was fitted.
+        units: What contradicts itself in the units of equations that are fixed.
     """
 
     stages: Dict[str, Cascade]
@@ -90,6 +92,7 @@ class TrainedComposite:
     rounds: tuple[TrainedRound, ...] = ()
     active_learning: ActiveLearned | None = None
     limits: LimitCheck
+    units: tuple[str, ...] = ()
 
     @property
     def chosen(self) -> str:
@@ -115,7 +118,7 @@ class TrainedComposite:
         choice = [] if self.candidates is None or self.candidates.choice is None else [self.candidates.sentence]
         learned = [] if self.active_learning is None else [self.active_learning.sentence]
         estimated = [f"Round {one.name}: {told}" for one in self.rounds for told in one.fit.told_of_equations]
-        return [*choice, *(one.sentence for one in self.retrained), *said, *estimated, *learned]
+        return [*self.units, *choice, *(one.sentence for one in self.retrained), *said, *estimated, *learned]
 
 
 def train(
@@ -177,6 +180,7 @@ def train(
         limits=check_limits(
             composite, with_fixed(composite.fixed, data.fitted, values_in(whole)) if composite.free else seen.fitted
         ),
+        units=tuple(unit_contradictions_of(composite.fixed, seen.estimation[0])),
     )
 
 

@@ -1,8 +1,9 @@
 """Whether the units of equations go together: numbers are taken as they are, and nothing converts between them.
 
 What has no unit, as a plain number, is taken for whatever fits, so that only what contradicts itself is told: sums and
-comparisons of different things, the same thing in different units, angles in degrees. A factor such as ``60`` or
-``0.001`` may convert from one unit to another, and one such as ``9.81`` may have a unit of its own that nobody wrote.
+comparisons of different things, the same thing in different units, angles in degrees. A factor such as ``60`` may
+convert from one unit to another, and one such as ``9.81``, ``4180`` or ``1000`` may have a unit of its own that nobody
+wrote: of what it is in nothing is known.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from collections.abc import Mapping as Dict
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 from sysid.equations.functions import ALIKE, ANGLE, ANY, FUNCTIONS, PURE, ROOT, SECONDS, Function
@@ -22,21 +23,15 @@ from sysid.written_units import plain_unit, registry
 _SAME: Final = 1e-3
 """Units of one thing are the same up to this: some have been rounded differently, as psi in Pa."""
 _PURE: Final = frozenset({1.0, 2.0, 3.0, 4.0, 0.5, 0.25, math.pi})
-"""Factors that are of geometry, and convert nothing."""
+"""Factors that are of geometry, and have no unit."""
 _SUMS, _PRODUCTS, _POWERS, _LOGIC = ("+", "-"), ("*", "/"), ("^", "**"), ("and", "or")
 
 
 @dataclass(frozen=True)
 class _Unit:
-    """What a part of an expression is in.
-
-    Args:
-        of: The unit.
-        exact: Whether its factor is known: a number such as 60 may have converted it.
-    """
+    """What a part of an expression is in."""
 
     of: Any  # a pint unit: what its arithmetic returns is typed as something less
-    exact: bool = True
 
     def __str__(self) -> str:
         return f"{self.of:~C}" or "1"
@@ -45,7 +40,7 @@ class _Unit:
         """Whether numbers in one are none in the other."""
         if self.of.dimensionality != other.of.dimensionality:
             return True
-        return self.exact and other.exact and not math.isclose(_factor(self.of), _factor(other.of), rel_tol=_SAME)
+        return not math.isclose(_factor(self.of), _factor(other.of), rel_tol=_SAME)
 
 
 _Known: TypeAlias = "_Unit | None"
@@ -111,7 +106,7 @@ class _Check:
         self._assigned()
 
     def _times(self, unit: _Known, *, per_second: bool) -> _Known:
-        return _Unit(unit.of / registry().second, unit.exact) if unit and per_second else unit
+        return _Unit(unit.of / registry().second) if unit and per_second else unit
 
     def _assigned(self) -> None:
         if not (self.left and self.right and self.left.contradicts(self.right)):
@@ -129,7 +124,7 @@ class _Check:
         right, rate = self.equation.right, self.equation.kind == CONTINUOUS
         sides: list[tuple[str, _Known]] = []
         if isinstance(right, Name) or (by_formula and self.complete):
-            whole = _Unit(self.right.of * registry().second, self.right.exact) if self.right and rate else self.right
+            whole = _Unit(self.right.of * registry().second) if self.right and rate else self.right
             sides.append((self.equation.name, whole))
         if isinstance(right, Name):
             sides.append((right.name, self.left))
@@ -139,20 +134,13 @@ class _Check:
         """What a part is in; ``None`` where nobody knows."""
         match node:
             case Number():
-                return self._number(node.value)
+                return _number() if self.strict and node.value in _PURE else None
             case Name() | Delayed():
                 return self.known.get(node.name)
             case Call():
                 return self._call(node)
         assert isinstance(node, Operation)  # noqa: S101 - there is no other node
         return self._operation(node)
-
-    def _number(self, value: float) -> _Known:
-        if not self.strict or value == 0.0:
-            return None
-        if value in _PURE:
-            return _number()
-        return replace(_number(), exact=False) if _converts(value) else None
 
     def _operation(self, node: Operation) -> _Known:
         if len(node.operands) == 1:
@@ -180,7 +168,7 @@ class _Check:
         inside = exponent.operands[0] if negative and isinstance(exponent, Operation) else exponent
         if base is None or not isinstance(inside, Number):
             return None
-        return _Unit(base.of ** (-inside.value if negative else inside.value), base.exact)
+        return _Unit(base.of ** (-inside.value if negative else inside.value))
 
     def _alike(self, parts: Sequence[Node]) -> _Known:
         """The unit that parts have in common; told where they have none."""
@@ -210,7 +198,7 @@ class _Check:
         if one.gives == PURE:
             return _number()
         if one.gives == ROOT and common:
-            return _Unit(common.of**0.5, common.exact)
+            return _Unit(common.of**0.5)
         return common if one.gives == ALIKE else None
 
     def _as_asked(self, node: Call, unit: _Unit, asked: str) -> None:
@@ -247,12 +235,7 @@ def _number() -> _Unit:
 def _product(a: _Known, b: _Known, operator: str) -> _Known:
     if a is None or b is None:
         return None
-    return _Unit(a.of * b.of if operator == "*" else a.of / b.of, a.exact and b.exact)
-
-
-def _converts(value: float) -> bool:
-    """Whether a number may convert one unit to another: 60, 1000, 0.001, and no 9.81."""
-    return value.is_integer() or (0.0 < value < 1.0 and (1.0 / value).is_integer())
+    return _Unit(a.of * b.of if operator == "*" else a.of / b.of)
 
 
 def _factor(unit: Any) -> float:

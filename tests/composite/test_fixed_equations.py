@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sysid.composite import FixedMember, equation_of, fixed_by_equations, with_fixed
+from sysid.composite.fixed.equations import unit_contradictions_of
 from sysid.errors import ConfigError
 from sysid.models import Mapping, VectorGreyBox, VectorGreyBoxModel, VectorScaling
 from sysid.traces import Channel, Trace
@@ -177,3 +178,23 @@ def test_what_is_no_held_sum_is_told(equation, says):
 def test_what_is_said_of_no_equation_is_told(given):
     with pytest.raises(ConfigError, match=f"{next(iter(given))} names z, which is in none of the equations"):
         fixed_by_equations("y = a", **given)
+
+
+@pytest.mark.parametrize(
+    ("equation", "told"),
+    [
+        pytest.param("y = a - b", "a is in bar, and b in psi", id="a sum"),
+        pytest.param("y = 2*a - 0.1*b", "", id="weights, which may convert"),
+        pytest.param("y = min(a, b)", "a is in bar, and b in psi", id="an expression"),
+        pytest.param("R = relay(a - b[k-1], on=1, off=0)", "a is in bar, and b[k-1] in psi", id="a relay"),
+        pytest.param("y = where(a > 3, high*b, b[k-1])", "high * b is in Pa*psi, and b[k-1] in psi", id="a parameter"),
+        pytest.param("y = where(a > 3, b, y[k-1])", "", id="its own past"),
+    ],
+)
+def test_units_that_contradict_each_other_are_told(equation: str, told: str) -> None:
+    parameters = {"high": {"start": 2.0, "unit": "Pa"}} if "high" in equation else {}
+    fixed = fixed_by_equations(equation, parameters=parameters)
+    channels = (Channel(name="a", unit="bar"), Channel(name="b", unit="psi"))
+    record = Trace(name="record", sample_time=0.1, channels=channels, values=np.ones((5, 2)))
+    found = unit_contradictions_of(fixed, with_fixed(fixed, [record])[0])
+    assert [told in one for one in found] == [True] * bool(told)

@@ -21,6 +21,11 @@ TOGETHER = [
     pytest.param(ROOM, HEATED, id="temperatures and their differences"),
     pytest.param(ROOM, HEATED | {"outside": "K"}, id="a temperature whose zero lies elsewhere"),
     pytest.param("dh/dt = q/area/60", {"h": "cm", "q": "cm^3/min", "area": "cm^2"}, id="a number that converts"),
+    pytest.param(
+        "y = flow*4180*(T - 15) + gas*(T - outside)",
+        {"flow": "kg/s", "T": "degC", "gas": "W/K", "outside": "degC", "y": "W"},
+        id="a heat capacity in a bare number",
+    ),
     pytest.param("dx/dt = a*u - b*sqrt(x)", {"x": "cm", "u": "V", "a": "cm/V/s", "b": "cm^0.5/s"}, id="a root"),
     pytest.param("dx/dt = a*(u - 2*x)", {"x": "V", "u": "V"}, id="a parameter of no unit"),
     pytest.param("dx/dt = (u - x)/2", {"x": "V", "u": "V"}, id="a time constant in a bare number"),

@@ -9,7 +9,7 @@ found as one, and runs as one (:mod:`sysid.composite.fixed_members`); anything e
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from collections.abc import Mapping as Dict
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -31,10 +31,12 @@ from sysid.equations.syntax import (
     equation_error,
     nodes_of,
 )
-from sysid.equations.system import written_name
+from sysid.equations.system import System, written_name
+from sysid.equations.units_checked import unit_contradictions
 from sysid.errors import ConfigError
 from sysid.models import Mapping
 from sysid.models.grey_box.declared import Parameter
+from sysid.traces import Trace
 
 _SWITCH = (0.0, 1.0)
 """Bounds of a switch: off, on and how far between."""
@@ -133,6 +135,27 @@ def equation_of(fixed: FixedMember) -> str:
     elif (fixed.low, fixed.high) != (-math.inf, math.inf):
         total = f"clamp({total}, {_number(fixed.low)}, {_number(fixed.high)})"
     return f"{written_name(fixed.output)} = {total}"
+
+
+def unit_contradictions_of(fixed: Sequence[FixedMember], like: Trace) -> list[str]:
+    """What contradicts itself in the units of fixed submodels, of which nothing is converted.
+
+    Args:
+        fixed: The submodels.
+        like: A trace with all of their channels.
+
+    Returns:
+        A sentence for each place, as :func:`sysid.equations.units_checked.unit_contradictions` gives them.
+    """
+    there = {one.name: "" if one.unit == "1" else one.unit for one in like.channels}
+    told = []
+    for one in fixed:
+        units = {name: there[name] for name in (*one.mapping.inputs, one.output)}
+        units |= {parameter.name: parameter.unit for parameter in one.named}
+        text = f"{written_name(one.output)} = {one.equation or _sum_of(one)}"
+        system = System.read(text, [parameter.name for parameter in one.named], one.points)
+        told += unit_contradictions(system, units)
+    return list(dict.fromkeys(told))
 
 
 def _sum_of(fixed: FixedMember) -> str:
