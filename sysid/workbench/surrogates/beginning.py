@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -11,12 +12,16 @@ from sysid.references.config import ReferenceConfig
 from sysid.references.runs import Case, ReferenceRuns
 from sysid.workbench.auto.look import MOVED
 
+HELD: Final = (("beginning-high", 0.9, 0.7), ("beginning-low", 0.1, 0.3))
+"""Inputs that stay, as shares of their ranges from the first to the last input: at 0 many a reference stands still, and
+where all are alike what moves by a difference."""
+
 
 def stood_at(config: ReferenceConfig, like: Case, spans: Sequence[float]) -> dict[str, float]:
     """What the inputs of a surrogate stand at before its first sample, so that it begins where its reference does.
 
     Experiments all begin at the same inputs, and do not tell a reference that begins at rest at any from one that
-    begins at one state. It is run once more, at other inputs that stay: it stands still there, or it does not.
+    begins at one state. It is run twice more, at other inputs that stay: it stands still at both, or it does not.
 
     Args:
         config: The reference, with whole paths.
@@ -29,15 +34,17 @@ def stood_at(config: ReferenceConfig, like: Case, spans: Sequence[float]) -> dic
     """
     if not config.inputs or config.settling:
         return {}
-    farther = [max(port.range, key=lambda end: abs(end - port.begin)) for port in config.inputs.values()]
-    held = replace(like, name="beginning", inputs=np.tile(farther, (len(like.inputs), 1)), told="inputs that stay")
+    ports, n = config.inputs.values(), len(like.inputs)
+    cases = []
+    for name, low, high in HELD:
+        shares = np.linspace(low, high, len(ports))
+        levels = [p.at_levels(np.array([p.range[0] + x * np.ptp(p.range)])) for x, p in zip(shares, ports, strict=True)]
+        cases.append(replace(like, name=name, inputs=np.tile(np.hstack(levels), (n, 1)), told="inputs that stay"))
     with ReferenceRuns(config=config, workers=1) as runs:
-        (found,) = runs.run([held])
-    if found.trace is None:
-        return {name: port.begin for name, port in config.inputs.items()}
-    values = found.trace.columns(tuple(config.outputs))
-    still = (np.ptp(values, axis=0) <= MOVED * np.asarray(spans)).all()
-    return {} if still else {name: port.begin for name, port in config.inputs.items()}
+        found = runs.run(cases)
+    moved = [np.ptp(one.trace.columns(tuple(config.outputs)), axis=0) for one in found if one.trace is not None]
+    still = all((by <= MOVED * np.asarray(spans)).all() for by in moved)
+    return {} if moved and still else {name: port.begin for name, port in config.inputs.items()}
 
 
 def begun_elsewhere(config: ReferenceConfig, cases: Sequence[Case]) -> list[Case]:

@@ -28,6 +28,10 @@ def from_its_own(time, inputs, parameters):
     return _run(inputs, 1.0)
 
 
+def from_zero(time, inputs, parameters):
+    return _run(inputs, 0.0)
+
+
 def from_its_inputs(time, inputs, parameters):
     return _run(inputs, inputs[0, 0])
 
@@ -61,11 +65,12 @@ def reference(folder: Path, function: str, **more: float) -> ReferenceConfig:
     ("function", "more", "stood"),
     [
         pytest.param("from_its_own", {}, {"u": 1.0}, id="at a state of its own"),
+        pytest.param("from_zero", {}, {"u": 1.0}, id="at a state that it would rest at elsewhere"),
         pytest.param("from_its_inputs", {}, {}, id="at rest at its first inputs"),
         pytest.param("from_its_own", {"settling": 60.0}, {}, id="after it has settled at them"),
     ],
 )
-def test_one_run_more_tells_where_a_reference_begins(
+def test_two_runs_more_tell_where_a_reference_begins(
     folder: Path, function: str, more: dict[str, float], stood: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SYSID_CACHE", str(folder / "cache"))
