@@ -280,16 +280,17 @@ def _about_its_level(free: AbstractProblem, found: End, watch: Watch) -> tuple[A
     """
     near = slow_poles.REACH / max(len(record.target) for record in found.provider.records)
     put = near_ones_put(found.sections, free.orders.domain, free.terms.sample_time, near)
-    plain = replace(found, theta=found.provider.poles.theta(put))
-    level = free.levelled(plain)
+    there = replace(found, theta=found.provider.poles.theta(put))
+    plain = free.at_one(found, every=True)  # the other poles as they are best there: a level has to beat that
+    level = free.levelled(there)
     if level is None:
         return free, found
-    begun = tried(PoleStart(name="level", sections=plain.sections), found.delays, level.provider(found.delays))
+    begun = tried(PoleStart(name="level", sections=there.sections), found.delays, level.provider(found.delays))
     if not np.isfinite(begun.loss):
         return free, found
     other = level.at_one(long_run(begun, free.training, watch), every=True)
     # Each pole that leaves 1 brings a state of its own to bend a ramp by.
-    bent = int(np.count_nonzero(found.theta != plain.theta)) - 1
+    bent = int(np.count_nonzero(found.theta != there.theta)) - 1
     if not plain.worse_than(other) or other.worse_than(found, free=max(bent, 0)):
         return free, found
     return level, replace(other, notes=found.notes)

@@ -79,3 +79,15 @@ def test_an_integrator_is_asked_about_where_a_stable_search_ends_well_within_its
     fit = sysid.fit(sysid.data((u, y), sample_time=T), "u -> y", structure)
     assert abs(fit.model.pole_radius - 1.0) < 1e-6
     assert np.std(fit.simulate(u) - clean) < 0.02 * np.std(clean)
+
+
+@pytest.mark.parametrize("seed", [15, 20])
+def test_a_plant_that_stands_at_zero_gets_no_level_by_chance(seed: int) -> None:
+    """It was set beside a run whose other pole stayed where it had been with none at 1, which any level beats."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 40), 10)
+    y = signal.lfilter([0.0, 0.01], np.poly([1.0, 0.97]), u)
+    traces = sysid.data((u, y + 0.01 * y.std() * rng.standard_normal(400)), sample_time=1.0)
+    fit = sysid.fit(traces, "u -> y", sysid.TransferFunction(poles=2, zeros=1, delays=1))
+    assert fit.model.pole_radius == pytest.approx(1.0, abs=1e-9)
+    assert fit.model.scaling.input_offset == (0.0,)
