@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -26,6 +26,8 @@ BLOCK = 2**14
 """Rows of the long ARX model that are laid side by side at a time."""
 LONGEST_ARX = 40
 """Lags of each channel in the long ARX model, at most; fewer where the records are short."""
+SLOWER, LEAST_ROWS = (5, 20), 100
+"""Samples whose means a record that is sampled fast is looked at by; and how many of these there have to be."""
 _GRID = 300
 """Frequencies at which the long model's response is read."""
 
@@ -135,18 +137,24 @@ def free_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...]) -> list
     return starts
 
 
-def arx_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zeros: tuple[int, ...]) -> list[PoleStart]:
+def arx_starts(
+    records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zeros: tuple[int, ...], *, every: int = 1
+) -> list[PoleStart]:
     """Starts from ARX models.
 
     Args:
         records: Data in scaled numbers.
         n_poles: For each input.
         n_zeros: For each input.
+        every: Samples whose means the models are of: a long model of a record that is sampled fast ends before a slow
+            mode shows in it.
 
     Returns:
         Two from a long model, reduced for each input, and one with the poles of a short one.
     """
     domain, sample_time = records[0].domain, records[0].sample_time
+    records = records if every == 1 else [_means(record, every) for record in records]
+    said = "" if every == 1 else f" of means of {every}"
     n_rows = sum(len(record.target) for record in records)
     n_lags = max(2, min(LONGEST_ARX, max(2 * max(n_poles), 10), n_rows // (4 * (1 + len(n_poles)))))
     if records[0].free_start:
@@ -171,10 +179,50 @@ def arx_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zeros:
                 continue
         if not all(np.isfinite(p).all() for p in poles):
             continue
-        planes = [p if domain is Domain.DISCRETE else continuous_from(p, sample_time) for p in poles]
+        planes = [_in_plane(p, domain, sample_time, every) for p in poles]
         sections = tuple(sections_of(stabilised(p, domain), domain) for p in planes)
-        starts.append(PoleStart(name=name, sections=sections))
+        starts.append(PoleStart(name=f"{name}{said}", sections=sections))
     return starts
+
+
+def slower_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zeros: tuple[int, ...]) -> list[PoleStart]:
+    """Starts from long ARX models of a record as if it had been sampled more slowly.
+
+    Args:
+        records: Data in scaled numbers.
+        n_poles: For each input.
+        n_zeros: For each input.
+
+    Returns:
+        Two for each slower rate at which enough samples are left.
+    """
+    n_rows = min(len(record.target) for record in records)
+    rates = [every for every in SLOWER if n_rows >= LEAST_ROWS * every]
+    return [start for every in rates for start in arx_starts(records, n_poles, n_zeros, every=every)[:2]]
+
+
+def _means(record: TimeRecord, every: int) -> TimeRecord:
+    """A record of the means of so many samples each; one of which any is masked is masked."""
+    n = len(record.target) // every
+
+    def parts(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+        return signal[: n * every].reshape(n, every, *signal.shape[1:])
+
+    return replace(
+        record,
+        inputs=parts(record.inputs).mean(axis=1),
+        target=parts(record.target).mean(axis=1),
+        root_weights=parts(record.root_weights).min(axis=1),
+        sample_time=record.sample_time * every,
+    )
+
+
+def _in_plane(poles: NDArray[np.complex128], domain: Domain, sample_time: float, every: int) -> NDArray[np.complex128]:
+    """Poles in the plane of the fit, of those that were found at the rate of every so many samples."""
+    if domain is Domain.DISCRETE and every == 1:
+        return poles
+    found = continuous_from(poles, sample_time * every)
+    return found if domain is Domain.CONTINUOUS else np.exp(found * sample_time)
 
 
 def pole_starts(

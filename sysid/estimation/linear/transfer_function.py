@@ -18,7 +18,7 @@ from sysid.estimation.linear.begun_at_rest import Beginning, at_rest, left_out
 from sysid.estimation.linear.delay_search import check_max_delay, without_dead_time
 from sysid.estimation.linear.determined import Determined
 from sysid.estimation.linear.pole_moves import slowness
-from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts
+from sysid.estimation.linear.pole_starts import PoleStart, arx_starts, free_starts, pole_starts, slower_starts
 from sysid.estimation.linear.segments import delayed_inputs, scaling_of
 from sysid.estimation.linear.stretches import stretches, told_of
 from sysid.estimation.linear.time_record import TimeRecord
@@ -165,17 +165,27 @@ class _Problem(AbstractProblem):
     def starts(self, provider: SeparableProvider, *, few: bool, alone: bool = True) -> list[PoleStart]:
         """From ARX models and instrumental variables, and scattered ones; see the base class."""
         records = [record for record in provider.records if isinstance(record, TimeRecord)]
-        if few:
-            found = arx_starts(records, self.orders.poles, self.orders.zeros)
-            return [*found, *self.free_starts(provider)] if self.training.stable is False else found
-        return pole_starts(
-            records,
-            self.orders.poles,
-            self.orders.zeros,
-            n_scattered=self.training.scattered_starts,
-            seed=self.training.seed,
-            instruments=alone,
+        n_poles, n_zeros, training = self.orders.poles, self.orders.zeros, self.training
+        found = (
+            arx_starts(records, n_poles, n_zeros)
+            if few
+            else pole_starts(
+                records,
+                n_poles,
+                n_zeros,
+                n_scattered=training.scattered_starts,
+                seed=training.seed,
+                instruments=alone,
+            )
         )
+
+        def loss(start: PoleStart) -> float:
+            return provider.loss(provider.poles.theta(start.sections))
+
+        # Most records are sampled slowly enough, and nothing is gained by them.
+        least = min(map(loss, found))
+        found += [start for start in slower_starts(records, n_poles, n_zeros) if loss(start) < least]
+        return [*found, *self.free_starts(provider)] if few and training.stable is False else found
 
     def part(self) -> _Problem | None:
         """Stretches of long records; see the base class."""
