@@ -217,6 +217,15 @@ class AssemblyConfig(Words):
         return self
 
     @model_validator(mode="after")
+    def _check_export(self) -> AssemblyConfig:
+        if self.export is not None and self.export.input_levels:
+            raise FieldError(
+                "what the inputs of an assembly stood at is said for all of it", expected="levels under rest",
+                got=f"input_levels of the export: {self.export.input_levels}", remedy="move them to rest",
+            )  # fmt: skip
+        return self
+
+    @model_validator(mode="after")
     def _check_begin(self) -> AssemblyConfig:
         if self.warm_start is None:
             return self

@@ -26,7 +26,8 @@ class ExportConfig(BaseModel):
         case: Of parameters that differ by case, the case whose values the files have; by default they are inputs.
         unstable: Whether a fit whose free run is unstable (status ``UNSTABLE``) may leave. Without, ``best`` is the
             best of the others, and nothing is exported where there is none.
-        rest: What inputs stood at before a run from rest, by channel, in their units; by default what they begin at.
+        input_levels: What inputs stood at before a run from rest, by channel, in their units; by default their first
+            sample.
     """
 
     model_config = STRICT
@@ -37,7 +38,7 @@ class ExportConfig(BaseModel):
     run_times: bool = False
     case: str | None = None
     unstable: bool = True
-    rest: dict[str, float] = Field(default_factory=dict)
+    input_levels: dict[str, FiniteFloat] = Field(default_factory=dict)
 
 
 class ReportConfig(BaseModel):
@@ -99,8 +100,19 @@ class SharedConfig(BaseModel):
                 f"rest names {', '.join(strangers)}, which is not {'the' if len(outputs) == 1 else 'an'} output",
                 expected=", ".join(outputs),
                 got=", ".join(strangers),
-                remedy=f"write rest: {{{outputs[0]}: 0}}; inputs rest at their first sample",
+                remedy=f"write rest: {{{outputs[0]}: 0}}; inputs rest at their first sample, or input_levels",
             )
+        return self
+
+    @model_validator(mode="after")
+    def _check_input_levels(self) -> Self:
+        strangers = sorted(set(self.export.input_levels if self.export else ()) - set(self.mapping.inputs))
+        if strangers:
+            raise FieldError(
+                f"input_levels of the export names {', '.join(strangers)}, which is no input",
+                expected=", ".join(self.mapping.inputs), got=", ".join(strangers),
+                remedy="name inputs; what outputs stand at is said under rest",
+            )  # fmt: skip
         return self
 
     @property

@@ -309,11 +309,11 @@ def export(
     if config.export is None:
         raise ConfigError("the pipeline exports nothing", where=config.name, remedy="add export: {fit: best}")
     figures = {output: one.evaluation for output, one in scores.items()}
-    several, case = len(fits) > 1 or bool(config.export.rest), config.export.case
+    several, case = len(fits) > 1 or bool(config.export.input_levels), config.export.case
     if case is not None:
         fits = [for_case(fit, case) for fit in fits]
     return export_bundle(
-        Cascade(models=tuple(fit.model for fit in fits), rest=dict(config.export.rest)) if several else fits[0],
+        Cascade(models=tuple(fit.model for fit in fits), rest=dict(config.export.input_levels)) if several else fits[0],
         data.traces,
         folder,
         start=config.start,

@@ -209,7 +209,7 @@ class Work:
         """What leaves the workbench, begun where the reference begins."""
         fitted = found.traces.with_role(Role.ESTIMATION)
         spans = [span_of(fitted, name) for name in self.mapping.outputs]
-        return {**EXPORT, "rest": stood_at(self.reference, found.outcomes["estimation"][0].case, spans)}
+        return {**EXPORT, "input_levels": stood_at(self.reference, found.outcomes["estimation"][0].case, spans)}
 
     def delivered(self, place: Path) -> Path | None:
         """The FMU where it is looked for, beside the folders; ``None`` where there is none."""

@@ -51,6 +51,11 @@ def test_an_assembly_that_cannot_be_is_refused(old, new, match):
         config(PIPELINE.replace(old, new))
 
 
+def test_levels_of_inputs_stand_with_all_others_under_rest():
+    with pytest.raises(ConfigError, match="is said for all of it"):
+        config(TWO_PLACES + "export: {input_levels: {STP: 90}}\n")
+
+
 def test_a_round_that_trains_a_stranger_is_refused():
     with pytest.raises(ConfigError, match="together, members names BQ, which no member writes"):
         config(TWO_PLACES + "together: {targets: {AR: 1}, again: [{members: [AR]}, {members: [BQ]}]}\n")

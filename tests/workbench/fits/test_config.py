@@ -118,6 +118,9 @@ MISTAKES = [
     pytest.param("name: closed", "name: Open", ["cannot be told from another"], id="two names for one folder"),
     pytest.param("fit: closed", "fit: close", ["export names the fit", "did you mean closed?"], id="export of no fit"),
     pytest.param("[onnx]", "[onxx]", ["export.formats", "did you mean onnx?"], id="unknown format"),
+    pytest.param(
+        "tolerance: 1e-10", "input_levels: {y: 0}", ["names y, which is no input", "a, b"], id="level of an output"
+    ),
     pytest.param("tolerance: 1e-10", "tolerance: -1", ["export.tolerance"], id="negative tolerance"),
     pytest.param("name: first", "name: a/b", ["field name"], id="name that is no folder"),
     pytest.param("seed: 7", "seed: -1", ["field seed"], id="negative seed"),
