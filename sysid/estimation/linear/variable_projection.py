@@ -42,8 +42,8 @@ class PoleParameters:
         n_poles: For each input.
         domain: Of the transfer function.
         stable: Whether every vector is to mean stable poles.
-        slowest: With stable poles, how far they keep from the edge: least distance of a reflection coefficient from 1,
-            or least rate in 1/s. A record cannot tell a pole much slower than itself from an integrator, and the
+        slowest: With stable poles, how far they keep from the edge: least distance from the unit circle, or least
+            rate in 1/s. A record cannot tell a pole much slower than itself from an integrator, and the
             equilibrium of such a model is lost to rounding.
     """
 
@@ -108,7 +108,7 @@ class PoleParameters:
         if not self.stable:
             return raw
         if self.domain is Domain.DISCRETE:
-            return np.asarray((1.0 - self.slowest) * np.tanh(raw))
+            return np.tanh(raw)
         return np.asarray(self._shift(len(raw)) @ np.exp(raw) + self._floor(len(raw)))
 
     def _floor(self, order: int) -> NDArray[np.float64]:
@@ -125,7 +125,17 @@ class PoleParameters:
     def _denominator(self, k: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.domain is Domain.CONTINUOUS:  # k is (c1, c0)
             return np.array([*k[::-1], 1.0])
-        return np.array([1.0, k[0]]) if len(k) == 1 else np.array([1.0, k[0] * (1.0 + k[1]), k[1]])
+        first = self._edge * k[0]
+        return np.array([1.0, first]) if len(k) == 1 else np.array([1.0, first * (1.0 + k[1]), self._edge**2 * k[1]])
+
+    @property
+    def _edge(self) -> float:
+        """Radius of the circle of which discrete sections have the reflection coefficients.
+
+        Poles lie within a circle where all of these are below 1. Coefficients of the unit circle, kept from 1 by as
+        much, would keep a pair of a natural frequency ``w`` from the circle by ``w**2 / 2``, however fast it decays.
+        """
+        return 1.0 - self.slowest if self.stable else 1.0
 
     def _raw(self, d: NDArray[np.float64]) -> NDArray[np.float64]:
         if self.domain is Domain.CONTINUOUS:
@@ -135,23 +145,21 @@ class PoleParameters:
             floor = self._floor(len(c))
             beyond = np.linalg.solve(self._shift(len(c)), np.abs(c) - floor)
             return np.asarray(np.log(np.maximum(beyond, 1e-3 * floor)))
-        k = d[1:].copy()
+        k = d[1:] / self._edge ** np.arange(1, len(d))
         if len(d) == 3:
-            k[0] = d[1] / (1.0 + d[2]) if d[2] != -1.0 else 0.0
-        if not self.stable:
-            return k
-        return np.arctanh(np.clip(k / (1.0 - self.slowest), -_LARGEST_REFLECTION, _LARGEST_REFLECTION))
+            k[0] = k[0] / (1.0 + k[1]) if k[1] != -1.0 else 0.0
+        return np.arctanh(np.clip(k, -_LARGEST_REFLECTION, _LARGEST_REFLECTION)) if self.stable else k
 
     def _jacobian(self, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         """Of the section's coefficients ``(c1, c2)`` or ``(c1, c0)`` with respect to the vector's entries."""
         if self.domain is Domain.CONTINUOUS:
             return self._shift(len(raw)) * np.exp(raw) if self.stable else np.eye(len(raw))
         k = self._constrained(raw)
-        edge = 1.0 - self.slowest
-        outer = edge - k**2 / edge if self.stable else np.ones(len(k))
+        edge = self._edge
+        outer = 1.0 - k**2 if self.stable else np.ones(len(k))
         if len(k) == 1:
-            return np.diag(outer)
-        return np.array([[1.0 + k[1], k[0]], [0.0, 1.0]]) * outer
+            return np.diag(edge * outer)
+        return np.array([[edge * (1.0 + k[1]), edge * k[0]], [0.0, edge**2]]) * outer
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

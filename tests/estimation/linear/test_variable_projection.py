@@ -95,6 +95,22 @@ def test_no_vector_of_continuous_poles_has_one_slower_than_the_slowest() -> None
         assert min(rates) >= 1e-3 * (1.0 - 1e-6)
 
 
+def test_a_pair_that_decays_within_the_records_keeps_its_poles_however_slowly_it_turns() -> None:
+    """Bounds of the coefficients had kept it away: transfer functions of records sampled fast had not reached it."""
+    poles = PoleParameters(n_poles=(2,), domain=Domain.DISCRETE, stable=True, slowest=1e-4)
+    for rate, turn in ((5e-3, 1e-3), (2e-4, 5e-3), (2e-4, 0.0)):
+        pair = np.real(np.poly(np.exp([-rate + 1j * turn, -rate - 1j * turn])))
+        ((found,),) = poles.sections(poles.theta(((pair,),)))
+        np.testing.assert_allclose(found, pair, rtol=0.0, atol=1e-12)
+
+
+def test_no_vector_of_discrete_poles_has_one_slower_than_the_slowest() -> None:
+    poles = PoleParameters(n_poles=(4,), domain=Domain.DISCRETE, stable=True, slowest=1e-3)
+    for seed in range(20):
+        (part,) = poles.sections(np.random.default_rng(seed).normal(scale=6.0, size=4))
+        assert max(np.abs(np.roots(section)).max() for section in part) <= (1.0 - 1e-3) * (1.0 + 1e-9)
+
+
 def test_a_model_that_runs_away_has_infinite_loss() -> None:
     poles = PoleParameters(n_poles=(2,), domain=Domain.DISCRETE, stable=False)
     record = time_record(Domain.DISCRETE, 1, free_start=False, n=5000)
