@@ -15,6 +15,7 @@ from sysid.estimation.linear.poles import continuous_from, scattered, sections_o
 from sysid.estimation.linear.refined_iv import refined_sections
 from sysid.estimation.linear.regression import solve
 from sysid.estimation.linear.sanathanan_koerner import sk_poles
+from sysid.estimation.linear.segments import LEAST_ROWS, SLOWER, blocks_of, means_of
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.estimation.nonparametric.evidence import triangle
@@ -26,8 +27,6 @@ BLOCK = 2**14
 """Rows of the long ARX model that are laid side by side at a time."""
 LONGEST_ARX = 40
 """Lags of each channel in the long ARX model, at most; fewer where the records are short."""
-SLOWER, LEAST_ROWS = (5, 20), 100
-"""Samples whose means a record that is sampled fast is looked at by; and how many of these there have to be."""
 _GRID = 300
 """Frequencies at which the long model's response is read."""
 
@@ -203,16 +202,11 @@ def slower_starts(records: Sequence[TimeRecord], n_poles: tuple[int, ...], n_zer
 
 def _means(record: TimeRecord, every: int) -> TimeRecord:
     """A record of the means of so many samples each; one of which any is masked is masked."""
-    n = len(record.target) // every
-
-    def parts(signal: NDArray[np.float64]) -> NDArray[np.float64]:
-        return signal[: n * every].reshape(n, every, *signal.shape[1:])
-
     return replace(
         record,
-        inputs=parts(record.inputs).mean(axis=1),
-        target=parts(record.target).mean(axis=1),
-        root_weights=parts(record.root_weights).min(axis=1),
+        inputs=means_of(record.inputs, every),
+        target=means_of(record.target, every),
+        root_weights=blocks_of(record.root_weights, every).min(axis=1),
         sample_time=record.sample_time * every,
     )
 

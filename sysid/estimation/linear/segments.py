@@ -14,6 +14,21 @@ from sysid.models import Scaling
 Array = NDArray[np.float64]
 
 
+SLOWER, LEAST_ROWS = (5, 20), 100
+"""Samples whose means a record that is sampled fast is looked at by; and how many of these there have to be."""
+
+
+def blocks_of(signal: Array, every: int) -> Array:
+    """A signal in blocks of so many samples, shape ``(n_samples // every, every, ...)``; what is left over goes."""
+    n = len(signal) // every
+    return signal[: n * every].reshape(n, every, *signal.shape[1:])
+
+
+def means_of(signal: Array, every: int) -> Array:
+    """The mean of each of those blocks."""
+    return np.asarray(blocks_of(signal, every).mean(axis=1))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Segment:
     """An unbroken piece of a record, in scaled numbers.
@@ -41,6 +56,15 @@ class Segment:
         return replace(
             self, inputs=self.inputs[at], outputs=self.outputs[at], root_weights=self.root_weights[at]
         )  # fmt: skip
+
+    def means(self, every: int) -> Segment:
+        """The piece as if it had been sampled more slowly, each sample the mean of so many."""
+        return replace(
+            self,
+            inputs=means_of(self.inputs, every),
+            outputs=means_of(self.outputs, every),
+            root_weights=blocks_of(self.root_weights, every).min(axis=1),
+        )
 
     def delayed(self, shifts: Sequence[int], *, unknown: int, masked: bool) -> Segment:
         """The piece with inputs that come later; see :func:`delayed_inputs`.

@@ -40,8 +40,9 @@ Data = tuple[Sequence[Trace], Mapping, Start, float, Sequence[Experiment]]
 Found = tuple[PredictionErrors, Solution, Scaling]
 """A problem, where its search ended, and the scaling of its coefficients."""
 
-ROUNDED = 1e-9
-"""How far a pole is brought within the bound that it is at: its polynomial is rounded."""
+ROUNDED = 1e-7
+"""How far a pole is brought within the bound that it is at: its polynomial is rounded, and two poles there move by the
+root of that."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,6 +85,8 @@ class AbstractWays(ABC):
 def next_to_transfer_function(found: Found, orders: AbstractPolynomial, ways: AbstractWays) -> Found:
     """What was found, or where a pole may be as slow as the records, what the transfer function of these orders is.
 
+    So it is where the steps came to no end: numerators are eliminated there, and there are other starts.
+
     Args:
         found: What was found.
         orders: Of a model without noise.
@@ -95,17 +98,18 @@ def next_to_transfer_function(found: Found, orders: AbstractPolynomial, ways: Ab
     errors, solution, scaling = found
     lengths, radius = [len(one) for one in errors.segments], errors.chart.system(solution.theta).radius
     slow = slow_poles.unseen(radius, lengths)
-    if not slow and not slow_poles.unseen(suggested(errors.segments, orders), lengths):
+    ended = solution.status is not Status.MAX_ITERATIONS
+    if ended and not slow and not slow_poles.unseen(suggested(errors.segments, orders), lengths):
         return found
     other = of_transfer_function(ways.data, orders, errors, scaling, seconds=ways.until - now())
     if other is None:
         return found
     problem, theta, own = other
     at_one = abs(problem.chart.system(theta).radius - 1.0) <= slow_poles.FAR  # from where steps would lead away
-    ended = ways.run(problem, theta, stays=at_one)
-    ended = replace(ended, status=Status.CONVERGED) if at_one else ended  # the transfer function has
+    end = ways.run(problem, theta, stays=at_one)
+    end = replace(end, status=Status.CONVERGED) if at_one else end  # the transfer function has
     beyond = slow and (at_one or radius > problem.largest)
-    return (problem, ended, own) if beyond or ended.at.loss < solution.at.loss else found
+    return (problem, end, own) if beyond or end.at.loss < solution.at.loss else found
 
 
 def suggested(segments: Sequence[Segment], orders: AbstractPolynomial) -> float:

@@ -15,6 +15,7 @@ from sysid.estimation.linear.segments import Segment, torn
 from sysid.estimation.linear.state_space.free_runs import free_run_error
 from sysid.estimation.linear.state_space.integrators import held_at_one
 from sysid.estimation.linear.state_space.refinement import Found, Level, Problem, size_of
+from sysid.estimation.linear.state_space.slower import slower_start
 from sysid.estimation.linear.state_space.training import BEST, METHODS, StateSpaceTraining
 from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import Subspace
@@ -69,8 +70,12 @@ def search(
                 found = _quieter(found, bounded, found_in)
         else:
             found = found_in(bounded)
+            slower = slower_start(bounded, segments) if iterations else None
+            if slower is not None and slower[0] < size_of(found.covariance):
+                found = _least(found, bounded.refined(slower[1], iterations, began + training.max_time_s - now()))
             if slow_poles.unseen(found.system.radius, problem.lengths):
-                found = _better(found, found_in(problem), problem)
+                beyond = problem.refined(found.system, iterations, began + training.max_time_s - now())
+                found = _better(found, _least(found_in(problem), beyond), problem)
         if training.stable is None and iterations and zero and orders.intercept:
             # Without inputs or a constant nothing makes a ramp of them.
             left = began + training.max_time_s - now()
@@ -133,6 +138,12 @@ def _whole(segments: Sequence[Segment], orders: LinearStateSpace) -> tuple[Segme
     return tuple(piece for piece in whole if len(piece) > orders.states)
 
 
+def _least(found: Found, other: Found) -> Found:
+    """The one of less error."""
+    better = size_of(other.covariance) < size_of(found.covariance)
+    return replace(other, weighting=found.weighting) if better else found
+
+
 def _better(inside: Found, beyond: Found, problem: Problem) -> Found:
     """What was found with poles up to the edge of stability, if it is better than chance has it."""
     errors, than = (problem.around_errors(one.system) for one in (beyond, inside))
@@ -161,8 +172,7 @@ def _from_white(found: Found, problem: Problem, iterations: int, until: float) -
         other = problem.refined(still.system, iterations, until - now())
     except np.linalg.LinAlgError:  # a run from there is not finite
         return found
-    better = size_of(other.covariance) < size_of(found.covariance)
-    return replace(other, weighting=found.weighting) if better else found
+    return _least(found, other)
 
 
 def _quieter(beyond: Found, bounded: Problem, found_in: Callable[[Problem], Found]) -> Found:
