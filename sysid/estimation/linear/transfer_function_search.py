@@ -261,14 +261,9 @@ def _free_poles(
     # Poles may be anywhere in a plant that few samples say much of, but not for the sake of their noise: beyond
     # chance, the gain must be one that as many parameters as there are, fitted to it, could not have.
     if not end.worse_than(found, free=sum(own.orders.poles) + provider.n_taps):
-        # A pole at 1 is no freer than one that its bound holds back: it has to be better than chance alone, of which
-        # errors that hang together have more.
-        there = free.at_one(found)
-        at_one = abs(slowness(there.sections, domain, sample_time) - 1.0) <= slow_poles.INTEGRATES
-        better = slow_poles.significantly_better(there.errors, end.errors, parameters=0, scale=end.power)
-        if not (slow_poles.undecided(slowest, end.lengths) and at_one and better):
+        found = free.at_one(found)
+        if not (slow_poles.undecided(slowest, end.lengths) and _is_clearly_better(found, end, own)):
             return own, end
-        found = there
     # Free poles are fitted from a free state. What begins where a start says has to follow from there as well: a
     # pole that is off 1 by little has an equilibrium where no plant ever was.
     judge = score or own.as_scored
@@ -278,6 +273,15 @@ def _free_poles(
         if not judge(free.model(found)[0]) < judge(own.model(end)[0]):
             return own, end
     return free, found
+
+
+def _is_clearly_better(found: End, end: End, own: AbstractProblem) -> bool:
+    """Whether an end with a pole at 1 beats one whose pole its bound holds back, which is no less free.
+
+    It has to beat chance alone, of which errors that hang together have more.
+    """
+    at_one = abs(slowness(found.sections, own.orders.domain, own.terms.sample_time) - 1.0) <= slow_poles.INTEGRATES
+    return at_one and slow_poles.significantly_better(found.errors, end.errors, parameters=0, scale=end.power)
 
 
 def _about_its_level(free: AbstractProblem, found: End, watch: Watch) -> tuple[AbstractProblem, End]:
