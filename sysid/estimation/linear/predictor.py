@@ -100,7 +100,8 @@ class MirroredPredictor:
         bound = GROWTH ** (1.0 / max(n_rows, 1))
         if all(np.abs(linalg.eigvals(system.A)).max(initial=0.0) <= bound for system in systems):
             return None
-        return cls(parts=tuple(Split.of(system, bound) for system in systems), n_rows=n_rows)
+        found = cls(parts=tuple(Split.of(system, bound) for system in systems), n_rows=n_rows)
+        return found if len(found.growing) else None  # at the bound two decompositions round to either side of it
 
     @cached_property
     def growing(self) -> NDArray[np.complex128]:
