@@ -44,7 +44,7 @@ def test_a_run_of_any_length_that_is_lost_ends_no_fit(structure: object, records
     assert not [note for note in fit.notes if "no noise of a sensor" in note]
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, 3])
 def test_a_run_that_is_poor_for_its_first_state_is_not_blamed_on_the_inputs(seed: int) -> None:
     """Three slow inputs, and a record that begins far from rest: its fit was -110 %, and *other orders* the remedy."""
     rng = np.random.default_rng(seed)
