@@ -70,6 +70,7 @@ _WRITTEN = {
     for word in words.split("|")
 }
 _EXACT = {
+    **{f"{prefix}{text}": f"{prefix}VA" for prefix in ("", "k", "M") for text in ("var", "VAr", "VAR", "Var")},
     **{"nm": "nm", "kn": "knot", "mS": "mS", "MS": "MS", "mPa": "mPa", "mpa": "mPa", "KG": "kg", "Kg": "kg"},
     **{"C": "degC", "F": "degF", "PS": "metric_horsepower", "mb": "mbar", "mNm": "mN*m", "MNm": "MN*m"},
     **{"В": "V", "А": "A", "Вт": "W", "кВт": "kW", "Па": "Pa", "кПа": "kPa", "МПа": "MPa", "бар": "bar", "Гц": "Hz"},

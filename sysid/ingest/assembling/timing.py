@@ -12,6 +12,7 @@ from sysid.ingest.assembling.grid import grid_places
 
 _MOST_SLOTS = 1e18  # of one gap: a stamp that is nonsense shall not overflow
 _PIECE = 1 << 16
+_A_DAY, _AN_HOUR, _LONGEST_OF_HOURS = 86_400.0, 3600.0, 1e6
 _FEW = 0.25  # of the samples, that may be missing for stamps to be asked whether they are uneven instead
 _FEWEST_ROUNDED = 16  # stamps that tell a rounded clock from an uneven one
 _GAP_FACTOR = 1.5  # a step this many times the usual one means that a sample is missing
@@ -141,12 +142,16 @@ def round_step(step: float) -> float:
         step: Seconds between samples, as fitted.
 
     Returns:
-        The number of fewest digits that is within 0.5 % of it.
+        The number of fewest digits that is within 0.5 % of it; from an hour to some days, whole days or hours.
 
     Example:
-        >>> round_step(0.10029), round_step(1 / 120)
-        (0.1, 0.0083)
+        >>> round_step(0.10029), round_step(1 / 120), round_step(86_395.0)
+        (0.1, 0.0083, 86400.0)
     """
+    for unit in (_A_DAY, _AN_HOUR) if step <= _LONGEST_OF_HOURS else ():
+        whole = unit * round(step / unit)
+        if whole and abs(whole - step) <= 5e-3 * step:
+            return whole
     return next((value for value in _by_digits(step) if abs(value - step) <= 5e-3 * abs(step)), step)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
@@ -27,23 +27,32 @@ _MONTHS = {
     word: number + 1
     for number, words in enumerate(
         (
-            *("jan januar january", "feb februar february", "mar mrz mär märz march maart", "apr april", "may mai mei"),
-            *("jun juni june", "jul juli july", "aug august", "sep sept september", "oct okt october oktober"),
-            *("nov november", "dec dez december dezember"),
+            "jan januar january januari janv janvier ene enero gen gennaio janeiro",
+            "feb februar february februari févr fevr fév février febrero febbraio fev fevereiro",
+            "mar mrz mär märz march maart mars marzo março mrt",
+            "apr april avr avril abr abril aprile",
+            "may mai mei mayo mag maggio maio",
+            "jun juni june juin junio giu giugno junho",
+            "jul juli july juil juillet julio lug luglio julho",
+            "aug august août aout ago agosto augustus",
+            "sep sept september septembre septiembre set settembre setembro",
+            "oct okt october oktober octobre octubre ott ottobre out outubro",
+            "nov november novembre noviembre novembro",
+            "dec dez december dezember déc décembre dic diciembre dicembre dezembro",
         )
     )
     for word in words.split()
 }
 _DATE = re.compile(
     r"(?P<a>[0-9]{4}|[0-9]{1,2})(?P<mark>[-/.])\s?(?P<b>[0-9]{1,2})(?P=mark)\s?(?P<c>[0-9]{4}|[0-9]{1,2})(?![0-9])"
-    r"|(?P<day>[0-9]{1,2})[-./ ]?\s?(?P<month>[^\W\d_]{3,9})\.?[-./, ]?\s?(?P<year>[0-9]{4}|[0-9]{2})(?![0-9])"
-    r"|(?P<packed>(?:19|20)[0-9]{2}(?:0[1-9]|1[0-2])[0-3][0-9])(?=[T_ ]?[0-2][0-9]:?[0-5][0-9])"
+    r"|(?P<day>[0-9]{1,2})[-./ ]?\s?(?P<month>[^\W\d_]{3,10})\.?[-./, ]?\s?(?P<year>[0-9]{4}|[0-9]{2})(?![0-9])"
+    r"|(?P<packed>(?:19|20)[0-9]{2}(?:0[1-9]|1[0-2])[0-3][0-9])(?=[T_ :]?[0-2][0-9]:?[0-5][0-9])"
 )
 _CLOCK = re.compile(
     r"(?:[\sT,;_]\s*|(?<=^)|(?<=[0-9]):?)"
     r"(?:(?P<h>[0-9]{1,4}):(?P<m>[0-9]{1,2})(?::(?P<s>[0-9]{1,2}))?"
-    r"|(?P<th>[0-2][0-9])(?P<tm>[0-5][0-9])(?P<ts>[0-5][0-9]))"
-    r"(?:[.,:](?P<f>[0-9]+))?\s?(?P<half>[AaPp]\.?[Mm]\.?)?\s?(?P<zone>Z|[A-Z]{3,4}(?![A-Za-z])|[+-][0-9]{2}(?::?[0-9]{2})?)?"
+    r"|(?P<th>[0-2][0-9])(?P<tm>[0-5][0-9])(?P<ts>[0-5][0-9])?)"
+    r"(?:[.,:](?P<f>[0-9]+))?\s?(?P<half>[AaPp]\.?\s?[Mm]\.?)?\s?(?P<zone>Z|[A-Z]{3,4}(?![A-Za-z])|[+-][0-9]{2}(?::?[0-9]{2})?)?"
     r"(?:\[[\w/+-]+\])?"
 )
 _HOURS_AHEAD = {
@@ -57,6 +66,11 @@ _HOURS_AHEAD = {
 }  # fmt: skip
 """What zones are called behind a time of day. IST is left out: it is a zone of three countries."""
 _LONGEST = 40
+_SHORTEST_INTERVAL = 32
+_INTERVAL = re.compile(
+    r"(?P<first>[0-9]{4}-?[0-9]{2}-?[0-9]{2}[T ]\S{4,20})\s?/\s?(?P<last>[0-9]{4}-?[0-9]{2}-?[0-9]{2}[T ]\S{4,20})"
+)
+"""An interval of ISO 8601: where it begins and where it ends."""
 _FEW = 32
 _ZERO = 48
 
@@ -69,6 +83,7 @@ class _Stamp:
     micros: int
     offset: int = _ZONELESS
     clock: bool = True
+    interval: bool = False
 
 
 def is_calendar(text: str) -> bool:
@@ -85,6 +100,9 @@ def is_calendar(text: str) -> bool:
 
 def _taken_apart(text: str) -> _Stamp | None:
     """A text in its parts; one that begins with a day of the week or a month, or counts days, is brought into form."""
+    if len(text) > _SHORTEST_INTERVAL and (interval := _INTERVAL.fullmatch(text)):
+        first, last = (_in_parts(interval[end]) for end in ("first", "last"))
+        return None if first is None or last is None else replace(first, interval=True)
     digit = "0" <= text[:1] <= "9"
     if len(text) > _LONGEST or not (digit or " " in text):
         return None
@@ -219,6 +237,8 @@ class Calendar:
     _micros: list[NDArray[np.int64]] = field(default_factory=list)
     _offsets: list[NDArray[np.int64]] = field(default_factory=list)
     _clocks: int = 0
+    _intervals: bool = False
+    _of_two: bool = True
 
     def add(self, cells: Sequence[str], lines: NDArray[np.integer[Any]]) -> None:
         """Take a block of cells apart.
@@ -237,6 +257,7 @@ class Calendar:
             self._micros.append(micros)
             self._offsets.append(np.full(len(cells), offset, dtype=np.int64))
             self._clocks += len(cells)
+            self._of_two = False
             return
         stamps = []
         for cell, line in zip(cells, lines, strict=True):
@@ -248,6 +269,8 @@ class Calendar:
         self._micros.append(np.array([stamp.micros for stamp in stamps], dtype=np.int64))
         self._offsets.append(np.array([stamp.offset for stamp in stamps], dtype=np.int64))
         self._clocks += sum(stamp.clock for stamp in stamps)
+        self._intervals |= any(stamp.interval for stamp in stamps)
+        self._of_two = self._of_two and all(cell.count(":") < 2 for cell in cells)
 
     def _stamp(self, text: str) -> _Stamp | None:
         if not text:
@@ -317,7 +340,7 @@ class Calendar:
                 remedy="export the time stamps in one form",
             )
         if not dates.any():
-            local, notes = _over_midnight(micros)
+            local, notes = _over_midnight(*_minutes_and_seconds(micros) if self._of_two else (micros, []))
         else:
             days, notes = days_of(dates, micros, self.where)
             local = days * DAY + micros
@@ -335,15 +358,23 @@ class Calendar:
                 zoned=bool(inside) or self.zone is not None,
                 zone=None if inside else self.zone,
             )
+        notes = [*notes, "stamps are intervals: time is where each begins"] if self._intervals else notes
         seconds[known] = (local - local[0]) / 1e6
         return seconds, notes, guess
 
 
-def _over_midnight(micros: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:
+def _minutes_and_seconds(micros: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:
+    """Two numbers are hours and minutes, but where the first is more than the hours of a day from the start."""
+    if not len(micros) or micros[0] < DAY:
+        return micros, []
+    return micros // 60, ["stamps are taken for minutes and seconds, which is a guess: no day has so many hours"]
+
+
+def _over_midnight(micros: NDArray[np.int64], notes: list[str]) -> tuple[NDArray[np.int64], list[str]]:
     """Times of day in the order in which they were written: each fall by more than half a day is a midnight."""
     passed = np.cumsum(np.concatenate([[0], np.diff(micros) < -DAY // 2]))
-    notes = [f"midnight passes {int(passed[-1])} times" if passed[-1] > 1 else "midnight passes"] if passed[-1] else []
-    return micros + DAY * passed, notes
+    told = [f"midnight passes {int(passed[-1])} times" if passed[-1] > 1 else "midnight passes"] if passed[-1] else []
+    return micros + DAY * passed, [*notes, *told]
 
 
 def _told_zone(local: NDArray[np.int64], notes: list[str]) -> tuple[str | None, list[str]]:

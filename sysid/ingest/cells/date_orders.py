@@ -69,8 +69,8 @@ def days_of(dates: NDArray[np.int64], micros: NDArray[np.int64], where: str) -> 
         return int((steps <= 0).sum()), int(steps.max(initial=0))
 
     best = min(possible, key=lambda name: unevenness(possible[name]))
-    if unevenness(possible[best])[0]:
-        # A clock that steps back may tell the date: the night on which it was put back.
+    if unevenness(possible[best])[0] or len({*map(unevenness, possible.values())}) == 1:
+        # A clock that is changed may tell the date: the night on which it was put back, or on.
         best = next((name for name, days in possible.items() if guess_zone(days * DAY + micros)), best)
     differ = len(codes) > 1
     return possible[best], [f"dates taken as {best}, which is a guess: time.format says it"] if differ else []

@@ -31,6 +31,7 @@ _UNITS_IN_NAMES = frozenset(
     | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
     | {"g", "rad", "deg", "%"}
 )
+_LASTS = re.compile(r"(?:^|[_. ])(?:t|[Tt]ime|[Zz]eit|[Tt]id|[Ee]lapsed|[Rr]untime|[Dd]uration|[Dd]auer)[_.]min$")
 _WRITTEN_OUT = {
     "second": "s", "sec": "s", "millisecond": "ms", "microsecond": "us", "minute": "min", "hour": "h", "volt": "V",
     "millivolt": "mV", "ampere": "A", "amp": "A", "celsius": "degC", "kelvin": "K", "fahrenheit": "degF", "watt": "W",
@@ -67,11 +68,16 @@ def unit_in_name(name: str) -> str | None:
     Example:
         >>> unit_in_name("t_ms"), unit_in_name("p.bar"), unit_in_name("cell_volts"), unit_in_name("ms")
         ('ms', 'bar', 'V', None)
+        >>> unit_in_name("time_min")
+        'min'
+        >>> unit_in_name("flow_min")
     """
     last = re.split(r"[_.]", name)[-1]
     if last == name:
         return None
     word = last.casefold()
+    if word == "min" and not _LASTS.search(name):
+        return None  # the least of something, or the end of l_min
     return last if last in _UNITS_IN_NAMES else _WRITTEN_OUT.get(word, _WRITTEN_OUT.get(word.removesuffix("s")))
 
 

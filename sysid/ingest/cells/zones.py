@@ -84,8 +84,10 @@ def guess_zone(local: NDArray[np.int64]) -> tuple[str, int] | None:
         return None
     usual = float(np.median(rising))
     odd = np.abs(steps - usual) > 0.4 * usual  # half an hour, of samples an hour apart
-    near = [np.minimum(np.abs(steps + shift - usual), np.abs(steps - shift - usual)) < 0.5 * usual for shift in _SHIFTS]
-    jumps = np.flatnonzero(odd & np.logical_or.reduce(near))
+    # Days apart, a step is odd for other reasons than an hour.
+    shifts = [shift for shift in _SHIFTS if shift > 0.4 * usual]
+    near = [np.minimum(np.abs(steps + shift - usual), np.abs(steps - shift - usual)) < 0.5 * usual for shift in shifts]
+    jumps = np.flatnonzero(odd & np.logical_or.reduce(near)) if near else np.zeros(0, dtype=np.intp)
     if not len(jumps):
         return None
     first = int(jumps[0])

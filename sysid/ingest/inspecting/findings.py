@@ -145,7 +145,7 @@ class FileFinding:
                 for name, told in self._guessed_options
             ),
         ]
-        found += [f"{self.unstamped} samples without a time stamp"] if self.unstamped else []
+        found += [f"{counted(self.unstamped, 'sample')} without a time stamp"] if self.unstamped else []
         if self.timing is None:
             found += [self.time_told if self.table.time else "no time stamps"] if self.time_guessed else []
         found += self.of_time

@@ -143,6 +143,8 @@ def _beside(column: RawColumn, first: RawColumn, *, called: bool, timed: bool) -
         return ""
     even = _is_even(mine) and _is_even(theirs)
     pace = float(np.median(np.diff(mine)) / step) if even else float(mine[-1] - mine[0]) / lasts
+    if not pace > 0.0:
+        return ""
     factor = 1.0 if timed and first.unit else min((1.0, *_FACTORS), key=lambda f: abs(np.log(pace * f)))
     ahead = factor * mine - theirs
     apart, offset = float(np.ptp(ahead)), float(np.median(ahead))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,8 +22,10 @@ from sysid.ingest.tables.time_columns import is_counter, is_time_unit, unit_of_c
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
+_MOSTLY_ALIKE = 0.5
 _ARRAYS = {"matlab", "numpy"}
 _MINUTE = 60.0
+_YEARS, _CALLED_YEAR = (1700.0, 2300.0), re.compile(r"year|jahr|date|année|año", re.IGNORECASE)
 
 
 def find_time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
@@ -47,7 +50,7 @@ def find_time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     clock = clock_of(column.values, column.name, origin=column.counted_from) if asked.unit is None else None
     said = None if clock is not None and "clock" in table.settings else column.unit
     unit = asked.unit or (said if said is not None and is_time_unit(said) else None) or unit_in_name(name)
-    unit = unit or (unit_of_clock(name) if clock is None else None)
+    unit = unit or (unit_of_clock(name) if clock is None else None) or _years(column)
     if unit is not None:
         return TimeOptions(column=column.name, unit=unit), by_rising and f"guessed: {by_rising}"
     if clock is not None:
@@ -61,6 +64,13 @@ def find_time(table: RawTable, files: FileOptions) -> tuple[TimeOptions, str]:
     why += "; it rises by 1, as a number of samples does" if len(steps) and bool((steps == 1.0).all()) else ""
     why += f"; if it is {other}, say so: unit: {other} (--time-unit {other})" if other else ""
     return TimeOptions(column=column.name, unit=guess), f"guessed: {first}{name} in {guess}; {why}"
+
+
+def _years(column: RawColumn) -> str | None:
+    """The unit of dates as parts of a year, 2001.0417, which say so by their name and size."""
+    known = finite_of(column.values)
+    dated = len(known) > 1 and known.min() > _YEARS[0] and known.max() < _YEARS[1] and column.unit is None
+    return "year" if dated and _CALLED_YEAR.search(column.name) else None
 
 
 def _unit_by_step(steps: NDArray[np.float64], *, arrays: bool) -> tuple[str, str]:
@@ -135,8 +145,10 @@ def needs_of_time(known: NDArray[np.float64], timing: Timing) -> tuple[float, di
     even = even_step(rising, surveyed, tolerance=GridOptions().tolerance)
     rounded = rounded_step(rising, surveyed) if even is None else None
     usual = float(np.mean(np.abs(np.diff(rising) - clean.median_step) <= 0.01 * clean.median_step))
-    # A stamp or two that are wrong say nothing of the others' distance.
-    uneven = round_step(clean.median_step if usual >= _EVEN_SHARE else clean.step)
+    # A stamp or two that are wrong say nothing of the others' distance, nor do gaps where most steps are the same.
+    alike = float(np.mean(np.abs(np.diff(rising) - clean.median_step) <= 1e-6 * clean.median_step))
+    alike = alike if len(clean.gaps) else 0.0
+    uneven = round_step(clean.median_step if usual >= _EVEN_SHARE or alike >= _MOSTLY_ALIKE else clean.step)
     step, tolerance = (even or uneven, None) if rounded is None else rounded
     needs: dict[str, object] = {
         "backward": "sort" if len(timing.backward) else None,

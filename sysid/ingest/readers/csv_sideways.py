@@ -49,6 +49,8 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
         named = all(numbers.parse(name) is None for name in names[1:]) and (
             not names[0] or numbers.parse(names[0]) is None
         )
+        if named and all(map(is_calendar, names[1:])):
+            return None  # dates one below the other are the time, whatever numbers the head has
         if not (named or (bare and width >= max(_NAMELESS, _LONGER * len(cells)))):
             continue
         stamps = None if bare else _stamps(cells[0][1:], path)

@@ -163,7 +163,7 @@ def numbers_columns(split: Split) -> bool:
     """Whether the first row is a head of numbers, as pandas writes it for columns that nobody named.
 
     Its cells are 0, 1, 2 ... above numbers with decimals or a clock that begins anew, or whole numbers behind an empty
-    cell that stands over the index.
+    cell that stands over the index, or over dates.
 
     Args:
         split: The rows of a file without another head.
@@ -176,7 +176,9 @@ def numbers_columns(split: Split) -> bool:
     if len(rows) < 2 or len(head) < 2 or len(set(head)) < len(head):
         return False
     if not head[0]:
-        return all(map(_is_count, head[1:])) and [row[0] for row in rows] == [str(k) for k in range(len(rows))]
+        index = [row[0] for row in rows]
+        dated = all(kind_of(cell) is Kind.TIME for cell in index)
+        return all(map(_is_count, head[1:])) and (dated or index == [str(k) for k in range(len(rows))])
     if head != [str(k) for k in range(len(head))]:
         return False
     anew = [row[0].replace(",", ".") for row in rows[:2]]

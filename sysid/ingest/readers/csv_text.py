@@ -37,7 +37,7 @@ from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, RepairOptions
 from sysid.ingest.tables.rates import said_step
 from sysid.ingest.tables.table import RawTable
-from sysid.ingest.tables.time_columns import recognise_time
+from sysid.ingest.tables.time_columns import is_called_time, recognise_time
 from sysid.names import from_csv_cell
 
 _MOST_TOLD = 6
@@ -183,7 +183,7 @@ def _given_names(names: Sequence[str], layout: Layout, path: Path) -> list[str]:
 
 def _calendar_column(headers: Sequence[Header], layout: Layout, options: FileOptions) -> int | None:
     """Index of the column of calendar time that is time, if there is one."""
-    names, asked = [header.name for header in headers], options.time
+    names, asked = [header.name or f"column_{i + 1}" for i, header in enumerate(headers)], options.time
     if asked.step is not None or asked.unit not in {None, "datetime"}:
         return None
     if asked.column is not None:
@@ -191,11 +191,13 @@ def _calendar_column(headers: Sequence[Header], layout: Layout, options: FileOpt
             asked.unit == "datetime" or layout.kinds[names.index(asked.column)] is Kind.TIME
         )
         return names.index(asked.column) if here else None
-    bare = [RawColumn(name=header.name, values=np.empty(0), unit=header.unit) for header in headers]
+    bare = [RawColumn(name=n, values=np.empty(0), unit=h.unit) for n, h in zip(names, headers, strict=True)]
     named = recognise_time(bare)
     if named is not None and (asked.unit == "datetime" or layout.kinds[names.index(named)] is Kind.TIME):
         return names.index(named)
-    if named is not None and layout.kinds[names.index(named)] is not Kind.TIME and asked.unit is None:
+    # Dates go before what is known for a clock by its unit alone, unless that stands first, as clocks do.
+    sure = named is not None and (is_called_time(named) or names.index(named) == 0)
+    if named is not None and sure and layout.kinds[names.index(named)] is not Kind.TIME and asked.unit is None:
         return None
     return layout.kinds.index(Kind.TIME) if Kind.TIME in layout.kinds else 0 if asked.unit == "datetime" else None
 

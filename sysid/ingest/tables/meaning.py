@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import ChannelError, ConfigError, ReaderError, UnitError
 from sysid.ingest.cells.words import Words, states_for
+from sysid.ingest.tables.clock_digits import time_of_digits
 from sysid.ingest.tables.clocks import clock_of
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.date_parts import time_of_parts
@@ -54,8 +55,10 @@ def with_meaning(table: RawTable, files: FileOptions) -> RawTable:
     if files.long is not None:
         table = _wide(table, files.long)
     asked = files.time
-    table = table if asked.step is not None else time_of_parts(table)
-    table = rows_of_one_stamp(going_on(table))
+    if asked.step is None:
+        put_together = time_of_digits(time_of_parts(table))
+        table = put_together if asked.column in {None, put_together.time} else table
+    table = rows_of_one_stamp(going_on(table, asked.column))
     return table if asked.column or asked.unit or asked.step is not None else with_clock(table)
 
 

@@ -31,6 +31,12 @@ _COUNTER = re.compile(
     re.IGNORECASE,
 )
 
+MOSTLY = 0.8
+"""Part of a column that may be missing; of what has more nothing is proposed."""
+
+_FALLS = 0.1
+_NAMELESS = re.compile(r"column_\d+")
+
 GOES_BACK = 0.25
 """Part of the steps that lead back, from which on a column moves as a signal does; stamps that do are out of order."""
 
@@ -47,11 +53,13 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
     Returns:
         Its name, or ``None`` if no column is plainly one.
     """
-    named = [column for column in columns if is_called_time(column.name)]
+    named = [column for column in columns if is_called_time(column.name) and not _is_mostly_blank(column)]
     # A capital T may be a temperature: only where nothing else is called time, and it rises.
     plain = [column for column in named if re.split(r"[/.]", column.name.strip())[-1] != "T"]
     clocks = [column for column in named if _may_be_clock(column)]
     timed = [column for column in columns if column.unit is not None and time_unit(column.unit) in _TIME_UNITS]
+    # How long a day is, or it rained, is in a unit of time too: by its unit alone is known what goes on like a clock.
+    timed = [column for column in timed if column in named or _goes_on(column)]
     likely = [*plain, *clocks, *timed]
     back = {column.name for column in likely if _goes_back(column)}
     found = next((column for column in likely if column.name not in back), None) or next(
@@ -63,6 +71,22 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
 def _goes_back(column: RawColumn) -> bool:
     steps = np.diff(column.values)
     return bool(len(steps)) and float(np.mean(steps < 0.0)) > GOES_BACK
+
+
+def _goes_on(column: RawColumn) -> bool:
+    """Whether what changes rises, but where a record begins anew; of a column without values nothing is known."""
+    if not len(column.values):
+        return True
+    steps = np.diff(column.values[np.isfinite(column.values)])
+    rises, falls = int((steps > 0.0).sum()), int((steps < 0.0).sum())
+    return not _is_mostly_blank(column) and rises > 0 and falls <= _FALLS * (rises + falls)
+
+
+def _is_mostly_blank(column: RawColumn) -> bool:
+    """Whether nearly all of a column of numbers is missing: as a clock it would take the samples of all others."""
+    if column.problem is not None or column.words is not None or not len(column.values):
+        return False
+    return float(np.mean(np.isnan(column.values))) > MOSTLY
 
 
 def _has_other_unit(column: RawColumn) -> bool:
@@ -128,6 +152,18 @@ def unit_of_clock(name: str) -> str | None:
     last = words[-1].casefold()
     unit = _SPELT.get(last) or time_unit(last)
     return unit if unit in _TIME_UNITS and (len(words) > 1 or len(last) > 1) else None
+
+
+def is_nameless(name: str) -> bool:
+    """Whether a column has no name in its file, and was given a number.
+
+    Args:
+        name: Its name.
+
+    Returns:
+        Whether it has none.
+    """
+    return _NAMELESS.fullmatch(name) is not None
 
 
 def is_counter(name: str) -> bool:

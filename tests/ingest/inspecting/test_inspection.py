@@ -72,7 +72,7 @@ def test_every_problem_is_told_and_its_repair_proposed(write: Write) -> None:
     found = inspect_file(path := write("run.csv", "t [s];u [V];still [A];holes [V]\n" + "\n".join(cells)))
     assert found.problems == (
         "1 ragged rows dropped, first at line 14",
-        "1 samples without a time stamp",
+        "1 sample without a time stamp",
         "1 backward time stamp",
         "1 duplicate time stamp",
         "4 samples missing in 2 gaps",
