@@ -1,16 +1,20 @@
-"""The search for a process model: from the best points of a grid by trust-region steps to the least error."""
+"""The search for a process model: from the best points of a grid by Levenberg-Marquardt to the least error."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import FitDivergedError
+from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
+from sysid.estimation.least_squares.provider import AbstractProvider, Linearisation
+from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear.process.problem import Problem
 from sysid.estimation.linear.process.starts import Begun, begun_at
+from sysid.estimation.linear.transfer_function_runs import flat_prior
 from sysid.estimation.results.result import Status
 from sysid.models.process.process_type import DEAD_TIME
 
@@ -27,6 +31,44 @@ AWAY = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
 """Samples from a dead time at which others are tried: between two samples the error may have a minimum of its own."""
 SETTLED = 4
 """Times that rows are chosen anew, as the dead times move."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Errors(AbstractProvider):
+    """The errors of a problem, as the engine wants them: a run gives its derivatives, too, so that the last is kept.
+
+    Args:
+        problem: Records, types and bounds.
+    """
+
+    problem: Problem
+    kept: dict[bytes, Linearisation] = field(default_factory=dict)
+
+    @property
+    def n_samples(self) -> int:  # type: ignore[override]
+        """Samples that count."""
+        return self.problem.n_counted
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Of the vector."""
+        return self.problem.ends
+
+    def loss(self, theta: Array) -> float:
+        """Half the sum of squared errors; see the base class."""
+        return self.linearise(theta).loss
+
+    @np.errstate(all="ignore")  # a run that explodes has no loss
+    def linearise(self, theta: Array, *, correlation: bool = True) -> Linearisation:  # noqa: ARG002 - nobody asks
+        """Loss, gradient and Gauss-Newton matrix; see the base class."""
+        key = theta.tobytes()
+        if key not in self.kept:
+            self.kept.clear()
+            errors, J = self.problem.errors(theta)
+            loss = 0.5 * float(errors @ errors)
+            loss = loss if np.isfinite(loss) else np.inf
+            self.kept[key] = Linearisation(loss=loss, gradient=J.T @ errors, gauss_newton=J.T @ J)
+        return self.kept[key]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,7 +167,7 @@ def _in_order(end: End) -> End:
 
 
 def descended(problem: Problem, theta: Array, steps: int) -> End:
-    """Trust-region steps from a vector.
+    """Levenberg-Marquardt from a vector.
 
     Args:
         problem: The problem.
@@ -135,35 +177,14 @@ def descended(problem: Problem, theta: Array, steps: int) -> End:
     Returns:
         Where they end.
     """
-    from scipy.optimize import least_squares  # 10 MB that other fits do without
-
-    kept: dict[bytes, tuple[Array, Array]] = {}
-    curve: list[float] = []
-
-    def both(x: Array) -> tuple[Array, Array]:
-        key = x.tobytes()
-        if key not in kept:
-            kept.clear()
-            with np.errstate(all="ignore"):
-                errors, slopes = problem.errors(x)
-            finite = np.isfinite(errors).all() and np.isfinite(slopes).all()
-            kept[key] = (errors, slopes) if finite else (np.full_like(errors, 1e6), np.zeros_like(slopes))
-        return kept[key]
-
-    def jacobian(x: Array) -> Array:
-        errors, slopes = both(x)
-        curve.append(0.5 * float(errors @ errors))
-        return slopes
-
-    low, high = problem.ends
-    apart = high > low
-    inside = np.where(apart, np.clip(theta, low, np.where(apart, high, np.inf)), theta)
-    found = least_squares(
-        lambda x: both(x)[0], inside, jacobian, (low, np.where(apart, high, low + 1e-12)), x_scale="jac",
-        ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE, max_nfev=steps,
-    )  # fmt: skip
-    status = Status.CONVERGED if found.status > 0 else Status.MAX_ITERATIONS
-    return End(problem=problem, theta=found.x, loss=float(found.cost), status=status, curve=(*curve, float(found.cost)))
+    errors = Errors(problem=problem)
+    limits = Termination(max_iterations=steps, tolerance=TOLERANCE, patience=2)
+    engine = LevenbergMarquardt(termination=limits, evidence_after=None)
+    found = engine.minimise_within(errors, np.clip(theta, *errors.bounds), flat_prior(len(theta)))
+    # What no step improves stands at a minimum: between two samples the derivative of a dead time jumps.
+    ended = found.status in {Status.NOT_IMPROVED, Status.STALLED}
+    status = Status.CONVERGED if ended else found.status
+    return End(problem=problem, theta=found.theta, loss=found.at.loss, status=status, curve=found.state.losses)
 
 
 def _among_dead_times(end: End) -> End:
