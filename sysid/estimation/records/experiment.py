@@ -84,7 +84,7 @@ class Experiment:
         if start.kind is StartKind.ESTIMATED:
             begun = Beginning(history=history, first=0)
             whole = cls._of(trace, inputs, output, begun, past=np.zeros(1, dtype=np.bool_), each=each)
-            return replace(whole, n_first=window(1, trace.usable_samples, asked=n))
+            return replace(whole, n_first=window(1, trace.usable_samples, inputs, asked=n))
         past = trace.usable_samples[:n] if n else None
         return replace(
             cls._of(trace, inputs, output, Beginning(history=history, first=n), past=past, each=each), n_first=n

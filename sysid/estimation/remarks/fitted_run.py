@@ -27,6 +27,7 @@ class FreeRun:
         simulated: Likewise.
         usable: Which samples are not masked, shape ``(n_samples,)``.
         history: What the run began with.
+        first: The sample of the record at which the run begins.
         beside: Channels of the record that the model does not read, by name, each of shape ``(n_samples,)``; the first
             so many that are never missing.
     """
@@ -36,6 +37,7 @@ class FreeRun:
     simulated: NDArray[np.float64]
     usable: NDArray[np.bool_]
     history: History
+    first: int = 0
     beside: Dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @classmethod
@@ -64,6 +66,7 @@ class FreeRun:
             simulated=model.simulate(inputs[window], begun.history).reshape(shape),
             usable=usable[window],
             history=begun.history,
+            first=begun.first,
             beside=_beside(model, trace, window),
         )
 

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from sysid.estimation.nonparametric.excitation_order import MOST, excitation_order
 from sysid.estimation.nonparametric.segments import segments_of
 from sysid.estimation.records.informative import informative, own_part, still
+from sysid.estimation.remarks.bent_by_noise import bent_by_noise
 from sysid.estimation.remarks.closed_loop import feedback_told
 from sysid.estimation.remarks.error_causes import causes
 from sysid.estimation.remarks.error_lags import left_out
 from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.estimation.remarks.held_output import held_for, straight_for
+from sysid.estimation.remarks.moved_at_first import moved_at_first
 from sysid.estimation.remarks.record_drift import drifts_told
 from sysid.estimation.remarks.record_levels import levels_told
 from sysid.estimation.remarks.record_resolution import resolution_told
@@ -274,12 +276,13 @@ def contradicted(
 
     Returns:
         One sentence for each output whose free run a constant beats or equals, for each that acts on the inputs, and
-        for each input that acts at a lag which the model leaves out, or at once without being asked.
+        for each input that acts at a lag which the model leaves out, or at once without being asked; or that nothing
+        moves where the run is scored.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # a run that is lost, and its squares, are beyond any number
         runs = [FreeRun.of(model, trace, start) for trace in traces[:MOST_TRACES]]
-        lost = _lost_at_first(model, runs, trained)
-        return lost or _against(model, traces, runs, training, uncertainty)
+        told = moved_at_first(model.mapping, traces[:MOST_TRACES], runs) or _lost_at_first(model, runs, trained)
+        return told or _against(model, traces, runs, start, training=training, uncertainty=uncertainty)
 
 
 def _lost_at_first(model: AbstractModel, runs: Sequence[FreeRun], trained: float | None) -> tuple[str, ...]:
@@ -304,6 +307,8 @@ def _against(
     model: AbstractModel,
     traces: Sequence[Trace],
     runs: Sequence[FreeRun],
+    start: Start,
+    *,
     training: object,
     uncertainty: Uncertainty | None,
 ) -> tuple[str, ...]:
@@ -316,12 +321,14 @@ def _against(
     known = {**steps, **drifts}
     lags = () if known else left_out(model, longest, fed)
     ratios = _beside_constants(runs)
+    bent = None if fed or known or levels else bent_by_noise(model, traces[:MOST_TRACES], runs, start)
+    judged = longest if bent is None else max(bent.runs, key=lambda run: len(run.output))
     # A lag that is left out is a cause, and the nearer one; not of a run that has next to nothing of the output.
     worth = not lags or min(ratios.values(), default=0.0) > POOR
     told = {*known, *(i for i, ratio in ratios.items() if _lost(ratio))}
-    rest = (*lags, *(causes(model, longest, (*fed, *levels), but=told) if worth else ()))
+    rest = (*lags, *(causes(bent.model if bent else model, judged, (*fed, *levels), but=told) if worth else ()))
     poor = _told_beside_constants(model, ratios, uncertainty)
-    return (*poor, *fed.values(), *levels.values(), *known.values(), *rest)
+    return (*poor, *fed.values(), *levels.values(), *known.values(), *([bent.told] if bent else []), *rest)
 
 
 def _beside_constants(runs: Sequence[FreeRun]) -> dict[int, float]:

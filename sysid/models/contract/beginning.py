@@ -23,6 +23,8 @@ from sysid.models.contract.base import AbstractModel
 LONGEST_WINDOW, SHARE_OF_RECORD = 50, 5
 """A window is a fifth of its record and 50 samples at most, or as long as the model's memory where that is longer: the
 same for all models that remember less, so that they are scored on the same samples."""
+MOVES, LEAST_BEFORE = 0.1, 5
+"""Part of its range by which an input moves from where it stood, and samples before it does that show a state."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,12 +40,16 @@ class Beginning:
     first: int
 
 
-def window(memory: int, usable: NDArray[np.bool_], *, asked: int = 0) -> int:
+def window(memory: int, usable: NDArray[np.bool_], inputs: NDArray[np.float64] | None = None, *, asked: int = 0) -> int:
     """How many samples of a record an initial state is estimated on.
+
+    Where inputs move within the window and no more behind it, as in a step test, it ends before they do, if the samples
+    there show a state: what is left to be scored would be noise about a level.
 
     Args:
         memory: Samples that the model needs.
         usable: Which samples of the record are not masked, shape ``(n_samples,)``.
+        inputs: The record's inputs, shape ``(n_samples, n_inputs)``; they are not looked at without.
         asked: A length that somebody chose; 0 for none.
 
     Returns:
@@ -55,12 +61,28 @@ def window(memory: int, usable: NDArray[np.bool_], *, asked: int = 0) -> int:
         [20, 50, 9]
         >>> window(3, np.arange(300) < 5)
         3
+        >>> step = np.repeat([0.0, 1.0], [20, 180])[:, np.newaxis]
+        >>> [window(memory, np.ones(200, dtype=bool), step) for memory in (3, 30)]
+        [20, 40]
     """
     places = np.flatnonzero(usable)
     if not len(places):
         return 0
     wanted = asked or max(min(LONGEST_WINDOW, len(places) // SHARE_OF_RECORD), memory, 1)
-    return int(min(places[min(wanted, len(places)) - 1] + 1, places[-1]))
+    end = int(min(places[min(wanted, len(places)) - 1] + 1, places[-1]))
+    if asked or inputs is None:
+        return end
+    before = _before_all_moves(inputs, end)
+    return before if np.count_nonzero(usable[:before]) >= max(memory, LEAST_BEFORE) else end
+
+
+def _before_all_moves(inputs: NDArray[np.float64], end: int) -> int:
+    """The sample at which inputs begin to move that stand still from the end of a window on; 0 where some do not."""
+    least = MOVES * np.ptp(inputs, axis=0)
+    moving = np.flatnonzero(least > 0.0)
+    if not len(moving) or (np.ptp(inputs[end:, moving], axis=0) > least[moving]).any():
+        return 0
+    return int(np.argmax((np.abs(inputs - inputs[0])[:, moving] > least[moving]).any(axis=1)))
 
 
 def beginning(
@@ -95,7 +117,7 @@ def beginning(
         history = form.cased(start.history(inputs, output, model.resting, usable), case)
         return Beginning(history=history, first=start.n_measured)
     known = np.ones(len(output), dtype=np.bool_) if usable is None else usable
-    first = window(form.memory, known, asked=start.n_measured)
+    first = window(form.memory, known, inputs, asked=start.n_measured)
     if first == 0:  # a single sample: nothing is left to estimate on
         history = form.cased(History.at_rest(inputs=inputs[0], output=model.resting), case)
         return Beginning(history=history, first=0)

@@ -33,7 +33,7 @@ def free_run_error(system: Innovations, segments: Sequence[Segment]) -> float:
     for segment in segments:
         counts, first = segment.root_weights > 0.0, 0
         if segment.rest is None:
-            first = window(form.memory, counts)
+            first = window(form.memory, counts, segment.inputs)
             history = History(inputs=segment.inputs[:first], output=segment.outputs[:first], usable=counts[:first])
         else:
             history = History.at_rest(inputs=segment.rest[0], output=segment.rest[1])
