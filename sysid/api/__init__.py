@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from sysid.models import ProcessModel as ProcessModel
     from sysid.models import Start as Start
     from sysid.models import TransferFunction as TransferFunction
+    from sysid.models import VectorARX as VectorARX
     from sysid.models import VectorGreyBox as VectorGreyBox
     from sysid.models import VectorNARX as VectorNARX
     from sysid.models import VectorNeuralStateSpace as VectorNeuralStateSpace

@@ -32,12 +32,14 @@ from sysid.estimation.linear.state_space.fit import fit_state_space
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
 from sysid.estimation.linear.transfer_function import fit_transfer_function
 from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.linear.vector_arx import fit_vector_arx
 from sysid.estimation.linear_posteriors import (
     arx_posterior,
     polynomial_posterior,
     process_posterior,
     state_space_posterior,
     transfer_function_posterior,
+    vector_arx_posterior,
 )
 from sysid.estimation.networks.narx import fit_narx
 from sysid.estimation.networks.neural.state_space import (
@@ -70,6 +72,7 @@ from sysid.models import (
     ProcessModel,
     Start,
     TransferFunction,
+    VectorARX,
     VectorGreyBox,
     VectorNARX,
     VectorNeuralStateSpace,
@@ -91,6 +94,13 @@ ESTIMATORS: dict[str, Estimator] = {
     row.kind: row
     for row in (
         _linear(structure=ARX, name="an ARX model", fit=fit_arx, posterior=arx_posterior, no_posterior=GROWING),
+        _linear(
+            structure=VectorARX,
+            name="an ARX model of several outputs",
+            fit=fit_vector_arx,
+            posterior=vector_arx_posterior,
+            no_posterior=GROWING,
+        ),
         *(
             _trained(
                 structure=structure,

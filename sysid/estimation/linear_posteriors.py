@@ -22,6 +22,7 @@ from sysid.models import (
     LinearStateSpaceModel,
     Start,
     TransferFunctionModel,
+    VectorARXModel,
     VectorStateSpaceModel,
 )
 from sysid.models.linear.polynomial import PolynomialModel
@@ -62,6 +63,20 @@ def arx_posterior(model: ARXModel, known: Uncertainty, traces: Sequence[Trace], 
         factor[0] = root[n]
     noise = _noise(model, traces, start, len(root))
     return Posterior(factor=factor, noise=replace(noise, one_step=known.noise_variance))
+
+
+def vector_arx_posterior(
+    model: VectorARXModel, known: Uncertainty, traces: Sequence[Trace], start: Start
+) -> Posterior | None:
+    """Of an ARX model of several outputs: as of one, with the covariance between their coefficients."""
+    n, root = len(model.coefficients), _root(known.covariance)
+    constants = root[n:] if len(root) > n else np.zeros((len(model.intercepts), root.shape[1]))
+    noise = _noise(model, traces, start, len(root))
+    covariance = known.noise_covariance
+    assert covariance is not None  # noqa: S101 - of several outputs there is one
+    return Posterior(
+        factor=model.spread(root[:n], constants), noise=replace(noise, one_step=np.diag(covariance).copy())
+    )
 
 
 def polynomial_posterior(

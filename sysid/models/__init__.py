@@ -51,6 +51,8 @@ from sysid.models.linear.polynomial_orders import OE as OE
 from sysid.models.linear.state_space import StateSpace as StateSpace
 from sysid.models.linear.transfer_function import TransferFunction as TransferFunction
 from sysid.models.linear.transfer_function import TransferFunctionModel as TransferFunctionModel
+from sysid.models.linear.vector_arx import VectorARXModel as VectorARXModel
+from sysid.models.linear.vector_arx_orders import VectorARX as VectorARX
 from sysid.models.networks.narx import NARXModel as NARXModel
 from sysid.models.networks.narx import VectorNARXModel as VectorNARXModel
 from sysid.models.networks.narx_structures import NARX as NARX

@@ -22,6 +22,8 @@ from sysid.models.linear.linear_state_space import (
 from sysid.models.linear.polynomial import PolynomialModel
 from sysid.models.linear.polynomial_orders import POLYNOMIALS
 from sysid.models.linear.transfer_function import TransferFunction, TransferFunctionModel
+from sysid.models.linear.vector_arx import VectorARXModel
+from sysid.models.linear.vector_arx_orders import VectorARX
 from sysid.models.networks.narx import NARXModel, VectorNARXModel
 from sysid.models.networks.narx_structures import NARX, VectorNARX
 from sysid.models.networks.neural_state_space import (
@@ -46,6 +48,7 @@ _PAIRS: tuple[tuple[type[AbstractStructure], type[AbstractModel]], ...] = (
     (LinearStateSpace, LinearStateSpaceModel),
     (VectorStateSpace, VectorStateSpaceModel),
     *((structure, PolynomialModel) for structure in POLYNOMIALS.values()),
+    (VectorARX, VectorARXModel),
     (VectorNARX, VectorNARXModel),
     *((structure, BuiltModel) for structure in BUILT),
 )

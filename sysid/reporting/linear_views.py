@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.linear.of_polynomials import of_polynomials
 from sysid.estimation.linear.process.uncertainty import drawn_polynomials
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel, FittedProcess
@@ -125,13 +126,14 @@ def linear_views(model: AbstractModel, uncertainty: Uncertainty | None, seed: in
         One view per input that has parameters.
     """
     views = []
+    drawn_from = uncertainty if isinstance(model, FittedProcess) else of_polynomials(model, uncertainty)
     ends, several = model.ends, len(model.mapping.outputs) > 1
     for (o, j), ratio in model.ratios.items():
         if not len(ratio.B):
             continue
         name = f"{ends.outputs[o]} from {ends.inputs[j]}" if several else ends.inputs[j]
         Bs, Fs = ratio.B[np.newaxis], ratio.F[np.newaxis]
-        if uncertainty is not None and (drawn := _drawn(model, uncertainty, j, ratio, seed)) is not None:
+        if drawn_from is not None and (drawn := _drawn(model, drawn_from, j, ratio, seed)) is not None:
             drawn_B, drawn_F = drawn
             Bs, Fs = np.concatenate([Bs, drawn_B]), np.concatenate([Fs, drawn_F])
         views.append(

@@ -43,6 +43,7 @@ _ELSEWHERE = {
     **dict.fromkeys(("idneuralstatespace", "nlssest"), ("NeuralStateSpace",)),
     **dict.fromkeys(("frols", "polynomial"), ("PolynomialNARX",)),
     **dict.fromkeys(("ar", "fir", "idpoly", "impulseest"), ("ARX",)),
+    **dict.fromkeys(("var", "varx"), ("VectorARX",)),
 }
 """What the same is called in other tools."""
 

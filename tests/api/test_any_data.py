@@ -120,7 +120,7 @@ def _record(rng: Rng, length: int, *, kinds: list[str], output: str, scales: Arr
     return {**dict(zip(names, u.T, strict=True)), "y": y}
 
 
-KINDS = ["ARX", "TF", "NARX", "NSS", "SS", "VectorSS", "VectorNSS", "OE", "BJ", "ARMAX"]
+KINDS = ["ARX", "VectorARX", "TF", "NARX", "NSS", "SS", "VectorSS", "VectorNSS", "OE", "BJ", "ARMAX"]
 
 
 def _starts() -> st.SearchStrategy[sysid.Start]:
@@ -153,9 +153,10 @@ def _fits(draw: st.DrawFn, n_inputs: int) -> tuple[AbstractStructure, Options | 
             "ARMAX": sysid.ARMAX(na=na, nb=nb, nc=nc, nk=nk, integrated=draw(st.booleans())),
         }
         return given[kind], sysid.PolynomialTraining(max_iterations=draw(st.integers(0, 15)))
-    if kind == "ARX":
+    if kind in {"ARX", "VectorARX"}:
         nb, nk = (draw(each(*[st.integers(low, 3)] * n_inputs)) for low in (1, 0))
-        return sysid.ARX(na=draw(st.integers(0, 3)), nb=nb, nk=nk, intercept=draw(st.booleans())), None
+        arx = sysid.ARX if kind == "ARX" else sysid.VectorARX
+        return arx(na=draw(st.integers(0, 3)), nb=nb, nk=nk, intercept=draw(st.booleans())), None
     if kind == "TF":
         poles = draw(each(*[st.integers(1, 2)] * n_inputs))
         zeros = tuple(draw(st.integers(0, p)) for p in poles)

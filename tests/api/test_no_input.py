@@ -59,6 +59,7 @@ MODELS = {
     "NSS": ("-> y", sysid.NeuralStateSpace(states=1, neurons=1)),
     "one NSS of two outputs": ("-> y+z", sysid.NeuralStateSpace(states=1, neurons=1)),
     "AR of two outputs": ("-> y+z", sysid.ARX(na=1, nb=(), nk=())),
+    "a vector autoregression": ("-> y+z", sysid.VectorARX(na=1, nb=[], nk=[])),
     "one network of two outputs": ("-> y+z", sysid.VectorNARX(input_delays=[], output_delays=1, neurons=1)),
 }
 TRAININGS = {"NSS": sysid.Training(max_iterations=5), "VectorNARX": sysid.Training(max_iterations=2)}

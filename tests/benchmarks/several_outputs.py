@@ -1,9 +1,9 @@
-"""One network of two outputs beside one an output: neural state spaces at as many states, NARX at as many neurons.
+"""One model of two outputs beside one an output: neural state spaces, NARX and ARX at the same sizes.
 
-    python -m tests.benchmarks several_outputs [--seeds=5] [--samples=1200] [--only=states,narx]
+    python -m tests.benchmarks several_outputs [--seeds=5] [--samples=1200] [--only=states,narx,arx]
 
 Fit on an unseen record without noise, in free run from an estimated state, of the worse output; medians over the seeds,
-and over five plants for NARX. One thread.
+and over five plants for NARX and ARX. One thread.
 """
 
 from __future__ import annotations
@@ -11,13 +11,24 @@ from __future__ import annotations
 import sys
 import time
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation import StabilityOptions, Training
 from sysid.estimation.estimators import fit
-from sysid.models import NARX, AbstractModel, Mapping, NeuralStateSpace, Start, beginning
+from sysid.models import (
+    ARX,
+    NARX,
+    AbstractModel,
+    AbstractStructure,
+    Mapping,
+    NeuralStateSpace,
+    Start,
+    VectorARX,
+    beginning,
+)
 from sysid.traces import Channel, Trace
 from tests.benchmarks._findings import found
 from tests.benchmarks._linear_systems import NAMES, SAMPLES, systems
@@ -65,13 +76,18 @@ def percent(model: AbstractModel, unseen: Trace) -> Array:
 
 
 def compared(
-    estimation: Trace, unseen: Trace, network: NARX | NeuralStateSpace, training: Training
+    estimation: Trace,
+    unseen: Trace,
+    network: AbstractStructure,
+    training: Training | None,
+    whole: AbstractStructure | None = None,
 ) -> dict[str, Array]:
     """Fit of both outputs and processor time, of one model and of one an output."""
     began = time.process_time()
-    whole = fit([estimation], BOTH, network.for_outputs(2), training, start=FREE, stability=UNCHECKED).model
+    asked = whole or network.for_outputs(2)
+    model = fit([estimation], BOTH, asked, training, start=FREE, stability=UNCHECKED).model
     seconds = time.process_time() - began
-    one = np.append(percent(whole, unseen), seconds)
+    one = np.append(percent(model, unseen), seconds)
     began = time.process_time()
     each = [fit([estimation], m, network, training, start=FREE, stability=UNCHECKED).model for m in BOTH.each]
     seconds = time.process_time() - began
@@ -140,24 +156,31 @@ PLANTS = {
 LEVELS = {"no noise": (0.0, 0.0), "2 % noise": (0.02, 0.02), "10 and 1 % noise": (0.1, 0.01)}
 
 
-def narx(seeds: range, samples: int) -> None:
-    """NARX 3/3/8 of the five plants."""
-    network = NARX(input_delays=3, output_delays=3, neurons=8)
+def lagged(
+    seeds: range,
+    samples: int,
+    network: AbstractStructure,
+    training: Training | None,
+    whole: AbstractStructure | None = None,
+) -> None:
+    """A structure over lags of the five plants."""
     for name, sizes in LEVELS.items():
         rows: dict[str, list[Array]] = defaultdict(list)
         for make in PLANTS.values():
             for seed in seeds:
                 (u, y), rng = make(seed, samples), np.random.default_rng(seed)
                 noisy = y + rng.standard_normal(y.shape) * np.array(sizes) * y.std(axis=0)
-                training = Training(max_iterations=300, workers=1, seed=seed)
-                both = compared(trace_of(u, noisy), trace_of(*make(1_000 + seed, samples)), network, training)
+                given = None if training is None else replace(training, seed=seed)
+                both = compared(trace_of(u, noisy), trace_of(*make(1_000 + seed, samples)), network, given, whole)
                 for which, figures in both.items():
                     rows[which].append(figures)
         for which, figures in rows.items():
             worse = [min(row[:2]) for row in figures]
             note = f"lower quartile {np.quantile(worse, 0.25):.1f}, {len(PLANTS)} plants, {len(seeds)} seeds"
-            found(f"NARX 3/3/8, {name}, {which}, worse output", float(np.median(worse)), "%", note=note)
-            found(f"NARX 3/3/8, {name}, {which}, processor time", float(np.median([row[2] for row in figures])), "s")
+            found(f"{network.label}, {name}, {which}, worse output", float(np.median(worse)), "%", note=note)
+            found(
+                f"{network.label}, {name}, {which}, processor time", float(np.median([row[2] for row in figures])), "s"
+            )
 
 
 def states(seeds: range) -> None:
@@ -187,11 +210,14 @@ def states(seeds: range) -> None:
 def main() -> None:
     """What was asked for."""
     given = dict(argument.removeprefix("--").split("=") for argument in sys.argv[1:] if "=" in argument)
-    seeds, only = range(int(given.get("seeds", 5))), given.get("only", "states,narx").split(",")
+    seeds, only = range(int(given.get("seeds", 5))), given.get("only", "states,narx,arx").split(",")
     if "states" in only:
         states(seeds)
+    samples, training = int(given.get("samples", 1_200)), Training(max_iterations=300, workers=1)
     if "narx" in only:
-        narx(seeds, int(given.get("samples", 1_200)))
+        lagged(seeds, samples, NARX(input_delays=3, output_delays=3, neurons=8), training)
+    if "arx" in only:
+        lagged(seeds, samples, ARX(na=3, nb=(3,), nk=(1,)), None, VectorARX(na=3, nb=3, nk=1))
 
 
 if __name__ == "__main__":

@@ -76,6 +76,7 @@ def test_a_row_says_what_its_function_knows() -> None:
         "OE",
         "BJ",
         "ARMAX",
+        "VectorARX",
         "VectorSS",
     }
 

@@ -19,6 +19,8 @@ from sysid.models import (
     NARXModel,
     Scaling,
     TransferFunction,
+    VectorARX,
+    VectorARXModel,
     VectorNARX,
     VectorNARXModel,
     VectorScaling,
@@ -61,6 +63,25 @@ def wired_vector(mapping: str, structure: VectorNARX, seed: int) -> VectorNARXMo
         scaling=VectorScaling(
             input_offset=(45.0,) * n, input_scale=(45.0,) * n, output_offset=(40.0,) * m, output_scale=(38.0,) * m
         ),
+        mapping=parsed,
+        sample_time=0.1,
+        input_units=("psi",) * n,
+        output_units=("psi",) * m,
+        rest_outputs=(5.0,) * m,
+    )
+
+
+def wired_vector_arx(mapping: str, orders: VectorARX, seed: int) -> VectorARXModel:
+    """A linear model of several outputs that read each other, in a cascade."""
+    parsed = Mapping.parse(mapping)
+    n, m = len(parsed.inputs), len(parsed.outputs)
+    rng, terms = np.random.default_rng(seed), orders.sized(n, m).terms
+    past = sum(channel >= n for _, channel, _ in terms)
+    values = [rng.uniform(0.2, 0.9) / (past / m if channel >= n else 2.0 * n) for _, channel, _ in terms]
+    return VectorARXModel(
+        orders=orders,
+        coefficients=np.array(values),
+        intercepts=rng.normal(size=m),
         mapping=parsed,
         sample_time=0.1,
         input_units=("psi",) * n,
@@ -160,6 +181,14 @@ def build_equations() -> Cascade:
     )  # fmt: skip
 
 
+def build_vector_arx() -> Cascade:
+    """A linear model of two outputs that read each other, with dead times, and one that reads one of them."""
+    first = wired_vector_arx(
+        "STP+FLOW -> BP+AR", VectorARX(na=[[2, 1], [1, 3]], nb=[[2, 0], [1, 2]], nk=[[0, 1], [4, 2]]), 5
+    )
+    return Cascade(models=(first, wired_vector_arx("AR -> BC", VectorARX(na=1, nb=2, nk=0), 6)), rest={"BP": "STP"})
+
+
 def build_committee(count: int = 3, threshold: float = 1.0, *, mean: bool = False) -> Cascade:
     """Pairs of models of the same outputs: a channel limits an output in each, and one judges the first, or all."""
     structure = NARX(input_delays="0:1", output_delays=1, neurons=4)
@@ -184,6 +213,7 @@ CASCADES: dict[str, tuple[Callable[[], Cascade], tuple[str, ...] | None]] = {
     "some outputs, in another order": (build_limited, ("BC", "AR")),
     "one output of a circle": (build_circle, ("ER",)),
     "equations in a circle": (build_equations, None),
+    "linear, of several outputs": (build_vector_arx, None),
     "a mean of three": (partial(build_committee, 3, 1.0, mean=True), ("BC_spread", "BP", "BC")),
     "a committee of four": (partial(build_committee, 4, 0.5), ("BC",)),
 }

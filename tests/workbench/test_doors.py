@@ -42,6 +42,7 @@ NARX = {"kind": "NARX", "input_delays": 1, "output_delays": 1, "neurons": 2}
 NSS = {"kind": "NSS", "states": 1, "neurons": 2}
 ARX = {"kind": "ARX", "na": 1, "nb": [1, 1], "nk": [1, 1]}
 VECTOR_SS = {"kind": "VectorSS", "states": 2}
+VECTOR_ARX = {"kind": "VectorARX", "na": [[2, 1], [1, 2]], "nb": 2, "nk": [[1, 1], [0, 2]]}
 VECTOR_NSS = {"kind": "VectorNSS", "states": 1, "neurons": 1}
 VECTOR = {"kind": "VectorNARX", "input_delays": 1, "output_delays": 1, "neurons": 2}
 SS = {"kind": "SS", "states": 1}
@@ -106,6 +107,7 @@ FITS = [
         POLYNOMIAL_NARX | {"output_delays": []}, {"seed": 7, "max_iterations": 4}, ALONE, id="polynomial, inputs alone"
     ),
     pytest.param(VECTOR_SS, None, ALONE, id="VectorSS, of one"),
+    pytest.param(VECTOR_ARX | {"na": 2, "nk": [1, 0]}, None, ALONE, id="VectorARX, of one"),
     pytest.param(VECTOR_NSS, {"seed": 7, "max_iterations": 4, "starts": 1}, ALONE, id="VectorNSS, of one"),
     pytest.param(VECTOR, {"seed": 7, "max_iterations": 4, "starts": 2}, ALONE, id="NARX of several outputs, of one"),
     pytest.param(
@@ -220,6 +222,7 @@ TWO |= {"stability": STABILITY, "export": None}
     [
         pytest.param(VECTOR, {"seed": 7, "max_iterations": 3}, id="VectorNARX"),
         pytest.param(SS | {"kind": "VectorSS"}, None, id="VectorSS"),
+        pytest.param(VECTOR_ARX, None, id="VectorARX"),
         pytest.param(VECTOR_NSS, {"seed": 7, "max_iterations": 3, "starts": 2}, id="VectorNSS"),
     ],
 )

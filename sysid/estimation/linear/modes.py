@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sysid.estimation.linear.process.uncertainty import of_polynomials
+from sysid.estimation.linear.of_polynomials import of_polynomials
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel
 from sysid.models.contract.ratio import Ratio

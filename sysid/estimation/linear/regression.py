@@ -13,7 +13,7 @@ from sysid.errors import TraceError
 from sysid.estimation.nonparametric.evidence import triangle
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.records.operating_point import OperatingPoint
-from sysid.models import Lags
+from sysid.models import History, Lags
 
 TALL = 4096
 """Rows from which on they are made as few as there are columns, by blocks: as exact, in a fifth of the time."""
@@ -26,7 +26,8 @@ class Solution:
     """A least-squares solution.
 
     Args:
-        coefficients: Shape ``(n_columns,)``; zero in directions that the data do not determine.
+        coefficients: Shape ``(n_columns,)``, or with a column for each of several targets; zero in directions that the
+            data do not determine.
         unscaled_covariance: Inverse of the normal matrix, shape ``(n_columns, n_columns)``; NaN where it is singular.
         rank: Number of coefficients that the data determine.
     """
@@ -129,7 +130,7 @@ def blocks_of(
     """Weighted regressors and targets some rows at a time: a long record times its lags is larger than any memory.
 
     Args:
-        experiments: The records, with the weights of their rows.
+        experiments: The records, with the weights of their rows; of several outputs as :func:`all_read` gives them.
         lags: The regressors.
 
     Yields:
@@ -151,7 +152,21 @@ def blocks_of(
             root = np.ones(last - first) if e.weights is None else np.sqrt(e.weights[first:last])
             kept = root > 0.0
             if kept.any():
-                yield root[kept], X[kept] * root[kept, None], e.output[first:last][kept] * root[kept]
+                yield root[kept], X[kept] * root[kept, None], (e.output[first:last][kept].T * root[kept]).T
+
+
+def all_read(experiment: Experiment) -> Experiment:
+    """A record of several outputs whose past stands among the inputs, behind them: lags of any channel are of inputs.
+
+    Args:
+        experiment: The record, its output with columns.
+
+    Returns:
+        The record.
+    """
+    past = experiment.history
+    history = History(inputs=np.column_stack([past.inputs, past.output]), output=past.output)
+    return replace(experiment, inputs=np.column_stack([experiment.inputs, experiment.output]), history=history)
 
 
 def nothing_in_a_row(needed: int, experiments: Sequence[Experiment]) -> TraceError:
@@ -185,7 +200,7 @@ def solve(
 
     Args:
         X: Shape ``(n_rows, n_columns)``.
-        y: Shape ``(n_rows,)``.
+        y: Shape ``(n_rows,)``, or with a column for each of several targets.
         ridge: Weight :math:`\rho` of the penalty :math:`\rho\sum_i \|x_i\|^2\theta_i^2`, which does not depend on
             the units of the columns; 0 for none.
         constant: Whether the last column is that of a constant: where it and another say the same, as the past of an
@@ -212,11 +227,11 @@ def solve(
         scale[-1] *= 1.0 - FIRST
     A = X / scale
     if ridge > 0.0:
-        A, y = np.concatenate([A, np.sqrt(ridge) * np.eye(n)]), np.concatenate([y, np.zeros(n)])
+        A, y = np.concatenate([A, np.sqrt(ridge) * np.eye(n)]), np.concatenate([y, np.zeros((n, *y.shape[1:]))])
     Q, R, order = linalg.qr(A, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(R))
     rank = int(np.count_nonzero(diagonal > samples * np.finfo(np.float64).eps * diagonal[0])) if n else 0
-    coefficients, covariance = np.zeros(n), np.full((n, n), np.nan)
+    coefficients, covariance = np.zeros((n, *y.shape[1:])), np.full((n, n), np.nan)
     kept = order[:rank]
     coefficients[kept] = linalg.solve_triangular(R[:rank, :rank], Q.T[:rank] @ y)
     inverse = linalg.solve_triangular(R[:rank, :rank], np.eye(rank))
@@ -225,5 +240,5 @@ def solve(
         spread = spread @ (np.eye(rank) - ridge * spread)
     covariance[np.ix_(kept, kept)] = spread
     return Solution(
-        coefficients=coefficients / scale, unscaled_covariance=covariance / np.outer(scale, scale), rank=rank
+        coefficients=(coefficients.T / scale).T, unscaled_covariance=covariance / np.outer(scale, scale), rank=rank
     )

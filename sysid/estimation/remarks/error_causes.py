@@ -190,7 +190,8 @@ def _of_another(run: FreeRun, error: Array, usable: Mask, name: str) -> str:
     return (
         f"{100 * share:.0f} % of what the free run of {name} leaves moves with earlier values of {names}, which the "
         f"record has and this model does not read. What acts on {name} should be an input; where each acts on the "
-        "other, fit both as outputs of one model (a state space, or NARX, whose outputs read the past of all)."
+        "other, fit both as outputs of one model (a state space, VectorARX, or NARX, whose outputs read the past of "
+        "all)."
     )
 
 

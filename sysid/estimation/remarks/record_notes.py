@@ -184,7 +184,7 @@ def underexcited(model: AbstractModel, traces: Sequence[Trace]) -> tuple[str, ..
     for (_, j), ratio in model.ratios.items():
         # Of an equation with past outputs the noise excites the denominator.
         of_input = len(ratio.B) if ratio.past_outputs else len(ratio.B) + len(ratio.F) - 1
-        asked[j] = max(asked.get(j, 0), of_input)
+        asked[j] = max(asked.get(j, 0), of_input if ratio.asks is None else ratio.asks)
     if not model.ratios and model.structure.learns_curves:
         asked = dict.fromkeys(range(len(model.mapping.inputs)), OF_CURVES)
     told = []

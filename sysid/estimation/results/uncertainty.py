@@ -10,6 +10,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+_OPTIONAL = ("profile", "noise_covariance")
+"""Fields that only some fits have."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Uncertainty:
@@ -19,9 +22,12 @@ class Uncertainty:
         names: What each parameter is.
         values: Estimates, shape ``(n_parameters,)``.
         covariance: Shape ``(n_parameters, n_parameters)``; NaN in rows of parameters that the data do not determine.
-        noise_variance: Variance of the residuals, :math:`\sum e^2 / (N - p)`, in the output's unit squared.
+        noise_variance: Variance of the residuals, :math:`\sum e^2 / (N - p)`, in the output's unit squared; of
+            several outputs the root of the determinant of their covariance, one for each.
         profile: Ends of 95 % intervals by profile likelihood, shape ``(n_parameters, 2)``; infinite where the data do
             not end one. ``None`` where nobody asked for them.
+        noise_covariance: Covariance of the residuals of several outputs, in the products of their units, shape
+            ``(n_outputs, n_outputs)``; ``None`` of one.
 
     Example:
         >>> u = Uncertainty(names=("a1",), values=np.array([0.5]), covariance=np.array([[0.01]]), noise_variance=1.0)
@@ -34,6 +40,7 @@ class Uncertainty:
     covariance: NDArray[np.float64]
     noise_variance: float
     profile: NDArray[np.float64] | None = None
+    noise_covariance: NDArray[np.float64] | None = None
 
     @property
     def standard_deviations(self) -> NDArray[np.float64]:
@@ -63,12 +70,14 @@ class Uncertainty:
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as JSON values."""
+        optional = {name: getattr(self, name) for name in _OPTIONAL}
         return {
             "names": list(self.names),
             "values": self.values.tolist(),
             "covariance": self.covariance.tolist(),
             "noise_variance": self.noise_variance,
-        } | ({} if self.profile is None else {"profile": self.profile.tolist()})
+            **{name: values.tolist() for name, values in optional.items() if values is not None},
+        }
 
     @classmethod
     def from_dict(cls, fields: Dict[str, Any]) -> Uncertainty:
@@ -85,5 +94,25 @@ class Uncertainty:
             values=np.asarray(fields["values"], dtype=np.float64),
             covariance=np.asarray(fields["covariance"], dtype=np.float64),
             noise_variance=float(fields["noise_variance"]),
-            profile=np.asarray(fields["profile"], dtype=np.float64) if "profile" in fields else None,
+            **{name: np.asarray(fields[name], dtype=np.float64) for name in _OPTIONAL if name in fields},
         )
+
+
+_TINY = 1e-300
+
+
+def generalised_variance(covariance: NDArray[np.float64]) -> float:
+    """One figure for the noise of several outputs: the root of the determinant of their covariance, one for each.
+
+    Args:
+        covariance: Shape ``(n_outputs, n_outputs)``.
+
+    Returns:
+        Of one output its variance.
+
+    Example:
+        >>> float(round(generalised_variance(np.diag([4.0, 9.0])), 12))
+        6.0
+    """
+    p = len(covariance)
+    return float(np.exp(np.linalg.slogdet(covariance + _TINY * np.eye(p))[1] / p))

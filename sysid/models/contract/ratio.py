@@ -21,6 +21,8 @@ class Ratio:
         of_denominator: How those of the denominator begin.
         past_outputs: Whether the denominator's parameters are coefficients of past outputs, which stand on the other
             side of the equation.
+        asks: How many coefficients of the input a record has to tell apart; ``None`` for those of both polynomials, or
+            of the numerator where the other ones are those of past outputs.
     """
 
     B: NDArray[np.float64]
@@ -30,3 +32,4 @@ class Ratio:
     of_numerator: str
     of_denominator: str
     past_outputs: bool = False
+    asks: int | None = None

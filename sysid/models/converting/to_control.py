@@ -102,7 +102,7 @@ def of_wired(models: Sequence[Any], inputs: Sequence[str], outputs: Sequence[str
             raise ConfigError(
                 "a model that is not linear has no state space of python-control",
                 where=str(model.mapping),
-                expected="ARX, TF, OE, ARMAX, BJ, SS",
+                expected="ARX, VectorARX, TF, OE, ARMAX, BJ, SS",
                 got=model.structure.label,
                 remedy="fit that output by a linear structure too",
             )

@@ -27,6 +27,9 @@ from sysid.models.orders.structure import AbstractStructure
 class ARX(AbstractStructure):
     """Orders of an ARX model, as in MATLAB's ``arx``.
 
+    Of several outputs it is a model an output, each of which reads its own past; where they read each other's too, in
+    one model, it is :class:`~sysid.models.VectorARX`.
+
     Args:
         na: Number of past outputs.
         nb: Number of past values of each input, or one number for all; empty, as ``nk``, for a record without input
@@ -59,7 +62,9 @@ class ARX(AbstractStructure):
                 expected=f"na from 0 on, and one nb and one nk from 0 on for each input, or one for all, whole "
                 f"numbers up to {MOST:,}",
                 got=f"na = {shortened(self.na)}, nb = {shortened(list(self.nb))}, nk = {shortened(list(self.nk))}",
-                remedy="write for example na: 2, nb: [2, 2], nk: [1, 1]",
+                remedy="of outputs that read each other's past write VectorARX, with the same orders"
+                if any(isinstance(one, list | tuple) for one in (self.na, *self.nb, *self.nk))
+                else "write for example na: 2, nb: [2, 2], nk: [1, 1]",
             )
 
     @property

@@ -157,7 +157,7 @@ def check_linear(known: Known) -> None:
             raise ConfigError(
                 "a model that is not linear has no step response, Bode diagram or poles of its own",
                 where=str(model.mapping),
-                expected="ARX, TF, OE, ARMAX, BJ, SS",
+                expected="ARX, VectorARX, TF, OE, ARMAX, BJ, SS",
                 got=model.structure.label,
                 remedy="simulate the step that is meant, from the level where it happens; or fit a linear structure",
             )

@@ -66,7 +66,7 @@ class Dimension:
     """One field with a range.
 
     Args:
-        name: The field: ``neurons``, ``nb[1]``, ``training.regularisation``.
+        name: The field: ``neurons``, ``nb[1]``, ``na[0][1]``, ``training.regularisation``.
         values: The values, in order.
         numeric: Whether neighbours in the list are neighbours in meaning.
     """
@@ -109,8 +109,7 @@ class Alternative:
         """
         fields: dict[str, Any] = {}
         for name, written in self.written.items():
-            entries = [values.get(f"{name}[{i}]", entry) for i, entry in enumerate(written)] if _many(written) else None
-            fields[name] = values.get(name, written if entries is None else entries)
+            fields[name] = _at(name, written, values)
         structure = _checked(fields, self.where).for_inputs(self.n_inputs)
         options = {name: values.get(TRAINING + name, written) for name, written in self.training.items()}
         return Point(number=number, structure=structure, training=options, values=dict(values))
@@ -198,10 +197,7 @@ def parse_space(
             declared = declared_ranges(ESTIMATORS[written["kind"]].structure)
         dimensions: list[Dimension] = []
         for name, value in written.items():
-            found = [_dimension(name, value, declared.get(name))]
-            if _many(value):
-                found += [_dimension(f"{name}[{i}]", entry, declared.get(name)) for i, entry in enumerate(value)]
-            dimensions += [dimension for dimension in found if dimension is not None]
+            dimensions += _dimensions(name, value, declared.get(name))
         alternatives.append(
             Alternative(
                 written=written,
@@ -212,6 +208,21 @@ def parse_space(
             )
         )
     return Space(alternatives=tuple(alternatives))
+
+
+def _dimensions(name: str, written: object, declared: AbstractRange | None) -> list[Dimension]:
+    """That of a field, or those of the entries of a list or of a matrix."""
+    own = _dimension(name, written, declared)
+    found = [] if own is None else [own]
+    for i, entry in enumerate(written) if _many(written) else ():
+        found += _dimensions(f"{name}[{i}]", entry, declared)
+    return found
+
+
+def _at(name: str, written: Any, values: Mapping[str, Any]) -> Any:
+    """What stands in a field at a point."""
+    entries = [_at(f"{name}[{i}]", one, values) for i, one in enumerate(written)] if _many(written) else written
+    return values.get(name, entries)
 
 
 def _dimension(name: str, written: object, declared: AbstractRange | None) -> Dimension | None:
@@ -287,4 +298,4 @@ def _several(value: object) -> str:
 
 
 def _many(value: object) -> typing.TypeGuard[list[Any]]:
-    return isinstance(value, list) and any(isinstance(entry, dict) or entry == WORD for entry in value)
+    return isinstance(value, list) and any(isinstance(one, dict) or one == WORD or _many(one) for one in value)

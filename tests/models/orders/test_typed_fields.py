@@ -38,7 +38,7 @@ GIVEN = (
     np.arange(2),
 )
 PLAIN: dict[str, dict[str, Any]] = {
-    "ARX": {"na": 1, "nb": 1, "nk": 1},
+    **{kind: {"na": 1, "nb": 1, "nk": 1} for kind in ("ARX", "VectorARX")},
     "ARMAX": {"na": 1, "nb": 1, "nc": 1, "nk": 1},
     "OE": {"nb": 1, "nf": 1, "nk": 1},
     "BJ": {"nb": 1, "nc": 1, "nd": 1, "nf": 1, "nk": 1},

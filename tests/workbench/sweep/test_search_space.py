@@ -49,6 +49,10 @@ SPACES = {
         [{"kind": "ARX", "na": 1, "nb": [{"from": 2, "to": 3}, 5], "nk": [1, {"from": 0, "to": 1}]}],
         ["ARX [1; 2 5; 1 0]", "ARX [1; 2 5; 1 1]", "ARX [1; 3 5; 1 0]", "ARX [1; 3 5; 1 1]"],
     ),
+    "orders in a matrix": (
+        [{"kind": "VectorARX", "na": [[2, {"from": 0, "to": 1}], [1, 2]], "nb": 1, "nk": {"from": 1, "to": 2}}],
+        [f"VectorARX [2 {n}, 1 2; 1; {nk}]" for n in (0, 1) for nk in (1, 2)],
+    ),
     "poles and zeros, without what is no transfer function": (
         [{"kind": "TransferFunction", "poles": {"from": 1, "to": 2}, "zeros": {"from": 1, "to": 2}, "delays": 1}],
         ["TF [1 1; 1 1; 1 1]", "TF [2 2; 1 1; 1 1]", "TF [2 2; 2 2; 1 1]"],

@@ -11,7 +11,7 @@ from scipy import linalg
 from sysid.estimation.linear.coloured_errors import colour, information, sandwich
 from sysid.estimation.linear.process.search import End
 from sysid.estimation.results.uncertainty import Uncertainty
-from sysid.models import AbstractModel, FittedProcess
+from sysid.models import FittedProcess
 from sysid.models.process.process_type import GAIN
 from sysid.models.process.structure import shown
 
@@ -143,42 +143,32 @@ def _in_units(model: FittedProcess, end: End) -> tuple[tuple[str, ...], Array, A
     return tuple(names), rows, np.array(values)
 
 
-def of_polynomials(model: AbstractModel, known: Uncertainty | None) -> Uncertainty | None:
-    """An uncertainty of polynomials, as views of a linear model read it.
+def polynomials_of(model: FittedProcess, known: Uncertainty) -> tuple[tuple[str, ...], Array, Array]:
+    """What is known of the parameters as polynomials, as their views read it.
 
     Args:
         model: The model.
         known: Of its parameters.
 
     Returns:
-        Of a process model that of numerators ``B(input, power)`` and denominators ``F(input, power)``, to first order;
-        of others it itself.
+        Names ``B(input, power)`` of numerators and ``F(input, power)`` of denominators, their values, and how they move
+        with what is known, shape ``(n_values, n_known)``.
     """
-    if known is None or not isinstance(model, FittedProcess):
-        return known
     inputs = model.mapping.inputs
     names, values, rows = [], [], []
     for kind, own, of in zip(model.process.types, model.values, inputs, strict=True):
         at = np.array(own)
         B, F = kind.polynomials(at)
-        slopes = kind.polynomial_slopes(at)
         names += [f"B({of}, {i})" for i in range(len(B))] + [f"F({of}, {i})" for i in range(len(F) - 1)]
         values += [*B, *F[:-1]]
-        for row in slopes:
+        for row in kind.polynomial_slopes(at):
             found = np.zeros(len(known.names))
             for slope, name in zip(row, kind.names, strict=True):
                 label = shown(name, of, inputs)
                 if label in known.names:
                     found[known.names.index(label)] = slope
             rows.append(found)
-    table, covariance = np.array(rows), known.covariance
-    unknown = np.isnan(np.diag(covariance))
-    found = table @ np.where(np.isnan(covariance), 0.0, covariance) @ table.T
-    open_ = (table[:, unknown] != 0.0).any(axis=1)
-    found[open_] = found[:, open_] = np.nan
-    return Uncertainty(
-        names=tuple(names), values=np.array(values), covariance=found, noise_variance=known.noise_variance
-    )
+    return tuple(names), np.array(values), np.array(rows)
 
 
 def drawn_polynomials(

@@ -10,7 +10,7 @@ from scipy import linalg
 
 from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.state_space.refinement import Found
-from sysid.estimation.results.uncertainty import Uncertainty
+from sysid.estimation.results.uncertainty import Uncertainty, generalised_variance
 from sysid.models import LinearStateSpaceModel, VectorStateSpaceModel
 from sysid.models.linear.innovations import Innovations
 from sysid.models.linear.state_space_polynomials import polynomials, state_space_names
@@ -97,8 +97,6 @@ def state_space_uncertainty(model: LinearStateSpaceModel | VectorStateSpaceModel
         names=state_space_names(orders, model.mapping),
         values=values,
         covariance=J @ _coordinates_covariance(found) @ J.T,
-        noise_variance=float(np.exp(np.linalg.slogdet(covariance + _TINY * np.eye(p))[1] / p)),
+        noise_variance=generalised_variance(covariance),
+        noise_covariance=covariance if p > 1 else None,
     )
-
-
-_TINY = 1e-300
