@@ -14,13 +14,17 @@ from sysid.kernels import register_machine as machine
 from sysid.models.channels.history import fitting_columns
 from sysid.models.channels.scaling import Scaling, VectorScaling
 from sysid.models.contract.form import AbstractForm
-from sysid.models.contract.state_descent import LARGEST
+from sysid.models.contract.state_descent import LARGEST, usable
 from sysid.models.grey_box.state_search import Derived, at_rest
 
 Array = NDArray[np.float64]
 
 INTEGRATES = 1e-7
 """Singular value of what changes from sample to sample, in states' scales, up to which there is no equilibrium."""
+
+LEAVES = 1e-6
+"""Part by which what is moved has to grow from sample to sample, or in the time of the fastest state, for an
+equilibrium to be left: chains of integrators are off theirs by roundings."""
 
 MANY_RESTS = 256
 """States at rest that are kept at most: to find one takes twenty times as long as to run a short sequence from it."""
@@ -293,6 +297,16 @@ class _Standing:
 
     def change(self, x: Array) -> Array:
         return self.programs.changing(x, self.u)[0]
+
+    def leaves(self, x: Array, free: NDArray[np.int64]) -> bool:
+        by_state, first = self.programs.changing(x, self.u)[1], self.programs.lowered.n_continuous
+        if not usable(by_state):
+            return True
+        rated, stepped = free[free < first], free[free >= first]
+        rates = np.linalg.eigvals(by_state[np.ix_(rated, rated)])
+        factors = np.linalg.eigvals(by_state[np.ix_(stepped, stepped)])
+        size = np.abs(rates).max(initial=0.0)
+        return bool((rates.real > LEAVES * size).any() or (np.abs(factors) > 1.0 + LEAVES).any())
 
     def __call__(self, x: Array) -> tuple[Derived, Derived]:
         return self.programs.standing(x, self.u, self.p)

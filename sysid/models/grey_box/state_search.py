@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -50,6 +51,18 @@ class Standing(Protocol):
         """
         ...
 
+    def leaves(self, x: Array, free: NDArray[np.int64]) -> bool:
+        """Whether a system that stands leaves a state as soon as it is moved a little.
+
+        Args:
+            x: The state, shape ``(n_states,)``.
+            free: Places of the states that are not held.
+
+        Returns:
+            Whether it does.
+        """
+        ...
+
     def __call__(self, x: Array) -> tuple[Derived, Derived]:
         """What changes at a state, and the outputs there, with derivatives.
 
@@ -64,6 +77,8 @@ class Standing(Protocol):
 
 def at_rest(standing: Standing, output: Array, output_scale: Array, terms: Bounded) -> tuple[Array, Array]:
     """The state at which nothing changes; where that leaves directions open, the one with these outputs.
+
+    Of several the first is taken that a system returns to: none has stood for ever where the slightest move leads away.
 
     Args:
         standing: What changes at a state, and the outputs there.
@@ -84,13 +99,7 @@ def at_rest(standing: Standing, output: Array, output_scale: Array, terms: Bound
         moved = level.copy()
         moved[free] += step * scale
         begins.append(terms.held(moved))
-    least, x = _stood(standing, level, (free, scale), (output, output_scale), terms)
-    for begin in begins[1:]:
-        if least <= STOOD:
-            break
-        left, end = _stood(standing, begin, (free, scale), (output, output_scale), terms)
-        if left < least:
-            least, x = left, end
+    x = _found(standing, begins, (free, scale), (output, output_scale), terms)
     (change, by_state, by_parameter), (_, out_state, out_parameter) = standing(x)
     J, open_ = _split(by_state[:, free] * scale, change)
     move = -np.linalg.pinv(J, rcond=RANK) @ by_parameter
@@ -101,6 +110,25 @@ def at_rest(standing: Standing, output: Array, output_scale: Array, terms: Bound
     moves = np.zeros((len(x), by_parameter.shape[1]))
     moves[free] = np.where(np.isfinite(move), move, 0.0) * scale[:, None]
     return x, moves
+
+
+def _found(
+    standing: Standing,
+    begins: Sequence[Array],
+    free: tuple[NDArray[np.int64], Array],
+    outputs: tuple[Array, Array],
+    terms: Bounded,
+) -> Array:
+    """Where the searches from some states end: where it stands and stays, or stands, or changes least."""
+    best, x = (2, np.inf), begins[0]
+    for begin in begins:
+        left, end = _stood(standing, begin, free, outputs, terms)
+        rank = (2, left) if left > STOOD else (int(standing.leaves(end, free[0])), 0.0)
+        if rank < best:
+            best, x = rank, end
+        if rank[0] == 0:
+            break
+    return x
 
 
 def _stood(

@@ -40,6 +40,23 @@ def test_a_system_at_rest_stands_still(equations: str, u: float, y: float, state
     assert run == pytest.approx(np.full(20, run[0]), abs=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("equations", "state"),
+    [
+        ("dx/dt = (x - 0.6)*(5 - x)*u; y = x", 5.0),
+        ("x[k+1] = x + 0.1*(x - 0.6)*(5 - x)*u; y = x", 5.0),
+        ("y = y[k-1] + 0.1*(y[k-1] - 0.6)*(5 - y[k-1])*u[k-1]", 5.0),
+        ("dx/dt = x - u; y = x", 1.0),
+        ("x[k+1] = 1.5*x - 0.5*u; y = x", 1.0),
+    ],
+    ids=["continuous", "discrete", "its own past", "which it leaves, if there is no other", "the same, discrete"],
+)
+def test_of_several_equilibria_a_system_has_stood_where_it_returns_to(equations: str, state: float) -> None:
+    """A polynomial NARX model began at the other root of its square, and its run left all bounds."""
+    found = a_model(equations).recursion.state(History.at_rest(inputs=[1.0], output=0.0))
+    assert found == pytest.approx(np.full(len(found), state), abs=1e-9)
+
+
 def test_a_state_at_rest_is_looked_for_once_and_no_run_moves_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thousand sequences that begin at one plateau each looked for it: twenty times as long as to run them."""
     model, searches = a_model("dx/dt = u - sqrt(x); y = x"), list[float]()
