@@ -32,6 +32,7 @@ from sysid.estimation.networks.starts.output_weights import reweighted
 from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
 from sysid.estimation.networks.starts.united import elects, ends_of
+from sysid.estimation.networks.starts.united import told as of_ensemble
 from sysid.estimation.networks.template import held_told, layout_of, template_of
 from sysid.estimation.networks.training import FitProgress, Training, check_members
 from sysid.estimation.networks.warm_start import check_initial, grown
@@ -145,7 +146,7 @@ def fit_narx(
     fit = with_note(multistart_result(choice, list(tasks), training, status, seconds, left=left), windows)
     held = held_told(template)
     twice = cautious.told(choice, list(tasks), tasks[chosen].provider.n_samples)
-    made = () if whole is None else whole[0].notes(choice)
+    made = of_ensemble(training, None if whole is None else whole[0], choice)
     return replace(fit, posterior=posterior, notes=(*fit.notes, *twice, *made, *held))
 
 

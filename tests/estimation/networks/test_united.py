@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 from sysid.estimation.networks.starts.multistart import Place
@@ -18,7 +19,9 @@ from sysid.estimation.networks.starts.united import (
     keep_up,
     stable_of,
     stand_together,
+    told,
 )
+from sysid.estimation.networks.training import Training
 from sysid.estimation.results.result import Status
 
 
@@ -78,6 +81,12 @@ def test_who_is_far_behind_keeps_up_where_the_closer_one_has_too_many_parameters
     ]
     assert keep_up([least, *others], 100) == [True, True, False, True]
     assert keep_up([], 100) == []
+
+
+@pytest.mark.parametrize("members", [1, 4])
+def test_an_ensemble_that_was_asked_for_and_not_made_is_told(members: int) -> None:
+    said = told(Training(starts=8, ensemble=members), None, SimpleNamespace())
+    assert [one.partition(":")[0] for one in said] == ["No ensemble was made"] * (members > 1)
 
 
 def test_distances_are_from_the_median_of_what_is_finite():

@@ -29,6 +29,7 @@ from sysid.estimation.networks.starts.choosing import Choice, choose
 from sysid.estimation.networks.starts.output_weights import reweighted, weighed
 from sysid.estimation.networks.starts.race import run_race
 from sysid.estimation.networks.starts.result import left_on, multistart_result, multistart_status
+from sysid.estimation.networks.starts.united import told as of_ensemble
 from sysid.estimation.networks.training import FitProgress, Training, check_hidden_states, check_members
 from sysid.estimation.networks.windows import Windows, in_place, with_note
 from sysid.estimation.records.experiment import Experiment, experiments_of, unit_range, unit_ranges
@@ -223,8 +224,8 @@ def _fit(
     posterior = _posterior(choice.chosen, provider, records, whole)
     seconds = multistart.checkpoints.earlier_s + now() - began
     found = with_note(multistart_result(choice, candidates, training, status, seconds, left=left), windows)
-    notes = (*told, *(() if whole is None else whole.notes(choice)))
-    return replace(found, posterior=posterior, notes=(*found.notes, *notes))
+    notes = (*found.notes, *told, *of_ensemble(training, whole, choice))
+    return replace(found, posterior=posterior, notes=notes)
 
 
 def _multistart(

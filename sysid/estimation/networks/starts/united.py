@@ -203,6 +203,25 @@ class AbstractUnited(ABC):
         return (f"An ensemble: {self.made}.{left}",)
 
 
+def told(training: Training, whole: AbstractUnited | None, choice: Choice) -> tuple[str, ...]:
+    """What is said of an ensemble that was asked for, also where there is none.
+
+    Args:
+        training: How starts were trained.
+        whole: The ensemble, where one was made.
+        choice: What was chosen in the end.
+
+    Returns:
+        Sentences.
+    """
+    if whole is not None:
+        return whole.notes(choice)
+    none = (
+        "No ensemble was made: of its starts one alone does as well as any mean of several, or fewer than two are left."
+    )
+    return (none,) * (training.ensemble > 1)
+
+
 def _left_out(why: str, numbers: Sequence[int]) -> str:
     """Who was left out, as a sentence; nothing where nobody was."""
     return f" Left out, as {why}: start {', '.join(str(number + 1) for number in numbers)}." if numbers else ""
