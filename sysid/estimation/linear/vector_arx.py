@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,15 @@ from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import rests_of
 from sysid.estimation.linear.regression import Solution, all_read, blocks_of, solve
 from sysid.estimation.nonparametric.evidence import triangle
-from sysid.estimation.records.experiment import experiments_of
+from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.estimation.results.uncertainty import Uncertainty, generalised_variance
 from sysid.models import Mapping, Start, VectorARX, VectorARXModel
 from sysid.traces import Trace
 
 Array = NDArray[np.float64]
+ROUNDS, INSIDE = 3, 0.999
+"""Rounds of instruments, and the largest pole of the model that makes them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,12 +100,12 @@ def fit_vector_arx(
     orders = orders.sized(m, len(mapping.outputs))
     rests = rests_of(traces, mapping, rest_output)
     solved = _solved(traces, mapping, orders, start or Start(), np.array(rests))
-    n = np.bincount([i for i, *_ in orders.terms], minlength=len(mapping.outputs))
-    own = [one.coefficients[:, 0] for one in solved.solutions]
+    n = _counts(orders)
+    coefficients, intercepts = _parts([one.coefficients[:, 0] for one in solved.solutions], n)
     model = VectorARXModel(
         orders=orders,
-        coefficients=np.concatenate([values[:k] for values, k in zip(own, n, strict=True)]),
-        intercepts=np.array([values[k:].sum() for values, k in zip(own, n, strict=True)]),
+        coefficients=coefficients,
+        intercepts=intercepts,
         mapping=mapping,
         sample_time=traces[0].sample_time,
         input_units=tuple(traces[0].channel(name).unit for name in mapping.inputs),
@@ -122,6 +124,25 @@ def fit_vector_arx(
     )
 
 
+def _counts(orders: VectorARX) -> NDArray[np.int64]:
+    """Coefficients of each output."""
+    return np.bincount([i for i, *_ in orders.terms], minlength=len(orders.na))
+
+
+def _parts(own: Sequence[Array], n: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Parameters output by output as a model has them: the coefficients of all, and the constant of each, or 0."""
+    pairs = [*zip(own, n, strict=True)]
+    return np.concatenate([values[:k] for values, k in pairs]), np.array([values[k:].sum() for values, k in pairs])
+
+
+def _columns(orders: VectorARX) -> list[list[int]]:
+    """Of each output where its regressors stand among those of all, the constant behind them."""
+    lags = orders.lags
+    places = {pair: at for at, pair in enumerate((c, lag) for c, read in enumerate(lags.inputs) for lag in read)}
+    constant = [len(places)] * orders.intercept
+    return [[places[c, lag] for row, c, lag in orders.terms if row == i] + constant for i in range(len(orders.na))]
+
+
 def _solved(traces: Sequence[Trace], mapping: Mapping, orders: VectorARX, start: Start, rests: Array) -> _Solved:
     lags = orders.lags
     records = [all_read(one).one_step(lags) for one in experiments_of(traces, mapping, start, rests)]
@@ -129,10 +150,8 @@ def _solved(traces: Sequence[Trace], mapping: Mapping, orders: VectorARX, start:
     blocks = (np.column_stack([X, root, y]) for root, X, y in blocks_of(records, lags))
     reduced = triangle(blocks, free=0)
     table = np.column_stack([reduced.R, reduced.z])
-    columns = {pair: at for at, pair in enumerate((c, lag) for c, read in enumerate(lags.inputs) for lag in read)}
     solutions, residuals = [], []
-    for i in range(len(mapping.outputs)):
-        at = [columns[channel, lag] for row, channel, lag in orders.terms if row == i] + [width] * orders.intercept
+    for i, at in enumerate(_columns(orders)):
         target = table[:, width + 1 + i]
         both = np.column_stack([target, np.eye(len(table))])
         solutions.append(solve(table[:, at], both, constant=orders.intercept, samples=samples))
@@ -144,6 +163,53 @@ def _solved(traces: Sequence[Trace], mapping: Mapping, orders: VectorARX, start:
     return _Solved(
         solutions=tuple(solutions), residuals=np.column_stack(residuals), spread=spread, samples=samples
     )  # fmt: skip
+
+
+def by_instruments(traces: Sequence[Trace], model: VectorARXModel, start: Start) -> VectorARXModel:
+    """The same orders by instruments, outputs of a free run, which noise on the outputs does not bend.
+
+    Ljung 1999, section 7.6; of the four steps of :func:`~sysid.estimation.linear.instrumental.fit_iv4` the first two,
+    the second of them twice: consistent, and not the most exact.
+
+    Args:
+        traces: Estimation traces.
+        model: The estimate by least squares.
+        start: What stands before each trace.
+
+    Returns:
+        The model.
+
+    Raises:
+        TraceError: If no row counts.
+    """
+    orders, n = model.orders, _counts(model.orders)
+    records = experiments_of(traces, model.mapping, start, np.array(model.rest_outputs))
+    for _ in range(ROUNDS):
+        quiet = _stabilised(model)
+        runs = [replace(one, output=quiet.simulate(one.inputs, one.history)) for one in records]
+        (X, y), (Z, _) = (_table(some, orders) for some in (records, runs))
+        own = []
+        for i, at in enumerate(_columns(orders)):
+            instruments = Z[:, at] / np.maximum(np.linalg.norm(Z[:, at], axis=0), np.finfo(np.float64).tiny)
+            Q = np.linalg.qr(instruments)[0]
+            own.append(solve(Q.T @ X[:, at], Q.T @ y[:, i], samples=len(X)).coefficients)
+        coefficients, intercepts = _parts(own, n)
+        model = replace(model, coefficients=coefficients, intercepts=intercepts)
+    return model
+
+
+def _table(records: Sequence[Experiment], orders: VectorARX) -> tuple[Array, Array]:
+    """Regressors of all outputs with the constant behind them, and the targets, of the rows that count."""
+    blocks = [*blocks_of([all_read(one).one_step(orders.lags) for one in records], orders.lags)]
+    table = np.concatenate([np.column_stack([X, root]) for root, X, _ in blocks])
+    return table, np.concatenate([y for *_, y in blocks])
+
+
+def _stabilised(model: VectorARXModel) -> VectorARXModel:
+    """The same model with all poles drawn in, so that the largest lies inside the unit circle."""
+    part, m = INSIDE / max(model.pole_radius, INSIDE), len(model.mapping.inputs)
+    drawn = [part**lag if c >= m else 1.0 for _, c, lag in model.orders.terms]
+    return replace(model, coefficients=model.coefficients * drawn)
 
 
 def _uncertainty(solved: _Solved, model: VectorARXModel, n: NDArray[np.int64]) -> Uncertainty:

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.errors import UserError
 from sysid.estimation.linear.instrumental import fit_iv4
+from sysid.estimation.linear.vector_arx import by_instruments, fit_vector_arx
 from sysid.estimation.remarks.fitted_run import MOST_SAMPLES, FreeRun
-from sysid.models import ARX, AbstractModel, ARXModel, Start
+from sysid.models import ARX, AbstractModel, ARXModel, Start, VectorARX, VectorARXModel
 from sysid.traces import Trace
 
 WORTH, LESS = 0.1, 0.7
@@ -55,18 +58,18 @@ def bent_by_noise(
     Returns:
         The better estimate, of whose error causes are to be asked; ``None`` where there is none.
     """
-    if not isinstance(model, ARXModel) or not model.mapping.inputs:
+    if not isinstance(model, ARXModel | VectorARXModel) or not model.mapping.inputs:
         return None
-    y = np.concatenate([run.output[run.usable, 0] for run in runs])
-    spread, own = float(np.std(y)), _error(runs)
-    if len(y) < LEAST_SAMPLES or not np.sqrt(own) > WORTH * spread:
+    y = np.concatenate([run.output[run.usable] for run in runs])
+    own = _error(runs)
+    if len(y) < LEAST_SAMPLES or not np.sqrt(own) > WORTH:
         return None
     seen = [trace[: run.first + MOST_SAMPLES] for trace, run in zip(traces, runs, strict=True)]
     tried = [one for orders in _smaller(model.orders) if (one := _by_instruments(model, orders, seen, start))]
     other, free = min(tried, key=lambda one: _error(one[1]), default=(model, tuple(runs)))
     if not _error(free) < LESS * own:
         return None
-    fits = [f"{100.0 * (1.0 - np.sqrt(_error(some)) / spread):.0f} %" for some in (runs, free)]
+    fits = [" and ".join(f"{100.0 * (1.0 - np.sqrt(each)):.0f} %" for each in _errors(some)) for some in (runs, free)]
     return Unbent(
         told="Least squares one step ahead has bent this model: over the records that were fitted its free run has a "
         f"fit of {fits[0]}, and that of {other.label} by instruments, which noise does not bend, {fits[1]}. It takes "
@@ -77,23 +80,47 @@ def bent_by_noise(
     )
 
 
-def _smaller(orders: ARX) -> list[ARX]:
+def _smaller(orders: ARX | VectorARX) -> list[ARX | VectorARX]:
     """The orders, and those with some poles less, and as many coefficients of each input at most."""
+    if isinstance(orders, VectorARX):
+        most = max(max(row) for row in orders.na)
+        return [_fewer(orders, most - k) if k else orders for k in range(MOST_FEWER + 1) if most - k > 0]
     fewer = [orders.na - k for k in range(MOST_FEWER + 1) if orders.na - k > 0]
     return [replace(orders, na=na, nb=tuple(min(nb, na) if na < orders.na else nb for nb in orders.nb)) for na in fewer]
 
 
+def _fewer(orders: VectorARX, most: int) -> VectorARX:
+    na, nb = (tuple(tuple(min(n, most) for n in row) for row in rows) for rows in (orders.na, orders.nb))
+    return replace(orders, na=na, nb=nb)
+
+
 def _by_instruments(
-    model: ARXModel, orders: ARX, traces: Sequence[Trace], start: Start
+    model: ARXModel | VectorARXModel, orders: ARX | VectorARX, traces: Sequence[Trace], start: Start
 ) -> tuple[AbstractModel, tuple[FreeRun, ...]] | None:
     """The estimate by instruments, and its free runs; ``None`` where there is none, or it is lost."""
     try:
-        found = fit_iv4(traces, model.mapping, orders, start=start, rest_output=model.rest_output).model
+        found = _estimate(model, orders, traces, start)
         runs = tuple(FreeRun.of(found, trace, start) for trace in traces)
     except (UserError, np.linalg.LinAlgError):
         return None
     return (found, runs) if np.isfinite(_error(runs)) else None
 
 
+def _estimate(
+    model: ARXModel | VectorARXModel, orders: ARX | VectorARX, traces: Sequence[Trace], start: Start
+) -> AbstractModel:
+    if isinstance(orders, VectorARX):
+        rests = dict(zip(model.mapping.outputs, model.ends.rest_outputs, strict=True))
+        begun = fit_vector_arx(traces, model.mapping, orders, start=start, rest_output=rests).model
+        return by_instruments(traces, cast("VectorARXModel", begun), start)
+    return fit_iv4(traces, model.mapping, orders, start=start, rest_output=model.rest_output).model
+
+
+def _errors(runs: Sequence[FreeRun]) -> NDArray[np.float64]:
+    """Mean squared error of each output, over its variance."""
+    y, simulated = (np.concatenate([getattr(r, name)[r.usable] for r in runs]) for name in ("output", "simulated"))
+    return np.asarray(np.mean((y - simulated) ** 2, axis=0) / np.maximum(np.var(y, axis=0), np.finfo(np.float64).tiny))
+
+
 def _error(runs: Sequence[FreeRun]) -> float:
-    return float(np.mean(np.concatenate([(run.output - run.simulated)[run.usable, 0] for run in runs]) ** 2))
+    return float(np.mean(_errors(runs)))

@@ -16,6 +16,7 @@ from sysid.models import (
     NeuralStateSpace,
     PolynomialNARX,
     TransferFunction,
+    VectorARX,
     VectorGreyBox,
     VectorNARX,
     WienerHammerstein,
@@ -99,6 +100,16 @@ class Family:
 
 def _arx(looked: Looked) -> list[Try]:
     return [Try(structure=one) for one in looked.orders]
+
+
+def _vector_arx(looked: Looked) -> list[Try]:
+    """Of several outputs the orders of one, each reading the past of all, and their share where all have the states."""
+    n, found = looked.n_outputs, []
+    for one in looked.orders if n > 1 else ():
+        for k in (n, 1):
+            nb = tuple(-(-count // k) for count in one.nb)
+            found.append(VectorARX(na=((-(-one.na // k),),), nb=(nb,), nk=(one.nk,)))
+    return [Try(structure=one) for one in dict.fromkeys(found)]
 
 
 def _shortest_arx(looked: Looked) -> list[Try]:
@@ -331,6 +342,7 @@ def suggested(looked: Looked, *, linear: bool) -> list[Try]:
 
 FAMILIES = (
     Family(kind=ARX.kind, linear=True, first=_arx, in_motion=_shortest_arx),
+    Family(kind=VectorARX.kind, linear=True, first=_vector_arx),
     Family(kind=TransferFunction.kind, linear=True, first=_transfer_functions),
     Family(kind=LinearStateSpace.kind, linear=True, first=_state_spaces, larger=_larger_state_spaces),
     Family(

@@ -32,3 +32,24 @@ def test_noise_that_has_the_plants_poles_bends_nothing() -> None:
     traces = sysid.data((u, y + 0.3 * y.std() / v.std() * v), sample_time=1.0)
     told = sysid.fit(traces, "u -> y", sysid.ARX(na=2, nb=2, nk=1)).warnings
     assert not [one for one in told if "bent" in one]
+
+
+def coupled(seed: int, *, sensor: float, inside: float) -> tuple[np.ndarray, np.ndarray]:
+    """Two oscillators that drive each other, with noise of their sensors or in their equations."""
+    rng = np.random.default_rng(seed)
+    u, y = np.repeat(rng.choice([-1.0, 1.0], size=(N // 5, 2)), 5, axis=0), np.zeros((N, 2))
+    for t in range(2, N):
+        y[t] = [1.8, 1.7] * y[t - 1] - 0.93 * y[t - 2] + [0.05, -0.05] * y[t - 1, ::-1] + 0.1 * u[t - 1]
+        y[t] += inside * rng.standard_normal(2)
+    return u, y + sensor * y.std(axis=0) * rng.standard_normal((N, 2))
+
+
+@pytest.mark.parametrize(("sensor", "inside", "bent"), [(0.1, 0.0, True), (0.0, 0.1, False)])
+@pytest.mark.parametrize("order", [2, 4])
+def test_of_several_outputs_noise_of_their_sensors_is_told(
+    order: int, sensor: float, inside: float, bent: bool
+) -> None:
+    """A free run of 27 % where one of 86 % was there to be found went without a word."""
+    traces = sysid.data(coupled(1, sensor=sensor, inside=inside), sample_time=1.0)
+    told = sysid.fit(traces, "u1+u2 -> y1+y2", sysid.VectorARX(na=order, nb=1, nk=1), start="estimated").warnings
+    assert sum(one.startswith("Least squares one step ahead has bent this model") for one in told) == bent

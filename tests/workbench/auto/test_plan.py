@@ -234,6 +234,14 @@ def test_where_some_of_several_outputs_end_one_network_has_all_of_them() -> None
         assert kinds == ({"NARX", "VectorNARX"} if all_end else {"VectorNARX"})
 
 
+def test_of_several_outputs_an_arx_model_of_all_is_tried_beside_one_an_output() -> None:
+    for outputs in (1, 2):
+        _, rounds = searched(lambda _: 1.0, looked=replace(LOOKED, n_outputs=outputs))
+        tried = [point.structure.label for points in rounds for point in points]
+        assert tried[:2] == ["ARX [2; 2; 1]", "VectorARX [1; 1; 1]" if outputs > 1 else "TF [1; 0; 1]"]
+        assert ("VectorARX [2; 2; 1]" in tried) is (outputs > 1)
+
+
 def test_of_two_outputs_in_motion_what_has_a_state_for_each_comes_first() -> None:
     """A short search tries one or two: an oscillator of two outputs had one state, and an error of a third."""
     for outputs, first in ((1, "NSS 1/4"), (2, "NSS 2/8"), (3, "NSS 3/8")):
