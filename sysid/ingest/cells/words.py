@@ -123,9 +123,14 @@ class Words:
         )
 
     def _are_stamps(self) -> bool:
-        """Whether texts are dates or times in some form: of few words each has digits, of many also marks between."""
+        """Whether texts are dates or times in some form: of few words each has digits, of many also marks between.
+
+        What is the same in every row, or numbers that begin with a letter, are those of a station or a device.
+        """
         digits = all(sum(map(str.isdigit, text)) >= _DIGITS_OF_STAMPS for text in self.texts)
-        return digits and (self.complete or all(map(_STAMP.search, self.texts)))
+        stamps = [bool(_STAMP.search(text)) for text in self.texts]
+        few = self.complete and len(self.texts) > 1
+        return digits and (all(stamps) or (few and all(text[:1].isdigit() for text in self.texts)))
 
 
 NOTHING = {"shut", "closed", *(word for pair in (TRUTH, *PAIRS) for word, number in pair.items() if not number)}

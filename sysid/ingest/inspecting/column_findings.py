@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 from sysid.ingest.cells.blanks import blanks_mean
 from sysid.ingest.cells.headers import is_unit, split_reference, unit_in_name
+from sysid.ingest.cells.words import UNKNOWN_DATES
 from sysid.ingest.inspecting.findings import ColumnFinding, counted
 from sysid.ingest.inspecting.time_findings import finite_of
 from sysid.ingest.tables.columns import RawColumn
@@ -60,7 +61,8 @@ def column_finding(column: RawColumn) -> ColumnFinding:
 def _told(column: RawColumn, problem: ReaderError) -> str:
     """Why a column cannot be used; words that might be states are quoted."""
     words = column.words
-    if words is None or not words.complete or not 1 < len(words.texts) <= _FEW_STATES:
+    few = words is not None and words.complete and 1 < len(words.texts) <= _FEW_STATES
+    if words is None or not few or problem.what == UNKNOWN_DATES:
         return problem.what
     quoted = ", ".join(f"{text[:20]!r}" for text in words.texts)
     return f"{problem.what} ({quoted}): source.files.states says which number each is"

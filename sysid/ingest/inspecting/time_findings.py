@@ -134,6 +134,16 @@ def _rising(columns: Sequence[RawColumn]) -> str | None:
     return None
 
 
+def _is_plain(rising: NDArray[np.float64], clean: Timing) -> bool:
+    """Whether the usual step is the clock's, though others are common: gaps, or events between even stamps."""
+    step = clean.median_step
+    if float(np.mean(np.abs(np.diff(rising) - step) <= 1e-6 * step)) < _MOSTLY_ALIKE:
+        return False
+    even = rising[0] + step * np.arange(min(int((rising[-1] - rising[0]) / step + 1e-6) + 1, 2 * len(rising)))
+    nearest = np.searchsorted(rising, even - 1e-3 * step).clip(max=len(rising) - 1)
+    return bool(len(clean.gaps)) or float(np.mean(np.abs(rising[nearest] - even) <= 2e-3 * step)) >= _EVEN_SHARE
+
+
 def needs_of_time(known: NDArray[np.float64], timing: Timing) -> tuple[float, dict[str, object], float | None]:
     """Sample time, the repairs of time that the stamps need, and how far they are rounded where only that is uneven."""
     known = known if timing.in_order else np.sort(known)
@@ -145,10 +155,9 @@ def needs_of_time(known: NDArray[np.float64], timing: Timing) -> tuple[float, di
     even = even_step(rising, surveyed, tolerance=GridOptions().tolerance)
     rounded = rounded_step(rising, surveyed) if even is None else None
     usual = float(np.mean(np.abs(np.diff(rising) - clean.median_step) <= 0.01 * clean.median_step))
-    # A stamp or two that are wrong say nothing of the others' distance, nor do gaps where most steps are the same.
-    alike = float(np.mean(np.abs(np.diff(rising) - clean.median_step) <= 1e-6 * clean.median_step))
-    alike = alike if len(clean.gaps) else 0.0
-    uneven = round_step(clean.median_step if usual >= _EVEN_SHARE or alike >= _MOSTLY_ALIKE else clean.step)
+    # A stamp or two that are wrong say nothing of the others' distance.
+    by_most = usual >= _EVEN_SHARE or _is_plain(rising, clean)
+    uneven = round_step(clean.median_step if by_most else clean.step)
     step, tolerance = (even or uneven, None) if rounded is None else rounded
     needs: dict[str, object] = {
         "backward": "sort" if len(timing.backward) else None,

@@ -7,11 +7,12 @@ the columns beside and below them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
@@ -23,7 +24,7 @@ from sysid.ingest.tables.columns import array_column, distinct
 from sysid.ingest.tables.options import FileOptions
 from sysid.ingest.tables.rates import said_step
 from sysid.ingest.tables.table import RawTable, by_length
-from sysid.ingest.tables.time_columns import recognise_time
+from sysid.ingest.tables.time_columns import is_called_time, recognise_time
 
 _DEEPEST = 40
 _NAMES = {"names", "channels", "columns", "labels", "signals", "variables", "fields", "header", "headers", "colheaders"}
@@ -201,11 +202,9 @@ class _Walk:
         leaves = {str(key): leaf for key, value in node.items() if (leaf := leaf_of(value)) is not None}
         cells = {str(key): parts for key, value in node.items() if (parts := _cell(value)) is not None}
         elements = [leaf for cell in cells.values() for _, leaf in cell]
-        numbers = (
-            leaf for leaf in (*leaves.values(), *elements) if leaf.vector and leaf.values.dtype.kind not in "USO"
-        )
-        lengths = {len(leaf.values) for leaf in numbers}
+        lengths = _lengths((*leaves.items(), *(("", leaf) for leaf in elements)))
         names = _names_beside(node)
+        leaves |= _texts_of_samples(node, lengths, leaves)
         leaves = {key: replace(leaf, names=leaf.names or names) for key, leaf in leaves.items()}
         for key, value in node.items():
             name = str(key)
@@ -225,7 +224,7 @@ class _Walk:
         path: tuple[str, ...],
         step: float | None,
         *,
-        lengths: set[int],
+        lengths: Mapping[int, bool],
         units: Mapping[str, str],
         whole: bool,
         index: int | None = None,
@@ -250,12 +249,14 @@ class _Walk:
             column = replace(column, problem=column.problem or leaf.problem, aside=leaf.aside)
             yield Found(path=path, stem=stem, cell=index, column=column, step=leaf.step or step, whole=whole)
 
-    def _standing(self, name: str, array: NDArray[Any], lengths: set[int]) -> NDArray[Any]:
+    def _standing(self, name: str, array: NDArray[Any], lengths: Mapping[int, bool]) -> NDArray[Any]:
         """A matrix with its channels in columns."""
         rows, columns = array.shape
         wide = self.transpose
         if wide is None:
             beside = [rows in lengths, columns in lengths]
+            if all(beside):  # a matrix over time and place
+                beside = [lengths[rows], lengths[columns]]
             # What stands beside it says which side is time; else the longer one is.
             wide = beside[1] if beside[0] != beside[1] else 1 < rows < columns
             if wide:
@@ -268,6 +269,29 @@ class _Walk:
         """The column under the full name of its place."""
         prefix = "".join(f"{part}{self.separator}" for part in found.path)
         return replace(found, column=replace(found.column, name=f"{prefix}{found.column.name}"))
+
+
+def _lengths(leaves: Iterable[tuple[str, Leaf]]) -> dict[int, bool]:
+    """How long vectors of numbers are, and whether one of each length is called time."""
+    found = dict[int, bool]()
+    for name, leaf in leaves:
+        if leaf.vector and leaf.values.dtype.kind not in "USO":
+            found[len(leaf.values)] = found.get(len(leaf.values), False) or is_called_time(name)
+    return found
+
+
+def _texts_of_samples(
+    node: Mapping[str, Any], lengths: Mapping[int, bool], leaves: Mapping[str, Leaf]
+) -> dict[str, Leaf]:
+    """Lists of as many texts as there are samples: dates, or words for states, as MATLAB saves both."""
+    long = {max(leaf.values.shape) for leaf in leaves.values() if not leaf.vector and leaf.values.dtype.kind in "buif"}
+    found = dict[str, Leaf]()
+    for key, value in node.items():
+        if not isinstance(value, list) or len(value) not in {*lengths, *long} or str(key).casefold().strip() in _NAMES:
+            continue
+        if all(isinstance(text, str) for text in value):
+            found[str(key)] = Leaf(values=np.array(value))
+    return found
 
 
 def _cell(value: Any) -> list[tuple[int, Leaf]] | None:

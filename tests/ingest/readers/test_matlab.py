@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ReaderError
-from sysid.ingest import read_table
+from sysid.ingest import inspect_file, read_table
 from tests.ingest.readers.zoo_binary import U, Y, cells, iddata, mat, modelica
 from tests.ingest.recordings import PIPE, TIME, VOLT, mark_as_mat73
 
@@ -237,3 +237,19 @@ def test_a_clock_of_another_length_than_all_signals_is_not_theirs(tmp_path: Path
     table = read_table(tmp_path / "workspace.mat")
     assert {"T", "U", "Y"} <= set(table.names)
     assert [column.name for column in table.others] == ["tout"]
+
+
+def test_dates_and_states_in_texts_of_as_many_rows_are_columns(tmp_path: Path) -> None:
+    stamps = [f"2024-03-12 08:15:{k // 10:02d}.{k % 10}" for k in range(len(U))]
+    words = cells(*("on" if u > 2 else "off" for u in U))
+    mat("5", t=np.array(stamps), valve=words, u=U, y=Y, names=cells("one", "two"))(tmp_path / "a.mat")
+    found = inspect_file(tmp_path / "a.mat")
+    assert found.sample_time == pytest.approx(0.1)
+    assert [column.name for column in found.channels] == ["valve", "u", "y"]
+
+
+def test_a_matrix_over_time_and_place_is_turned_by_what_is_called_time(tmp_path: Path) -> None:
+    place = np.linspace(0.0, 1.0, 30)
+    mat("5", t=TIME[:20], x=place, field=np.outer(np.sin(place), 1.0 + TIME[:20]))(tmp_path / "a.mat")
+    found = inspect_file(tmp_path / "a.mat")
+    assert (found.time.column, found.samples, len(found.channels)) == ("t", 20, 30)

@@ -194,3 +194,19 @@ def test_the_least_of_something_is_in_no_minutes(tmp_path: Path) -> None:
 def test_a_channel_that_never_changes_and_is_called_as_a_clock_warns_of_nothing(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("Time,T1,y\n" + "".join(f"{k},21.55,{y}\n" for k, y in enumerate(Y)))
     assert [c.name for c in inspect_file(tmp_path / "a.csv").channels] == ["T1", "y"]
+
+
+def test_events_between_even_stamps_leave_the_step_as_it_is(tmp_path: Path) -> None:
+    times = np.sort(np.concatenate([600.0 * np.arange(N), 600.0 * np.arange(0, N, 5) + 123.0, [7223.0]]))
+    (tmp_path / "a.csv").write_text("time [s],y\n" + "".join(f"{t},{t % 7}\n" for t in times))
+    assert inspect_file(tmp_path / "a.csv").sample_time == 600.0
+    months = [datetime(1913 + m // 12, m % 12 + 1, 1) for m in range(N)]
+    (tmp_path / "a.csv").write_text("time,y\n" + "".join(f"{d},{k % 7}\n" for k, d in enumerate(months)))
+    assert inspect_file(tmp_path / "a.csv").sample_time == pytest.approx(30.44 * 86_400, rel=2e-3)
+
+
+@pytest.mark.parametrize("station", ["B32C0609", "USGS01022500"])
+def test_the_number_of_a_station_is_no_date(tmp_path: Path, station: str) -> None:
+    (tmp_path / "a.csv").write_text("station,y\n" + "".join(f"{station},{y}\n" for y in Y))
+    (problem,) = (column.problem for column in inspect_file(tmp_path / "a.csv").columns if column.name == "station")
+    assert problem == "the column holds words"
