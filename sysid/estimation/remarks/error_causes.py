@@ -1,8 +1,9 @@
 """What the error of a free run is made of, where it is more than noise need be: told by its cause, for every structure.
 
-A fit that ended in a minimum may be far from its record and say nothing. Five causes leave marks in the error itself:
+A fit that ended in a minimum may be far from its record and say nothing. Six causes leave marks in the error itself:
 lone samples that jump away and back, an output that stands at an end while the model goes on, something of the inputs
-that the model leaves out, nothing of the inputs at all, and an error that lasts as long as the record.
+that the model leaves out, nothing of the inputs at all, a run that follows how its record begins and no input, and an
+error that lasts as long as the record.
 """
 
 from __future__ import annotations
@@ -46,6 +47,9 @@ at all; and how improbable by chance it must be that they do."""
 LEAST_INDEPENDENT, OWN, SMALL, LARGE = 30.0, 0.8, 0.2, 0.3
 """Independent samples that an error counts for, below which its fit says little of another record; the part of an error
 in its sample before from which it is told in any case; and its part of the output for either."""
+BEGUN, ADDED = 0.3, 0.1
+"""Part of an output that a run with held inputs must follow to be said to follow its beginning, and the least part of
+what that leaves that its inputs must add."""
 STRAIGHT, STEEP = 0.4, 0.5
 """What a line in time must leave of an output's squares beside its inputs, and how far it must go, in deviations."""
 OWN_PAST = 5
@@ -102,6 +106,9 @@ def _of_output(
             name=name, inputs=inputs
         )
         found = found or _of_inputs(groups, y - s, sound).format(name=name, inputs=inputs)
+        if not found:
+            held = run.held(model)[:, model.mapping.outputs.index(name)]
+            found = _of_beginning((y, s), held, sound).format(name=name, inputs=inputs)
         if found:
             return [*told, found]
     return [*told, *_lasting(y - s, sound, name)]
@@ -288,6 +295,24 @@ def _nothing(model: AbstractModel, signals: tuple[Array, Array], groups: dict[st
         "chance, and neither are simple curves of filtered inputs. Measure what moves {name}, excite it more, or give "
         "its dead time; where it moves by itself, as in a limit cycle, or along something less simple, a network with "
         "more states or starts may tell."
+    )
+
+
+def _of_beginning(signals: tuple[Array, Array], held: Array, usable: Mask) -> str:
+    """A sentence where a run follows its output by how it begins alone: no nearer than with its inputs held."""
+    y, s = (signal[usable] for signal in signals)
+    still_run = held[usable] - held[usable].mean()
+    if not np.isfinite(still_run).all() or not np.ptp(still_run) > 0.0:
+        return ""
+    centred = y - y.mean()
+    without = centred - still_run * float(still_run @ centred / (still_run @ still_run))
+    parts = [float(left @ left / (centred @ centred)) for left in (without, y - s)]
+    if parts[0] > 1.0 - BEGUN or parts[1] < (1.0 - ADDED) * parts[0]:
+        return ""
+    return (
+        f"The free run of {{name}} follows how the record begins, and not {{inputs}}: it leaves {100 * parts[1]:.3g} % "
+        f"of what {{name}} moves, and {100 * parts[0]:.3g} % with {{inputs}} held at the mean. Its fit says nothing of "
+        "what {inputs} does. Record {name} moved by {inputs}, beginning at rest; or name what moves it."
     )
 
 

@@ -70,6 +70,19 @@ class FreeRun:
             beside=_beside(model, trace, window),
         )
 
+    def held(self, model: AbstractModel) -> NDArray[np.float64]:
+        """The run with every input held at its mean, from the same beginning: what of it no input does.
+
+        Args:
+            model: The model that ran.
+
+        Returns:
+            Shape ``(n_samples, n_outputs)``.
+        """
+        means = self.inputs[self.usable].mean(axis=0)
+        inputs = np.broadcast_to(means, self.inputs.shape).copy()
+        return model.simulate(inputs, self.history).reshape(self.output.shape)
+
 
 def _beside(model: AbstractModel, trace: Trace, window: slice) -> dict[str, NDArray[np.float64]]:
     """What else was recorded, where it is known throughout."""

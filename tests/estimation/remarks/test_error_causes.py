@@ -49,7 +49,11 @@ def _play(u: np.ndarray, width: float) -> np.ndarray:
 
 
 def _told(u: np.ndarray, y: np.ndarray, simulated: np.ndarray, parameters: int = 10, **beside: np.ndarray) -> list[str]:
-    model = SimpleNamespace(mapping=Mapping(inputs=("u",), outputs=("y",)), n_parameters=parameters)
+    model = SimpleNamespace(
+        mapping=Mapping(inputs=("u",), outputs=("y",)),
+        n_parameters=parameters,
+        simulate=lambda inputs, _: np.zeros(len(inputs)),
+    )
     run = FreeRun(
         inputs=u[:, np.newaxis],
         output=y[:, np.newaxis],
@@ -238,3 +242,23 @@ def test_outputs_that_drive_each_other_are_told_where_each_has_a_model_of_its_ow
     assert any(one.startswith("y2: ") and "earlier values of y1, which the record has" in one for one in apart.warnings)
     together = sysid.fit(traces, "u1+u2 -> y1+y2", sysid.NARX(input_delays=1, output_delays=1, neurons=0))
     assert not together.warnings
+
+
+STRUCTURES = [
+    sysid.ARX(na=2, nb=2, nk=1),
+    sysid.TransferFunction(poles=1, zeros=0),
+    sysid.LinearStateSpace(states=1, noise=False),
+]
+
+
+@pytest.mark.parametrize("structure", STRUCTURES, ids=lambda one: type(one).__name__)
+def test_a_run_that_follows_how_its_record_begins_and_no_input_says_so(structure: object) -> None:
+    rng = np.random.default_rng(5)
+    u, decay = rng.normal(size=1000), 5.0 * 0.995 ** np.arange(1000)
+    begins = "The free run of y follows how the record begins, and not u"
+    y = decay + 0.15 * rng.normal(size=1000)
+    fit = sysid.fit(sysid.data({"u": u, "y": y}, sample_time=0.1), "u -> y", structure)
+    assert any(text.startswith(begins) for text in fit.warnings)
+    moved = y + 4.0 * lfilter([0.0, 0.1], [1.0, -0.9], u)
+    fit = sysid.fit(sysid.data({"u": u, "y": moved}, sample_time=0.1), "u -> y", structure)
+    assert not any(text.startswith(begins) for text in fit.warnings)
