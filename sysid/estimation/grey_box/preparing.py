@@ -85,15 +85,34 @@ def seen_terms(provider: EquationProvider, theta: Array) -> tuple[EquationForm, 
     form = provider.at(theta)
     each = [provider.of_record(form, theta, i) for i in range(len(provider.records))]
     begun = [provider.begin(one, theta, i) for i, one in enumerate(each)]
-    paths = [path[np.isfinite(path).all(axis=1)] for _, path in provider.paths(theta)]
-    whole = np.concatenate(paths) if paths else np.zeros((0, form.lowered.n_states))
-    if not len(whole):
-        return form, begun
-    low, high = whole.min(axis=0), whole.max(axis=0)
-    terms = form.terms
+    whole, terms = _visited(form, [path for _, path in provider.paths(theta)]), form.terms
+    low, high = whole.min(axis=0, initial=np.inf), whole.max(axis=0, initial=-np.inf)
     span = np.where(high > low, (high - low) / 2.0, terms.scale)
-    level = np.where(terms.declared, terms.level, (low + high) / 2.0)
+    level = np.where(terms.declared | (high < low), terms.level, (low + high) / 2.0)
     return replace(form, terms=replace(terms, level=terms.held(level), scale=span)), begun
+
+
+def _visited(form: EquationForm, paths: Sequence[Array]) -> Array:
+    """The states that records visit; what stood before a record, and no sample shows well, is not where a past is.
+
+    Args:
+        form: The form.
+        paths: Of each record, shape ``(n_samples, n_states)``.
+
+    Returns:
+        Shape ``(n_visited, n_states)``, all finite.
+    """
+    # The first rows of a past have its values before the record: of one that hardly counts these may be anything.
+    parts = [name.rpartition("[k-") for name in form.lowered.states]
+    depths = [int(index.rstrip("]")) if owner else 0 for owner, _, index in parts]
+    kept = []
+    for path in paths:
+        one = path.copy()
+        for j, depth in enumerate(depths):
+            if len(path) > depth:
+                one[:depth, j] = path[depth, j]
+        kept.append(one[np.isfinite(one).all(axis=1)])
+    return np.concatenate(kept) if kept else np.zeros((0, form.lowered.n_states))
 
 
 def norms_for(provider: EquationProvider, theta: Array) -> Array:
