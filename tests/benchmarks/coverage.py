@@ -39,6 +39,8 @@ from sysid.models import (
     Mapping,
     Start,
     TransferFunction,
+    VectorARX,
+    VectorARXModel,
     VectorStateSpace,
 )
 from sysid.models.contract.ratio import Ratio
@@ -143,6 +145,21 @@ def _truth_of_two(*, noise: bool = True) -> list[float]:
     return [*numerators[:, :, 1:].ravel(), *F[1:], *(C[:, :, 1:].ravel() if noise else [])]
 
 
+COUPLED = VectorARX(na=[[1, 1], [1, 2]], nb=[[2, 1], [1, 1]], nk=[[1, 3], [2, 1]])
+OF_COUPLED = [1.0, 0.4, 0.8, 0.7, 0.3, 0.6, 1.6, -0.3, 1.1, -0.3]
+"""Two outputs that drive each other, and the coefficients in the order of the structure's terms."""
+
+
+def record_of_coupled(seed: int) -> tuple[Trace, Mapping]:
+    """A record of it; the noise of its equations hangs together."""
+    u, e = _drawn(seed, 2, 2)
+    y = e @ np.array([[1.0, 0.4], [0.0, 0.9]])
+    for t in range(3, len(u)):
+        for (i, channel, lag), value in zip(COUPLED.terms, OF_COUPLED, strict=True):
+            y[t, i] += value * (u[t - lag, channel] if channel < 2 else y[t - lag, channel - 2])
+    return trace_of(u, y)
+
+
 def _polynomial(
     structure: AbstractStructure, orders: AbstractPolynomial, truth: list[float], *, told: list[float] | None = None
 ) -> Known:
@@ -183,6 +200,7 @@ STRUCTURES: dict[str, Known] = {
     "SS": _polynomial(LinearStateSpace(states=2), ARMAX(na=2, nb=2, nc=2, nk=1), STATES),
     "SS with dead time 6": _polynomial(LinearStateSpace(states=2, nk=6), ARMAX(na=2, nb=2, nc=2, nk=6), STATES),
     "SS without noise model": _polynomial(LinearStateSpace(states=2, noise=False), OUTPUT_ERROR, PLANT),
+    "VectorARX": Known(structure=COUPLED, record=record_of_coupled, truth=OF_COUPLED),
     "VectorSS": Known(structure=VectorStateSpace(states=2), record=record_of_two, truth=_truth_of_two()),
     "VectorSS without noise model": Known(
         structure=VectorStateSpace(states=2, noise=False),
@@ -229,14 +247,23 @@ def held(known: Known, seed: int) -> Held:
     ratios = list(result.model.ratios.values())
     if not ratios:
         return inside
-    inside["poles"] = _of_poles(result, [_true_ratio(one, names, truth) for one in ratios])
+    of_truth = _true_ratios(result, truth)
+    inside["poles"] = _of_poles(result, of_truth)
     views = linear_views(result.model, result.uncertainty, seed)
-    true = [_true_view(view, _true_ratio(one, names, truth)) for view, one in zip(views, ratios, strict=True)]
+    true = [_true_view(view, one) for view, one in zip(views, of_truth, strict=True)]
     inside["gain"] = _in_band(
         [np.abs(view.responses(FREQUENCIES)) for view in views], [np.abs(one.responses(FREQUENCIES)[0]) for one in true]
     )
     inside["step response"] = _in_band([_steps(view) for view in views], [_steps(one)[0] for one in true])
     return inside
+
+
+def _true_ratios(result: FitResult, truth: np.ndarray) -> list[Ratio]:
+    model = result.model
+    if isinstance(model, VectorARXModel):
+        return list(replace(model, coefficients=truth[: len(model.coefficients)]).ratios.values())
+    assert result.uncertainty is not None
+    return [_true_ratio(one, result.uncertainty.names, truth) for one in model.ratios.values()]
 
 
 def _true_ratio(ratio: Ratio, names: tuple[str, ...], truth: np.ndarray) -> Ratio:
