@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy import linalg
 
+from sysid.estimation.linear.long_arx import LongARX
 from sysid.estimation.linear.poles import continuous_from, scattered, sections_of, stabilised
 from sysid.estimation.linear.refined_iv import refined_sections
 from sysid.estimation.linear.regression import solve
@@ -44,30 +45,7 @@ class PoleStart:
     sections: Sections
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LongArx:
-    """A least-squares ARX model with many lags, as rational functions with one denominator.
-
-    Args:
-        a: Coefficients of the past outputs, shape ``(n_lags,)``.
-        b: For each input those of the input delayed by its dead time, from lag 0 on, shape ``(n_lags,)``.
-    """
-
-    a: NDArray[np.float64]
-    b: tuple[NDArray[np.float64], ...]
-
-    @property
-    def poles(self) -> NDArray[np.complex128]:
-        """In the z plane, mirrored into the unit circle."""
-        return stabilised(self.raw_poles, Domain.DISCRETE)
-
-    @property
-    def raw_poles(self) -> NDArray[np.complex128]:
-        """In the z plane, wherever they are."""
-        return np.asarray(np.roots([1.0, *(-self.a)]), dtype=np.complex128)
-
-
-def _long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> LongArx:
+def _long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> LongARX:
     """Fit the long model to scaled records whose inputs are delayed by their dead times.
 
     Inputs have ``more`` lags than outputs: what a plant over time answers to a held input comes a sample later.
@@ -82,7 +60,7 @@ def _long_arx(records: Sequence[TimeRecord], n_lags: int, *, more: int = 0) -> L
         reduced = triangle(blocks, free=0)
         solution = solve(reduced.R, reduced.z, samples=samples).coefficients
     b = tuple(solution[n_lags + width * j : n_lags + width * (j + 1)] for j in range(m))
-    return LongArx(a=solution[:n_lags], b=b)
+    return LongARX(A=np.concatenate([[1.0], -solution[:n_lags]]), B=b)
 
 
 def _blocks(record: TimeRecord, n_lags: int, width: int) -> Iterator[NDArray[np.float64]]:
@@ -273,7 +251,7 @@ def _padded(poles: NDArray[np.complex128], n: int) -> NDArray[np.complex128]:
     return np.concatenate([chosen, fast]).astype(np.complex128)
 
 
-def _balanced(model: LongArx, j: int, n: int) -> NDArray[np.complex128]:
+def _balanced(model: LongARX, j: int, n: int) -> NDArray[np.complex128]:
     """Poles of one input's response reduced to ``n`` states by balanced truncation (Moore 1981).
 
     The Gramians are those of the long model in the basis of its own poles, which is nearly orthonormal.
@@ -308,13 +286,13 @@ def _factor(gramian: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _response(model: LongArx, j: int, grid: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _response(model: LongARX, j: int, grid: NDArray[np.float64]) -> NDArray[np.complex128]:
     """The long model's response at some frequencies in rad per sample, its poles mirrored into the circle."""
     denominator = np.real(np.poly(model.poles))
-    return np.asarray(scipy.signal.freqz(model.b[j], denominator, worN=grid)[1], dtype=np.complex128)
+    return np.asarray(scipy.signal.freqz(model.B[j], denominator, worN=grid)[1], dtype=np.complex128)
 
 
-def _sk(model: LongArx, j: int, n: int, n_zeros: int, records: Sequence[TimeRecord]) -> NDArray[np.complex128]:
+def _sk(model: LongARX, j: int, n: int, n_zeros: int, records: Sequence[TimeRecord]) -> NDArray[np.complex128]:
     """Poles from the long model's response, weighted by how much of the input there is at each frequency."""
     length = max(len(record.target) for record in records)
     grid = np.exp(np.linspace(np.log(2.0 * np.pi / length), np.log(0.98 * np.pi), _GRID))

@@ -21,11 +21,12 @@ from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.arx import first_output
 from sysid.estimation.linear.coloured_errors import sandwich
 from sysid.estimation.linear.determined import Determined
+from sysid.estimation.linear.long_arx import LongARX
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
 from sysid.estimation.linear.polynomial.contained import has_common, next_smaller, parts_of, with_root
 from sysid.estimation.linear.polynomial.slow import AbstractWays, next_to_transfer_function
 from sysid.estimation.linear.polynomial.slow_noise import next_to_output_error
-from sysid.estimation.linear.polynomial.starts import LongARX, long_models, looked_at, of_state_space, starts_of
+from sysid.estimation.linear.polynomial.starts import long_models, looked_at, of_state_space, starts_of
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors

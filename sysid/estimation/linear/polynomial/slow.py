@@ -19,7 +19,7 @@ from sysid.estimation.clock import now
 from sysid.estimation.least_squares.provider import AbstractProvider
 from sysid.estimation.least_squares.state import Solution
 from sysid.estimation.linear import slow_poles
-from sysid.estimation.linear.polynomial.starts import LongARX
+from sysid.estimation.linear.polynomial.starts import model_of_order
 from sysid.estimation.linear.segments import Segment, delayed_inputs, segments_of
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.subspace.windows import Windows
@@ -134,7 +134,7 @@ def suggested(segments: Sequence[Segment], orders: AbstractPolynomial) -> float:
     ]
     if not lags or not late:
         return 0.0
-    return float(np.abs(np.roots(LongARX.of_order(Windows.of(late, lags, 1), lags).A)).max(initial=0.0))
+    return float(np.abs(model_of_order(Windows.of(late, lags, 1), lags).raw_poles).max(initial=0.0))
 
 
 def of_transfer_function(

@@ -13,7 +13,7 @@ chapter 6). What is left is the noise, an ARMA series.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.errors import FitDivergedError, TraceError, UserError
+from sysid.estimation.linear.long_arx import LongARX
 from sysid.estimation.linear.polynomial.contained import has_common
 from sysid.estimation.linear.segments import Segment, delayed_inputs
 from sysid.estimation.linear.state_space.search import search
@@ -46,102 +47,77 @@ STEPS = 30
 """Steps of a state space that a start is taken from."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LongARX:
-    """A long ARX model of some pieces.
+def long_model(pieces: Sequence[Segment], least: int, *, more: float = 1.0) -> LongARX:
+    """The model whose order Akaike's criterion chooses, or longer by a factor.
 
     Args:
-        A: Of the output, from 1 on, shape ``(order + 1,)``.
-        B: Of each input, from lag 0 on.
-        constant: On the right side.
-        yardstick: What it leaves unexplained; ``None`` where it was not fitted to that.
+        pieces: Unbroken records, in scaled numbers.
+        least: Lags at least.
+        more: The factor.
+
+    Returns:
+        The model.
     """
+    m = pieces[0].inputs.shape[1]
+    total, longest = sum(map(len, pieces)), max(map(len, pieces))
+    most = max(min(LONGEST, total // (4 * (m + 1)), longest // 2), 1)
+    windows = Windows.of(pieces, max(min(max(most, least), longest - 1), 1), 1)
+    chosen = 1 + int(np.argmin(arx_orders(windows)))
+    order = min(max(round(chosen * more), least), windows.past)
+    yardstick = Yardstick.of(windows, order, feedthrough=True)
+    return replace(model_of_order(windows, order), yardstick=yardstick)
 
-    A: Array
-    B: tuple[Array, ...]
-    constant: float
-    yardstick: Yardstick | None = None
 
-    @classmethod
-    def of(cls, pieces: Sequence[Segment], least: int, *, more: float = 1.0) -> LongARX:
-        """The model whose order Akaike's criterion chooses, or longer by a factor.
+def model_of_order(windows: Windows, order: int) -> LongARX:
+    """The model with so many lags.
 
-        Args:
-            pieces: Unbroken records, in scaled numbers.
-            least: Lags at least.
-            more: The factor.
+    Args:
+        windows: Of the pieces, with as many past samples or more.
+        order: How many.
 
-        Returns:
-            The model.
-        """
-        m = pieces[0].inputs.shape[1]
-        total, longest = sum(map(len, pieces)), max(map(len, pieces))
-        most = max(min(LONGEST, total // (4 * (m + 1)), longest // 2), 1)
-        windows = Windows.of(pieces, max(min(max(most, least), longest - 1), 1), 1)
-        chosen = 1 + int(np.argmin(arx_orders(windows)))
-        order = min(max(round(chosen * more), least), windows.past)
-        yardstick = Yardstick.of(windows, order, feedthrough=True)
-        return replace(cls.of_order(windows, order), yardstick=yardstick)
+    Returns:
+        The model.
+    """
+    inputs_now = windows.inputs(0, 1)
+    m, columns = inputs_now.shape[1], [windows.constant, windows.at(-order, 0), inputs_now]
+    theta = regress(np.concatenate(columns, axis=1), windows.outputs(0, 1))[:, 0]
+    lagged = theta[1 : 1 + order * (m + 1)].reshape(order, m + 1)[::-1]  # newest lag first
+    now = theta[1 + order * (m + 1) :]
+    A = np.concatenate([[1.0], -lagged[:, m]])
+    B = tuple(np.concatenate([[now[j]], lagged[:, j]]) for j in range(m))
+    return LongARX(A=A, B=B, constant=float(theta[0]))
 
-    @classmethod
-    def of_order(cls, windows: Windows, order: int) -> LongARX:
-        """The model with so many lags.
 
-        Args:
-            windows: Of the pieces, with as many past samples or more.
-            order: How many.
+def _in_state_space(pieces: Sequence[Segment], orders: AbstractPolynomial) -> LongARX | None:
+    """What the inputs do in a state space of the same order that is fitted to the free run.
 
-        Returns:
-            The model.
-        """
-        inputs_now = windows.inputs(0, 1)
-        m, columns = inputs_now.shape[1], [windows.constant, windows.at(-order, 0), inputs_now]
-        theta = regress(np.concatenate(columns, axis=1), windows.outputs(0, 1))[:, 0]
-        lagged = theta[1 : 1 + order * (m + 1)].reshape(order, m + 1)[::-1]  # newest lag first
-        now = theta[1 + order * (m + 1) :]
-        A = np.concatenate([[1.0], -lagged[:, m]])
-        B = tuple(np.concatenate([[now[j]], lagged[:, j]]) for j in range(m))
-        return cls(A=A, B=B, constant=float(theta[0]))
+    Args:
+        pieces: Unbroken records.
+        orders: The structure: its largest denominator says how many states.
 
-    @classmethod
-    def of_state_space(cls, pieces: Sequence[Segment], orders: AbstractPolynomial) -> LongARX | None:
-        """What the inputs do in a state space of the same order that is fitted to the free run.
-
-        Args:
-            pieces: Unbroken records.
-            orders: The structure: its largest denominator says how many states.
-
-        Returns:
-            The transfer functions over their common denominator, beside no noise model; ``None`` where there is none.
-        """
-        states = max(orders.denominators, default=0)
-        if not states:
-            return None
-        # Without D a state space has as many coefficients above as states, the first of them at a lag of one sample.
-        direct = min(orders.nk) == 0 or max(orders.nb) > states
-        dead = [nk - (not direct) for nk in orders.nk]
-        late = [replace(p, inputs=delayed_inputs(p.inputs, np.zeros(len(dead)), dead)) for p in pieces]
-        asked = LinearStateSpace(states=states, feedthrough=direct, noise=False)
-        try:
-            system = search(late, asked, StateSpaceTraining(max_iterations=STEPS)).system
-        except (UserError, FitDivergedError, linalg.LinAlgError, ValueError):  # too short for it: the other starts do
-            return None
-        A = np.real(np.poly(system.A))
-        B = []
-        for j, k in enumerate(dead):
-            b, d = system.B[:, j : j + 1], float(system.D[0, j])
-            # C adj(zI - A) b + d det(zI - A): the determinant lemma.
-            numerator = np.real(np.poly(system.A - b @ system.C)) + (d - 1.0) * A
-            B.append(np.concatenate([np.zeros(k), numerator]))
-        return cls(A=A, B=tuple(B), constant=0.0)
-
-    def innovations(self, piece: Segment) -> Array:
-        """What the model does not explain; its first samples, which it cannot tell, are zero."""
-        e = scipy.signal.lfilter(self.A, [1.0], piece.outputs[:, 0]) - self.constant
-        for j, b in enumerate(self.B):
-            e = e - scipy.signal.lfilter(b, [1.0], piece.inputs[:, j])
-        e[: len(self.A) - 1] = 0.0
-        return np.asarray(e)
+    Returns:
+        The transfer functions over their common denominator, beside no noise model; ``None`` where there is none.
+    """
+    states = max(orders.denominators, default=0)
+    if not states:
+        return None
+    # Without D a state space has as many coefficients above as states, the first of them at a lag of one sample.
+    direct = min(orders.nk) == 0 or max(orders.nb) > states
+    dead = [nk - (not direct) for nk in orders.nk]
+    late = [replace(p, inputs=delayed_inputs(p.inputs, np.zeros(len(dead)), dead)) for p in pieces]
+    asked = LinearStateSpace(states=states, feedthrough=direct, noise=False)
+    try:
+        system = search(late, asked, StateSpaceTraining(max_iterations=STEPS)).system
+    except (UserError, FitDivergedError, linalg.LinAlgError, ValueError):  # too short for it: the other starts do
+        return None
+    A = np.real(np.poly(system.A))
+    B = []
+    for j, k in enumerate(dead):
+        b, d = system.B[:, j : j + 1], float(system.D[0, j])
+        # C adj(zI - A) b + d det(zI - A): the determinant lemma.
+        numerator = np.real(np.poly(system.A - b @ system.C)) + (d - 1.0) * A
+        B.append(np.concatenate([np.zeros(k), numerator]))
+    return LongARX(A=A, B=tuple(B))
 
 
 def _armax_start(pieces: Sequence[Segment], orders: AbstractPolynomial, long: LongARX) -> Array:
@@ -327,7 +303,7 @@ def long_models(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[L
     """Long ARX models: as long as the records ask for, and twice that."""
     reach = [orders.order("na"), *(nb + nk for nb, nk in zip(orders.nb, orders.nk, strict=True))]
     least = max(*reach, *orders.denominators, 1) if len(reach) + len(orders.denominators) > 0 else 1
-    return [LongARX.of(looked, least), LongARX.of(looked, least, more=2.0)]
+    return [long_model(looked, least), long_model(looked, least, more=2.0)]
 
 
 def starts_of(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequence[LongARX]) -> list[Array]:
@@ -340,7 +316,7 @@ def starts_of(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequ
 
 def of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
     """Coefficients from a state space of the same order."""
-    same = None if has_common(orders) else LongARX.of_state_space(looked, orders)
+    same = None if has_common(orders) else _in_state_space(looked, orders)
     if same is None:
         return []
     begun = [_box_jenkins_start(looked, orders, same, whitened=False)]
