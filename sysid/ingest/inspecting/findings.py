@@ -70,6 +70,7 @@ class FileFinding:
         unstamped: How many of them have no time stamp.
         tolerance: How far off the grid stamps may lie that were rounded when they were written, as a fraction of the
             sample time; ``None`` where the usual will do.
+        longest_step: The longest step of stamps that are uneven by nature, as a solver's are; none of them is a gap.
         distinct: How many different time stamps there are; rows without stamps are all different.
         needed: The repairs that the file needs, with the gentlest choice of each.
         files: The reader options that the file was read with, where they are not recognised by itself.
@@ -93,6 +94,7 @@ class FileFinding:
     files: FileOptions
     table: RawTable = field(repr=False)
     tolerance: float | None = None
+    longest_step: float | None = None
     guessed: frozenset[str] = frozenset()
     notes: tuple[str, ...] = field(default=())
     cases: tuple[CaseFinding, ...] = field(default=())

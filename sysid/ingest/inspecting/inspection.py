@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.ingest.assembling.in_units import stamps_in_seconds
-from sysid.ingest.assembling.timing import Timing, survey
+from sysid.ingest.assembling.timing import Timing, round_step, survey
 from sysid.ingest.cells.blanks import blanks_mean, marks_in
 from sysid.ingest.inspecting.attempts import Attempt, read_somehow
 from sysid.ingest.inspecting.column_findings import column_finding
@@ -20,7 +20,14 @@ from sysid.ingest.inspecting.findings import CaseFinding, ColumnFinding, FileFin
 from sysid.ingest.inspecting.over_frequency import frequencies_in, over_frequency
 from sysid.ingest.inspecting.restarts import finer_than_clock, of_few_digits, records_by_clock
 from sysid.ingest.inspecting.second_clocks import without_second_clocks
-from sysid.ingest.inspecting.time_findings import find_time, finite_of, needs_of_time, step_beside, without_copies
+from sysid.ingest.inspecting.time_findings import (
+    find_time,
+    finite_of,
+    longest_of_solver,
+    needs_of_time,
+    step_beside,
+    without_copies,
+)
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
@@ -75,6 +82,7 @@ class _Clock:
         timing: The stamps surveyed; none where there are none, or where the clock is coarser than the samples.
         step: Sample time in seconds.
         tolerance: How far stamps are rounded, where only that is uneven.
+        longest_step: The longest step of stamps that are uneven by nature.
         unstamped: Samples without a stamp.
         distinct: Samples at times of their own.
         needs: The repairs of time.
@@ -86,6 +94,7 @@ class _Clock:
     step: float
     timing: Timing | None = None
     tolerance: float | None = None
+    longest_step: float | None = None
     unstamped: int = 0
     distinct: int
     needs: Mapping[str, object] = field(default_factory=dict)
@@ -107,6 +116,10 @@ class _Clock:
             return found
         timing = survey(known)
         step, needs, tolerance = needs_of_time(known, timing)
+        longest = longest_of_solver(known, needs)
+        if longest is not None:
+            timing, needs = survey(known, longest_step=longest), {**needs, "gaps": None}
+            step = round_step(timing.step)
         if needs.get("duplicates") and are_events(stamps, [c for c in table.columns if c.name != time.column]):
             needs["duplicates"] = "last"
         finer = None if found.unstamped else finer_than_clock(known, timing)
@@ -116,7 +129,8 @@ class _Clock:
             by_rows, said = TimeOptions(step=finer[0]), f"guessed: {finer[1]}"
             return replace(found, time=by_rows, told=said, step=finer[0], tolerance=tolerance)
         distinct = _distinct(known, timing)
-        return replace(found, timing=timing, step=step, needs=needs, tolerance=tolerance, distinct=distinct)
+        found = replace(found, timing=timing, step=step, needs=needs, tolerance=tolerance, distinct=distinct)
+        return replace(found, longest_step=longest)
 
 
 def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
@@ -150,6 +164,7 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         samples=len(table),
         unstamped=clock.unstamped,
         tolerance=clock.tolerance,
+        longest_step=clock.longest_step,
         distinct=clock.distinct,
         needed=RepairOptions.model_validate(needed),
         files=files,

@@ -173,6 +173,8 @@ def _grid(finding: FileFinding) -> list[str]:
         pairs["method"] = "linear"
     if finding.tolerance is not None:
         pairs["tolerance"] = finding.tolerance
+    if finding.longest_step is not None:
+        pairs["longest_step"] = finding.longest_step
     if finding.distinct < GridOptions().fewest_samples:
         pairs["fewest_samples"] = max(finding.distinct, 2)
     return [f"  grid: {_mapping(pairs)}"] if pairs else []

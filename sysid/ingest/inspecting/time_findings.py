@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from sysid.ingest.tables.time_columns import is_counter, is_time_unit, unit_of_c
 
 _RISING_SHARE = 0.98  # of the steps of a column that is taken for time though nothing says so
 _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
-_MOSTLY_ALIKE = 0.5
+_MOSTLY_ALIKE, _OFTEN, _MOST_UNEVEN = 0.5, 0.05, 20.0
 _ARRAYS = {"matlab", "numpy"}
 _MINUTE = 60.0
 _YEARS, _CALLED_YEAR = (1700.0, 2300.0), re.compile(r"year|jahr|date|année|año", re.IGNORECASE)
@@ -132,6 +132,27 @@ def _rising(columns: Sequence[RawColumn]) -> str | None:
         if since_1970(column.values) or np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
             return column.name
     return None
+
+
+def longest_of_solver(known: NDArray[np.float64], needs: Mapping[str, object]) -> float | None:
+    """The longest step of stamps that are uneven by nature, as a solver's are: none of their steps is a gap.
+
+    Args:
+        known: Time stamps in seconds, all finite.
+        needs: The repairs of time that they seem to need.
+
+    Returns:
+        Seconds, in three digits; ``None`` where steps are alike mostly, or some are far longer than all others.
+    """
+    if not needs.get("gaps") or not needs.get("jitter"):
+        return None
+    steps = np.diff(np.unique(known))
+    usual, longest = float(np.median(steps)), float(steps.max())
+    alike = float(np.mean(np.abs(steps - usual) <= 0.1 * usual))
+    often = float(np.mean(steps > 1.5 * usual))
+    if alike >= _MOSTLY_ALIKE or often < _OFTEN or longest > _MOST_UNEVEN * usual:
+        return None
+    return float(f"{1.005 * longest:.3g}")
 
 
 def _is_plain(rising: NDArray[np.float64], clean: Timing) -> bool:

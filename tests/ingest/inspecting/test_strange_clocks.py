@@ -170,3 +170,17 @@ def test_a_time_whose_unit_is_written_out_is_known(tmp_path: Path, name: str, sc
 def test_times_that_are_signals_are_no_clock() -> None:
     for name in ("step_time", "dead_time_s", "cycle time", "Sample Time", "on_time_seconds"):
         assert not is_called_time(name)
+
+
+def test_a_solvers_steps_are_no_gaps(tmp_path: Path) -> None:
+    steps = 0.001 * np.exp(np.cumsum(np.random.default_rng(4).normal(0.0, 0.3, 399)) * 0.3)
+    stamps = np.concatenate([[0.0], np.cumsum(np.clip(steps, 4e-4, 4e-3))])
+    text = "time [s],y\n" + "".join(f"{t:.8f},{np.sin(3.0 * t):.8f}\n" for t in stamps)
+    trace = proposed(tmp_path, text)
+    assert trace.usable_samples.all()
+    assert trace.sample_time == pytest.approx(stamps[-1] / 399, rel=0.2)
+    np.testing.assert_allclose(trace["y"], np.sin(3.0 * trace.time), atol=3e-5)
+    # Samples that were lost by chance, of an even clock, stay gaps.
+    kept = np.flatnonzero(np.random.default_rng(5).random(400) < 0.7)
+    trace = proposed(tmp_path, "time [s],y\n" + "".join(f"{0.01 * k:.2f},{k % 5}\n" for k in kept))
+    assert trace.sample_time == 0.01 and not trace.usable_samples.all()
