@@ -33,6 +33,10 @@ NOISE_ROUNDS, WIDEST, ALIKE = 3, 1e4, 0.05
 """Times that outputs are weighed anew; by how much their errors may differ; and below which difference they are alike,
 as a natural logarithm."""
 
+BY_CHANCE, SHOWN_AT_KINKS = 0.1, 1e-6
+"""What a step that does not improve may promise at a kink, for each parameter, in losses of one sample, where chance
+takes one; and the part of the strongest curvature that a direction must have there."""
+
 PRIOR_ROUNDS = 10
 """Times that declared priors are weighed anew."""
 
@@ -85,7 +89,10 @@ class Done:
 
 
 def settled(candidate: starts.Candidate, provider: EquationProvider) -> starts.Candidate:
-    """A candidate with its evidence, and the status of one whose gradient is zero to rounding.
+    """A candidate with its evidence, and the status of one whose gradient is zero to rounding, or nearly so at a kink.
+
+    Where a bend of a curve passes over a sample, the loss has a kink: a minimum there has a gradient on either side, and
+    no step improves it. What such a fit has still been promised is then less than chance decides.
 
     Args:
         candidate: A start at its last checkpoint.
@@ -95,7 +102,11 @@ def settled(candidate: starts.Candidate, provider: EquationProvider) -> starts.C
         The candidate.
     """
     solution = with_evidence(candidate.solution, provider.n_samples)
-    if solution.status in {Status.STALLED, Status.NOT_IMPROVED} and at_minimum(solution.state, provider):
+    kinked = BY_CHANCE * provider.n_parameters / provider.n_samples
+    if solution.status in {Status.STALLED, Status.NOT_IMPROVED} and (
+        at_minimum(solution.state, provider)
+        or (solution.status is Status.STALLED and at_minimum(solution.state, provider, kinked, shown=SHOWN_AT_KINKS))
+    ):
         solution = replace(solution, status=Status.CONVERGED)
     return replace(candidate, solution=solution)
 

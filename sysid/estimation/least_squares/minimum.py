@@ -10,6 +10,9 @@ from sysid.estimation.least_squares.state import State
 FLAT = 1e-8
 """Share of the loss that one more Newton step would take away, below which a fit stands at a minimum."""
 
+SHOWN = 1e-12
+"""Part of the strongest direction's curvature from which on a direction is more than rounding."""
+
 NOTHING_LEFT = 1e-24
 """Mean squared error over the output's scale that is rounding."""
 
@@ -38,13 +41,14 @@ def stands(state: State, provider: AbstractProvider) -> bool:
     return abs(before - loss) <= share * loss and at_minimum(state, provider, share)
 
 
-def at_minimum(state: State, provider: AbstractProvider, share: float = FLAT) -> bool:
+def at_minimum(state: State, provider: AbstractProvider, share: float = FLAT, *, shown: float = SHOWN) -> bool:
     """Whether a fit that finds no better step stands where there is none: its gradient is zero to rounding.
 
     Args:
         state: Where it stands.
         provider: Residuals and Jacobians.
         share: Of the loss, that one more Newton step may take away.
+        shown: Part of the strongest direction's curvature that one must have to be stepped along.
 
     Returns:
         Whether it does.
@@ -63,5 +67,5 @@ def at_minimum(state: State, provider: AbstractProvider, share: float = FLAT) ->
     H = at.gauss_newton + np.diag(ridge)
     root = np.sqrt(np.maximum(np.diag(H)[free], 1e-300))
     scaled = g[free] / root
-    step = np.linalg.lstsq(H[np.ix_(free, free)] / np.outer(root, root), scaled, rcond=1e-12)[0]
+    step = np.linalg.lstsq(H[np.ix_(free, free)] / np.outer(root, root), scaled, rcond=shown)[0]
     return bool(scaled @ step <= share * at.loss)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sysid.estimation.least_squares.correlation import correlation_time
 from sysid.estimation.records.informative import by_chance, informative, still, unit, with_past
 from sysid.estimation.remarks.fitted_run import FreeRun
-from sysid.estimation.remarks.input_features import CURVES, LINEAR, features
+from sysid.estimation.remarks.input_features import CURVES, LINEAR, answers, features
 from sysid.models import AbstractModel
 
 Array = NDArray[np.float64]
@@ -78,14 +78,14 @@ def causes(model: AbstractModel, run: FreeRun, fed: Collection[int] = (), but: C
         spread = float(np.std(y[run.usable]))
         if not float(np.std((y - s)[run.usable])) > WORTH * spread:
             continue
-        told += _of_output(model, run, name, (y / spread, s / spread), () if i in fed else None)
+        told += _of_output(model, run, i, (y / spread, s / spread), () if i in fed else None)
     return told
 
 
 def _of_output(
-    model: AbstractModel, run: FreeRun, name: str, signals: tuple[Array, Array], kept: tuple[int, ...] | None
+    model: AbstractModel, run: FreeRun, place: int, signals: tuple[Array, Array], kept: tuple[int, ...] | None
 ) -> list[str]:
-    y, s = signals
+    name, (y, s) = model.mapping.outputs[place], signals
     lone = _lone(y, s, run.usable)
     sound = run.usable & ~lone
     told = [_of_lone(y - s, lone, run.usable, name)] if lone.any() else []
@@ -101,7 +101,7 @@ def _of_output(
     if aside:
         return [*told, aside]
     if kept:
-        groups = features(run.inputs[:, list(kept)], s)
+        groups = features(run.inputs[:, list(kept)], s, answers(model, run.inputs, place))
         found = _drift(groups, y, sound, name) or _nothing(model, (y, s), groups, sound).format(
             name=name, inputs=inputs
         )

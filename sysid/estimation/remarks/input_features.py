@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels.linear import slowed
+from sysid.models import AbstractModel
 
 Array = NDArray[np.float64]
 
@@ -25,21 +28,23 @@ LATE = (2, 3, 4, 6, 8, 12, 16, 24)
 WIDTHS = (0.1, 0.2, 0.35)
 """Half the play, in ranges."""
 MOST_INPUTS = 4
+TINY = float(np.finfo(np.float64).tiny)
 
 
-def features(inputs: Array, simulated: Array) -> dict[str, list[Array]]:
+def features(inputs: Array, simulated: Array, answered: Sequence[Array] = ()) -> dict[str, list[Array]]:
     """Signals that a model of some inputs may have left out.
 
     Args:
         inputs: Shape ``(n_samples, n_inputs)``; of many inputs the first are looked at.
         simulated: Free run of one output, shape ``(n_samples,)``, for curves behind it.
+        answered: What the model makes of curves of its inputs (:func:`answers`), each of shape ``(n_samples, n)``.
 
     Returns:
         By kind those of it and of all simpler kinds before it, each of shape ``(n_samples,)``: apart, as a hundred of
         them side by side are more memory in one piece than a process has free.
     """
     u = inputs[:, :MOST_INPUTS]
-    u = (u - u.mean(axis=0)) / np.maximum(u.std(axis=0), np.finfo(np.float64).tiny)
+    u = (u - u.mean(axis=0)) / np.maximum(u.std(axis=0), TINY)
     memories = [1.0]
     while memories[-1] * STEP <= len(u) / SLOWEST:
         memories.append(memories[-1] * STEP)
@@ -48,7 +53,7 @@ def features(inputs: Array, simulated: Array) -> dict[str, list[Array]]:
     linear += [_late(u, lag) for lag in LATE if lag <= memories[-1]]
     bent = np.column_stack([*(_curves(one) for one in u.T), *_products(u)])
     held = np.column_stack([_play(one, width * float(np.ptp(one))) for one in u.T for width in WIDTHS])
-    curves += [bent, _curves(simulated)]
+    curves += [bent, _curves(simulated), *answered]
     plays += [held]
     for memory in memories:
         slow = u
@@ -67,6 +72,31 @@ def features(inputs: Array, simulated: Array) -> dict[str, list[Array]]:
         found = found + [np.ascontiguousarray(column) for part in parts for column in part.T]
         kinds[kind] = found
     return kinds
+
+
+def answers(model: AbstractModel, inputs: Array, output: int) -> list[Array]:
+    """What a linear model makes of curves of its inputs: a curve before a resonance is no sum of slow filters.
+
+    Args:
+        model: The model; of one that is not linear, or remembers for ever, there are none.
+        inputs: Shape ``(n_samples, n_inputs)``; of many inputs the first are looked at.
+        output: Place of the output.
+
+    Returns:
+        For each input shape ``(n_samples, n_curves)``.
+    """
+    if model.pole_radius is None or not model.pole_radius < 1.0:
+        return []
+    found = list[Array]()
+    for j in range(min(inputs.shape[1], MOST_INPUTS)):
+        runs = []
+        for bent in _curves((inputs[:, j] - inputs[:, j].mean()) / max(float(inputs[:, j].std()), TINY)).T:
+            moved = np.tile(inputs.mean(axis=0), (len(inputs), 1))
+            moved[:, j] += (bent - bent.mean()) * float(inputs[:, j].std())
+            run = model.simulate(moved).reshape(len(moved), -1)[:, output]
+            runs.append((run - run.mean()) / max(float(run.std()), TINY))
+        found.append(np.column_stack(runs))
+    return found
 
 
 def _late(x: Array, lag: int = 1) -> Array:
