@@ -91,8 +91,8 @@ class Done:
 def settled(candidate: starts.Candidate, provider: EquationProvider) -> starts.Candidate:
     """A candidate with its evidence, and the status of one whose gradient is zero to rounding, or nearly so at a kink.
 
-    Where a bend of a curve passes over a sample, the loss has a kink: a minimum there has a gradient on either side, and
-    no step improves it. What such a fit has still been promised is then less than chance decides.
+    Where a bend of a curve passes over a sample, the loss has a kink: a minimum there has a gradient on either side,
+    and no step improves it. What such a fit has still been promised is then less than chance decides.
 
     Args:
         candidate: A start at its last checkpoint.

@@ -71,7 +71,7 @@ def causes(model: AbstractModel, run: FreeRun, fed: Collection[int] = (), but: C
         Sentences; none where the error is small, or what is left of it looks like noise.
     """
     told = []
-    for i, name in enumerate(model.mapping.outputs):
+    for i in range(len(model.mapping.outputs)):
         y, s = run.output[:, i], run.simulated[:, i]
         if i in but or run.usable.sum() < LEAST_SAMPLES or not np.isfinite(s).all() or not np.ptp(y[run.usable]) > 0.0:
             continue

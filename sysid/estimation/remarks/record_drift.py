@@ -12,6 +12,7 @@ from sysid.errors import UserError
 from sysid.estimation.linear.slow_poles import INTEGRATES
 from sysid.estimation.nonparametric.remembered import remembered_response
 from sysid.estimation.remarks.fitted_run import FreeRun
+from sysid.kernels.linear import slowed
 from sysid.models import AbstractModel, Mapping, TransferFunctionModel
 from sysid.traces import Trace
 from sysid.units import in_unit
@@ -91,7 +92,7 @@ def _jump(x: Array) -> tuple[int, float, float]:
     return best, high - low, float(x @ x - gain.max())
 
 
-def sums_up(left: Array, inputs: Array) -> int | None:
+def sums_up(left: Array, inputs: Array, pole: float = 1.0) -> int | None:
     """Which input a drift is the sum of, as the charge of a battery is: then the plant adds up, and nothing drifts.
 
     A sum moves about its own line in time, and the drift moves with it there; by chance two slow signals may do so,
@@ -100,6 +101,7 @@ def sums_up(left: Array, inputs: Array) -> int | None:
     Args:
         left: What a quick response leaves of an output, shape ``(n_samples,)``.
         inputs: At the same samples, in units counted from where nothing is added, shape ``(n_samples, n_inputs)``.
+        pole: What a sample leaves of the sum in the next one: less than 1 of a plant that forgets slowly.
 
     Returns:
         The place of the input; ``None`` where none does it.
@@ -107,9 +109,10 @@ def sums_up(left: Array, inputs: Array) -> int | None:
     t = np.column_stack([np.ones(len(left)), np.linspace(-0.5, 0.5, len(left))])
     off, slope = _off_line(t, left)
     for j, u in enumerate(inputs.T):
-        moved, drawn = _off_line(t, np.cumsum(u))
+        added = np.cumsum(u) if pole == 1.0 else slowed(u - u.mean(), pole, 0.0)
+        moved, drawn = _off_line(t, added)
         size = float(moved @ moved)
-        strength = float(off @ moved) / size if size > 1e-24 * float(np.sum(np.cumsum(u) ** 2)) else 0.0
+        strength = float(off @ moved) / size if size > 1e-24 * float(np.sum(added**2)) else 0.0
         with_sum = strength * float(off @ moved) >= WITH_SUM * float(off @ off) > 0.0
         if with_sum and AS_STEEP * abs(slope) <= strength * drawn * np.sign(slope) <= abs(slope) / AS_STEEP:
             return j
@@ -196,6 +199,10 @@ def _drifts(traces: Sequence[Trace], mapping: Mapping, spread: float, model: Abs
         left = trace[mapping.output] - response.simulate(trace.columns(mapping.inputs))
         seen = trace.usable_samples & (np.arange(len(trace)) >= response.lags[-1])
         found = trend_of(left[seen], spread)
-        if found is not None and found.at is None and sums_up(left[seen], _added(model, trace, mapping)[seen]) is None:
+        if found is None or found.at is not None:
+            continue
+        added, slowest = _added(model, trace, mapping)[seen], _slowest(model)
+        poles = (1.0, slowest) if SLOW < slowest < 1.0 else (1.0,)
+        if all(sums_up(left[seen], added, pole) is None for pole in poles):
             sizes.append(found.size)
     return sizes

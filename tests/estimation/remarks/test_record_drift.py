@@ -72,6 +72,20 @@ def test_nothing_else_is_a_drift(plant: str) -> None:
         ]
 
 
+@pytest.mark.parametrize("seed", [8008, 8017])
+def test_a_slow_mode_that_inputs_drive_is_no_drift(seed: int) -> None:
+    """The model had the plant's slow pole, and its free run left the noise alone."""
+    rng = np.random.default_rng(seed)
+    pole, share = rng.uniform(0.9975, 0.9995), rng.uniform(0.1, 0.6)
+    n, held = int(rng.choice([1500, 3000])), int(rng.choice([30, 100]))
+    u = np.repeat(rng.choice([-1.0, 1.0], n // held + 1), held)[:n]
+    quick, slow = (scipy.signal.lfilter([0.0, 1.0 - p], [1.0, -p], u) for p in (0.6, pole))
+    y = share * quick + (1.0 - share) * slow
+    traces = sysid.data((u, y + 0.05 * y.std() * rng.standard_normal(n)), sample_time=1.0)
+    told = sysid.fit(traces, "u -> y", sysid.OE(nb=2, nf=2, nk=1), stability=UNASKED).warnings
+    assert not [one for one in told if "drifts" in one]
+
+
 def test_a_trend_is_a_line_or_a_jump_or_chance() -> None:
     noise = np.random.default_rng(2).standard_normal(400)
     assert trend_of(noise, 1.0) is None
