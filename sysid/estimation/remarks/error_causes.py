@@ -101,13 +101,13 @@ def _of_output(
     if aside:
         return [*told, aside]
     if kept:
-        groups = features(run.inputs[:, list(kept)], s, answers(model, run.inputs, place))
+        groups = features(run.inputs[:, list(kept)], s, answers(model, run.inputs, kept, place))
         found = _drift(groups, y, sound, name) or _nothing(model, (y, s), groups, sound).format(
             name=name, inputs=inputs
         )
         found = found or _of_inputs(groups, y - s, sound).format(name=name, inputs=inputs)
         if not found:
-            held = run.held(model)[:, model.mapping.outputs.index(name)]
+            held = run.held(model)[:, place]
             found = _of_beginning((y, s), held, sound).format(name=name, inputs=inputs)
         if found:
             return [*told, found]

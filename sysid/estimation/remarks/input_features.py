@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid.estimation.records.informative import STILL
 from sysid.kernels.linear import slowed
 from sysid.models import AbstractModel
 
@@ -74,29 +75,34 @@ def features(inputs: Array, simulated: Array, answered: Sequence[Array] = ()) ->
     return kinds
 
 
-def answers(model: AbstractModel, inputs: Array, output: int) -> list[Array]:
+def answers(model: AbstractModel, inputs: Array, kept: Sequence[int], output: int) -> list[Array]:
     """What a linear model makes of curves of its inputs: a curve before a resonance is no sum of slow filters.
 
     Args:
         model: The model; of one that is not linear, or remembers for ever, there are none.
-        inputs: Shape ``(n_samples, n_inputs)``; of many inputs the first are looked at.
+        inputs: Shape ``(n_samples, n_inputs)``.
+        kept: Places of those that move; of many the first are looked at.
         output: Place of the output.
 
     Returns:
-        For each input shape ``(n_samples, n_curves)``.
+        For each of them shape ``(n_samples, n_curves)``.
     """
     if model.pole_radius is None or not model.pole_radius < 1.0:
         return []
-    found = list[Array]()
-    for j in range(min(inputs.shape[1], MOST_INPUTS)):
-        runs = []
-        for bent in _curves((inputs[:, j] - inputs[:, j].mean()) / max(float(inputs[:, j].std()), TINY)).T:
-            moved = np.tile(inputs.mean(axis=0), (len(inputs), 1))
-            moved[:, j] += (bent - bent.mean()) * float(inputs[:, j].std())
-            run = model.simulate(moved).reshape(len(moved), -1)[:, output]
-            runs.append((run - run.mean()) / max(float(run.std()), TINY))
-        found.append(np.column_stack(runs))
+    found, held = list[Array](), np.tile(inputs.mean(axis=0), (len(inputs), 1))
+    for j in kept[:MOST_INPUTS]:
+        moved, size, runs = held.copy(), float(inputs[:, j].std()), list[Array]()
+        for bent in _curves((inputs[:, j] - held[:, j]) / size).T:
+            moved[:, j] = held[:, j] + (bent - bent.mean()) * size
+            runs.append(model.simulate(moved).reshape(len(moved), -1)[:, output])
+        # An input without effect gives no curve but rounding.
+        found += [np.column_stack([_one_wide(run) for run in runs])]
     return found
+
+
+def _one_wide(x: Array) -> Array:
+    spread = float(x.std())
+    return (x - x.mean()) / spread if spread > STILL * float(np.abs(x).max()) else np.zeros(len(x))
 
 
 def _late(x: Array, lag: int = 1) -> Array:
