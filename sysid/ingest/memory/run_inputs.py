@@ -13,6 +13,7 @@ from sysid.errors import ConfigError, TraceError
 from sysid.ingest.assembling.assemble import Wanted, assemble
 from sysid.ingest.assembling.in_units import stamps_in_seconds
 from sysid.ingest.assembling.timing import survey
+from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.memory.in_python import remedies_of_a_run
 from sysid.ingest.memory.memory_table import check_lengths, no_samples, table_of
 from sysid.ingest.tables.columns import RawColumn
@@ -124,7 +125,11 @@ def _of_columns(
         check_rows(values, where=where)
     elif table.time not in names and len(table) > 1:
         _check_step(_even_step(table), sample_time, where=where)
-    columns = [_in_unit(table.find(name), units.get(name, "1")) for name in names]
+    # A clock without a unit is in seconds; an input that is called as one, a torque t, is in its own.
+    said = {header.name: header.unit for header in map(parse_header, named)}
+    found = [table.find(name) for name in names]
+    found = [replace(one, unit=said.get(one.name)) if one.name == table.time else one for one in found]
+    columns = [_in_unit(one, units.get(name, "1")) for one, name in zip(found, names, strict=True)]
     return np.column_stack(columns) if names else np.zeros((len(table), 0))
 
 

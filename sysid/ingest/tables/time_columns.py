@@ -61,7 +61,7 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
     # How long a day is, or it rained, is in a unit of time too: by its unit alone is known what goes on like a clock.
     timed = [column for column in timed if column in named or _goes_on(column)]
     likely = [*plain, *clocks, *timed]
-    back = {column.name for column in likely if _goes_back(column)}
+    back = {one.name for one in likely if _goes_back(one) or (_has_other_unit(one) and not _goes_on(one))}
     found = next((column for column in likely if column.name not in back), None) or next(
         (column for column in likely if not _has_other_unit(column)), None
     )

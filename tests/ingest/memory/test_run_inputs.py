@@ -31,6 +31,13 @@ def test_inputs_are_told_by_their_names_without_units_and_by_their_clock() -> No
     assert_allclose(inputs_of(pd.DataFrame({"a": T}), ()).shape, (20, 0))
 
 
+@pytest.mark.parametrize("name", ["t", "time"])
+def test_an_input_that_is_called_as_time_is_has_its_own_unit(name: str) -> None:
+    """A surrogate with a torque t was searched for minutes, and could not be proven: N*m are no seconds."""
+    for u in ({name: U}, pd.DataFrame({name: U, "y": U}), {f"{name} [kN*m]": U / 1e3}):
+        assert_allclose(inputs_of(u, (name,), sample_time=0.5, units={name: "N*m"})[:, 0], U)
+
+
 @pytest.mark.parametrize("u", [U[:0], np.where(U > 2, np.nan, U), np.where(U > 2, np.inf, U), U * 1j, ["a", "b"]])
 def test_inputs_that_cannot_be_run_are_refused(u: Any) -> None:
     with pytest.raises(UserError) as caught:

@@ -103,6 +103,16 @@ def test_a_word_says_the_role(name: str, role: str | None) -> None:
     assert role_of(name) == role
 
 
+def test_a_torque_is_no_clock_whatever_it_is_called(tmp_path: Path) -> None:
+    """Held levels step back but now and then; they were taken for stamps, and sorted."""
+    torque = np.repeat(np.random.default_rng(0).uniform(-3.0, 3.0, 40), 10)
+    rows = "".join(f"{u},{2 * u}\n" for u in torque.tolist())
+    (tmp_path / "rig.csv").write_text("t [N*m],y [rad/s]\n" + rows)
+    table = read_table(tmp_path / "rig.csv")
+    assert table.time is None
+    np.testing.assert_array_equal(table.find("t").values, torque)
+
+
 def test_a_temperature_is_no_clock(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", T=20.0 + np.sin(LONG), u=LONG)
     assert read_table(tmp_path / "a.npz").time is None
