@@ -153,7 +153,7 @@ def first_row(split: Split, options: FileOptions) -> int:
     if split.labelled and all(split.has_its_numbers(row) for row in split.rows[:first]):
         return 0
     top = first
-    while top > 0 and _is_spoilt(split, top - 1):
+    while top > 0 and _is_spoilt(split, top - 1) and not _is_second_head(split, top - 1):
         top -= 1
     # Below a row of words only: what else stands above the numbers may have numbers in it, too.
     return top if 0 < top < first and _numbers_in(split, top - 1) == 0 else first
@@ -265,6 +265,14 @@ def _merged(run: Sequence[Kind], kinds: Sequence[Kind]) -> tuple[Kind, ...] | No
 def _is_spoilt(split: Split, index: int) -> bool:
     """Whether a row that does not fit is one of numbers with a bad cell."""
     return 2 * _numbers_in(split, index) >= sum(kind in DATA for kind in split.kinds)
+
+
+def _is_second_head(split: Split, index: int) -> bool:
+    """Whether a row says what tells names apart that stand twice above it, as heights do: a word stands over dates."""
+    cells = trimmed(split.rows[index].cells, split.width)
+    above = [cell.strip() for cell in split.rows[index - 1].cells] if index else []
+    over_dates = split.kinds[0] is Kind.TIME and len(cells) == split.width and kind_of(cells[0]) is Kind.WORD
+    return over_dates and len(above) == split.width and len(set(above)) < len(above)
 
 
 def _numbers_in(split: Split, index: int) -> int:

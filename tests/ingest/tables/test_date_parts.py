@@ -210,3 +210,10 @@ def test_the_number_of_a_station_is_no_date(tmp_path: Path, station: str) -> Non
     (tmp_path / "a.csv").write_text("station,y\n" + "".join(f"{station},{y}\n" for y in Y))
     (problem,) = (column.problem for column in inspect_file(tmp_path / "a.csv").columns if column.name == "station")
     assert problem == "the column holds words"
+
+
+def test_a_second_head_below_names_that_stand_twice_is_no_bad_row(tmp_path: Path) -> None:
+    lines = [f"{d.isoformat(' ')}+01:00,{y},{y + 1},{y + 2}" for d, y in stamps(HOUR, "2010-01-01")]
+    text = "\n".join(["variable_name,pressure,wind,wind", "height,0,10,80", *lines]) + "\n"
+    found, trace = read(tmp_path, text)
+    assert (found.samples, found.sample_time, len(trace.channels)) == (N, 3600.0, 3)
