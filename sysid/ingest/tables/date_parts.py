@@ -52,6 +52,8 @@ _CALENDARS = (
     ("year", "of_year", "digits"),
     ("year", "of_year", "hour"),
     ("year", "month", "day"),
+    ("month", "day", "hour", "minute"),
+    ("month", "day", "hour"),
 )
 """What columns beside one another may be, that nobody named; the longest first."""
 _EVEN, _VARY, _HALF_A_YEAR = 0.5, 2, 183.0
@@ -159,9 +161,12 @@ def _beside_one_another(table: RawTable) -> Iterator[Mapping[str, RawColumn]]:
     """Columns without names, beside one another, whose numbers may be those of dates."""
     columns = table.columns
     for start, first in enumerate(columns):
-        if not is_nameless(first.name) or first.problem is not None or not _fits(first.values, "year"):
+        if not is_nameless(first.name) or first.problem is not None:
             continue
-        for calendar in _CALENDARS:
+        # Without a year months have to go on, as what counts to 12 is common.
+        begins = [part for part in ("year", "month") if _fits(first.values, part)]
+        begins = [part for part in begins if part == "year" or np.ptp(first.values) > 0.0]
+        for calendar in (one for one in _CALENDARS if one[0] in begins):
             run = columns[start : start + len(calendar)]
             if len(run) == len(calendar) and all(is_nameless(c.name) and c.problem is None for c in run):
                 yield dict(zip(calendar, run, strict=True))
@@ -192,7 +197,12 @@ def _goes_on_evenly(stamps: NDArray[np.float64], parts: Mapping[str, RawColumn])
     # Hours and minutes in one number are two parts, where it does not just count.
     varying += "digits" in parts and len(np.unique(np.diff(parts["digits"].values))) > 1
     usual = float(np.median(steps))
-    return varying >= _VARY and float(np.mean(np.abs(steps - usual) <= 1e-3 * usual)) >= _EVEN
+    slots = steps / usual
+    # A signal in the place of minutes would leave steps that are no gaps.
+    nameless = any(is_nameless(column.name) for column in parts.values())
+    if nameless and (np.abs(slots - np.rint(slots)) > 1e-6 * slots).any():
+        return False
+    return varying >= _VARY and float(np.mean(np.abs(slots - 1.0) <= 1e-3)) >= _EVEN
 
 
 def _any_years(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -47,6 +47,10 @@ TABLES: dict[str, tuple[str, timedelta, str, Line]] = {
     "no names, a number before them, as the USGS": (
         "", DAY, "2000-01-20", lambda d, y: f"01022500 {d:%Y %m %d} {y}",
     ),
+    "no names and no year, as the German weather service": (
+        "", HOUR, "2023-01-30T01:00", lambda d, y: f"1 7 {d.month} {d.day} {d.hour or 24} {d.day % 9} {y}"
+        if d.hour else f"1 7 {(d - HOUR).month} {(d - HOUR).day} 24 {d.day % 9} {y}",
+    ),
     "no year": ("Month,Day,Hour,y", HOUR, "2023-12-30", lambda d, y: f"{d.month},{d.day},{d.hour},{y}"),
     "a typical year, of hours 1 to 24": (
         "Year,Month,Day,Hour,Minute,y", HOUR, "2023-01-30",
