@@ -20,6 +20,9 @@ from sysid.traces import Channel, Trace
 from sysid.units import Reference
 from sysid.written_units import plain_unit
 
+TAKEN = ("time", "usable")
+"""Names of columns that are no channels."""
+
 
 def write_trace(trace: Trace, path: str | Path) -> Path:
     """Write a trace to a file; its ending says which format.
@@ -160,7 +163,7 @@ def _check_name(channel: Channel, path: Path) -> None:
     reference = header.reference or Reference.NONE
     unit = plain_unit(channel.unit) or channel.unit  # what a header says as people do is read as pint writes it
     readable = (header.name, header.unit, reference) == (channel.name, unit, channel.reference)
-    if not readable or "\r" in channel.name or channel.name in {"time", "usable"}:
+    if not readable or "\r" in channel.name or channel.name in TAKEN:
         raise UserError(
             "a CSV header cannot hold this channel",
             where=f"{path}, channel {channel.name!r}",

@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from sysid.errors import UnitError
 from sysid.field_checks import FieldError
+from sysid.ingest.writers import TAKEN
 from sysid.units import Reference, check_unit, is_pressure
 from sysid.written_units import plain_unit
 
@@ -237,6 +238,12 @@ class ReferenceConfig(_Strict):
             raise FieldError(
                 f"{twice[0]} is named twice", expected="a name for each port", got=", ".join(names),
                 remedy="an input, a parameter, a constant or an output: say which it is",
+            )  # fmt: skip
+        taken = [name for name in names if name in TAKEN]
+        if taken:
+            raise FieldError(
+                f"{taken[0]} is what records call their own", expected=f"another name than {' and '.join(TAKEN)}",
+                got=taken[0], remedy="rename it in the reference, or leave it out",
             )  # fmt: skip
         renamed = [name for name, port in self.parameters.items() if port.variable is not None]
         if renamed and self.fmu is None:

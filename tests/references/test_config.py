@@ -30,3 +30,10 @@ def test_levels_say_how_far_a_port_goes() -> None:
     for port in ({}, {"levels": []}, {"levels": [1]}, {"levels": "012"}):
         with pytest.raises(ValueError, match=r"range|levels"):
             InputPort.model_validate(port)
+
+
+@pytest.mark.parametrize("name", ["time", "usable"])
+def test_a_port_that_records_cannot_name_is_refused_before_anything_is_run(name: str) -> None:
+    content = {"python": "a:b", "sample_time": 0.1, "inputs": {"u": {"unit": "V", "range": [0, 1]}}}
+    with pytest.raises(ValueError, match=f"{name} is what records call their own"):
+        ReferenceConfig.model_validate({**content, "outputs": {name: {"unit": "V"}}})
