@@ -4,3 +4,4 @@ from __future__ import annotations
 
 LABVIEW = "LabVIEW Measurement"
 NETCDF_3 = b"CDF"
+ZIP = b"PK\x03\x04"
