@@ -221,8 +221,10 @@ SAID: Final[dict[str, Words]] = {
         "Record ten times the settling time at least.",
     ),
     "settling.integrates": Words(
-        "A step of {who} does not settle: the plant integrates, its output stays wherever it is left.",
-        "Fit what adds up exactly: NSS with integrators: 1, whose free run does not drift as a pole near one makes it.",
+        "A step of {who} does not settle: as far as this record shows the plant integrates, its output stays wherever"
+        " it is left.",
+        "Fit what adds up exactly: NSS with integrators: 1, whose free run does not drift as a pole near one makes it."
+        " A mode much slower than the record is long looks the same: a longer one tells them apart.",
     ),
     "settling.never": Words(
         "A step of {who} does not settle within {lags_seconds:.3g} s.",
