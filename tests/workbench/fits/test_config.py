@@ -83,7 +83,7 @@ MISTAKES = [
     ),
     pytest.param("selection:", "selektion:", ["selektion", "did you mean selection?"], id="misspelt field at the top"),
     pytest.param("kind: ARX", "kind: ARXX", ["unknown kind", "did you mean ARX?"], id="unknown kind"),
-    pytest.param("kind: ARX, ", "", ["not a structure", "kind: one of ARX, NARX"], id="no kind"),
+    pytest.param("kind: ARX, ", "", ["not a structure", "kind: one of ARX, VectorARX, NARX"], id="no kind"),
     pytest.param("na: 1, ", "", ["lacks na", "add na: 2"], id="missing field of a structure"),
     pytest.param("nb: [2, 2]", "nb: two", ["orders of an ARX model", "two", "fits[0].structure"], id="text for orders"),
     pytest.param(
