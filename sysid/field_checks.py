@@ -115,11 +115,19 @@ _FORM = re.compile(r"(str|int|float|bool|none)$|[a-z-]+\[")
 
 _ELSEWHERE = {"detrend": ("drift",), "resample": ("grid",), "misdata": ("nan", "gaps"), "merge": ("cases",)}
 """What some fields are called in other tools, in small letters."""
-_FILTERS = ("filter", "prefilter", "idfilt", "focus", "weightingfilter", "lowpass", "highpass", "bandpass")
-_NO_FILTER = (
-    "no record is filtered: take a structure with a model of the noise (BJ), grid: {method: average}, or repairs: "
-    "{drift: ...} (docs/how/filters.md)"
-)
+_OTHERWISE = {
+    **dict.fromkeys(
+        ("filter", "prefilter", "idfilt", "focus", "weightingfilter", "lowpass", "highpass", "bandpass"),
+        "no record is filtered: take a structure with a model of the noise (BJ), grid: {method: average}, or repairs: "
+        "{drift: ...} (docs/how/filters.md)",
+    ),
+    **dict.fromkeys(
+        ("split", "train_size", "test_size", "validation_split"),
+        "parts of one file are cases of a data set: cases: {fit: {role: estimation, file: a.csv, rows: [1, 900]}, "
+        "unseen: {role: validation, file: a.csv, rows: [901, 1200]}}",
+    ),
+}
+"""What is done here in another way than by a field."""
 
 
 def _elsewhere(known: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -154,8 +162,9 @@ def _config_error(found: list[dict[str, Any]], model: type[BaseModel], origins: 
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, loc[:-1])
         what, expected, got = f"unknown field {loc[-1]!r}", f"one of {', '.join(known)}", str(loc[-1])
-        otherwise = _NO_FILTER if loc[-1] in _FILTERS else "remove it, or use one of the fields that are known"
-        remedy = did_you_mean(loc[-1], known if loc[-1] not in _FILTERS else (), otherwise, also=_elsewhere(known))
+        otherwise = _OTHERWISE.get(loc[-1])
+        rest = otherwise or "remove it, or use one of the fields that are known"
+        remedy = did_you_mean(loc[-1], () if otherwise else known, rest, also=_elsewhere(known))
     elif first["type"] == "missing":
         what, expected, got = (
             f"the field {loc[-1]!r} is missing",

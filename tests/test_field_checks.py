@@ -64,7 +64,12 @@ class Mended(BaseModel):
 
 @pytest.mark.parametrize(
     ("field", "remedy"),
-    [("detrend", "did you mean drift?"), ("filter", "no record is filtered"), ("focus", "no record is filtered")],
+    [
+        ("detrend", "did you mean drift?"),
+        ("filter", "no record is filtered"),
+        ("focus", "no record is filtered"),
+        ("split", "parts of one file are cases of a data set"),
+    ],
 )
 def test_a_word_of_another_tool_leads_to_what_there_is(field: str, remedy: str) -> None:
     """``filter`` was answered with jitter."""
