@@ -1,16 +1,18 @@
-"""Linear models of one output in other forms: an object of python-control, and the system in continuous time."""
+"""Linear models in other forms: an object of python-control, and the system in continuous time."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.models.contract.base import AbstractModel
+from sysid.models.contract.several_outputs import SeveralOutputs
 from sysid.models.converting.continuous import ContinuousStateSpace, rates
 from sysid.models.converting.realisation import Ratios, observer_row
-from sysid.models.converting.to_control import delayed, in_powers_of_z, transfer_function
+from sysid.models.converting.to_control import Matrices, delayed, in_powers_of_z, state_space, transfer_function
 
 
 class LinearForms(AbstractModel):
@@ -77,6 +79,34 @@ class LinearForms(AbstractModel):
         remedy = "fit fewer poles, or a transfer function with domain: continuous: such a pole mostly describes noise"
         A, B = rates(A, B, T, remedy=remedy)
         return ContinuousStateSpace(A=A, B=B, C=C, D=D, delays=tuple(delays), mapping=self.mapping)
+
+
+class VectorLinearForms(SeveralOutputs):
+    """A linear model of several outputs, which is a state space."""
+
+    @property
+    @abstractmethod
+    def matrices(self) -> Matrices:
+        """``A``, ``B``, ``C`` and ``D`` of the recursion that is run, in the channels' units."""
+
+    @abstractmethod
+    def continuous(self) -> ContinuousStateSpace:
+        """The continuous system whose samples the model gives when its inputs are held, as ``d2c`` by zoh."""
+
+    def to_control(self, *, continuous: bool = False, pade_order: int = 3) -> Any:
+        """The model as a ``control.StateSpace`` in the channels' units, from deviations to deviations.
+
+        Args:
+            continuous: Give the continuous form, not the discrete one.
+            pade_order: Order of the Padé approximation that stands for its dead times.
+
+        Returns:
+            The state space.
+
+        Raises:
+            ConfigError: If there is no continuous form.
+        """
+        return self.continuous().to_control(pade_order=pade_order) if continuous else state_space(self)
 
 
 def _check_inputs(model: AbstractModel) -> None:

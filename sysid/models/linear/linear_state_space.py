@@ -17,12 +17,11 @@ from sysid.models.channels.mapping import Mapping
 from sysid.models.channels.scaling import Scaling, VectorScaling, scaling_from_dict
 from sysid.models.contract.flat import as_many
 from sysid.models.contract.ratio import Ratio
-from sysid.models.contract.several_outputs import SeveralOutputs
 from sysid.models.converting.continuous import ContinuousStateSpace, rates
-from sysid.models.converting.to_control import Matrices, state_space
+from sysid.models.converting.to_control import Matrices
 from sysid.models.linear.innovation_moves import InnovationModel
 from sysid.models.linear.innovations import Innovations
-from sysid.models.linear.linear_forms import LinearForms
+from sysid.models.linear.linear_forms import LinearForms, VectorLinearForms
 from sysid.models.linear.state_space import Filter, StateSpace
 from sysid.models.linear.state_space_polynomials import polynomials
 from sysid.models.orders.lags import MOST, whole
@@ -305,7 +304,7 @@ class VectorStateSpace(LinearStateSpace):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VectorStateSpaceModel(_StateSpaceModel, SeveralOutputs):
+class VectorStateSpaceModel(_StateSpaceModel, VectorLinearForms):
     """A fitted state space of several outputs.
 
     Args:
@@ -338,18 +337,3 @@ class VectorStateSpaceModel(_StateSpaceModel, SeveralOutputs):
             for o, output in enumerate(self.mapping.outputs)
             for j, name in enumerate(self.mapping.inputs)
         }  # fmt: skip
-
-    def to_control(self, *, continuous: bool = False, pade_order: int = 3) -> Any:
-        """The model as a ``control.StateSpace`` in the channels' units, from deviations to deviations.
-
-        Args:
-            continuous: Give the continuous form, not the discrete one.
-            pade_order: Order of the Padé approximation that stands for its dead times.
-
-        Returns:
-            The state space.
-
-        Raises:
-            ConfigError: If there is no continuous form.
-        """
-        return self.continuous().to_control(pade_order=pade_order) if continuous else state_space(self)

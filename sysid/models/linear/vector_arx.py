@@ -15,16 +15,16 @@ from sysid.models.channels.mapping import Mapping
 from sysid.models.channels.scaling import VectorScaling
 from sysid.models.contract.flat import as_many
 from sysid.models.contract.ratio import Ratio
-from sysid.models.contract.several_outputs import SeveralOutputs
 from sysid.models.converting.continuous import ContinuousStateSpace, rates
-from sysid.models.converting.to_control import Matrices, state_space
+from sysid.models.converting.to_control import Matrices
 from sysid.models.lagged.vector_recursion import VectorRecursion
+from sysid.models.linear.linear_forms import VectorLinearForms
 from sysid.models.linear.polynomial_matrices import PolynomialMatrices
 from sysid.models.linear.vector_arx_orders import VectorARX
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VectorARXModel(SeveralOutputs):
+class VectorARXModel(VectorLinearForms):
     r"""A fitted ARX model of several outputs, in the channels' units.
 
     :math:`\hat y_t = d + \sum_k A_k y_{t-k} + \sum_k B_k u_{t-k}`. Note the sign: MATLAB's polynomial matrix
@@ -205,21 +205,6 @@ class VectorARXModel(SeveralOutputs):
         A, B = rates(A, B, self.sample_time, remedy=remedy)
         delays = tuple(k * self.sample_time for k in late)
         return ContinuousStateSpace(A=A, B=B, C=C, D=D, delays=delays, mapping=self.mapping)
-
-    def to_control(self, *, continuous: bool = False, pade_order: int = 3) -> Any:
-        """The model as a ``control.StateSpace`` in the channels' units, from deviations to deviations.
-
-        Args:
-            continuous: Give the continuous form, not the discrete one.
-            pade_order: Order of the Padé approximation that stands for its dead times.
-
-        Returns:
-            The state space.
-
-        Raises:
-            ConfigError: If there is no continuous form.
-        """
-        return self.continuous().to_control(pade_order=pade_order) if continuous else state_space(self)
 
     def _written(self) -> dict[str, Any]:
         return {"coefficients": self.coefficients.tolist(), "intercepts": self.intercepts.tolist()}
