@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import sys
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 
@@ -49,7 +50,7 @@ class CallableReference:
                 expected="a function of times, inputs and parameters", got=type(self.function).__name__,
                 remedy="name a function, or an object that can be called like one",
             )  # fmt: skip
-
+        _takes_three(self.function, str(config.python))
         self.beside = _beside(set(sys.modules) - before, Path(config.folder), self.function.__module__)
 
     @property
@@ -76,6 +77,25 @@ class CallableReference:
             where = f" ({Path(last.filename).name}, line {last.lineno})"
             raise RunError(f"it raised {type(error).__name__}{': ' + words if words else ''}{where}") from error
         return None, checked(values, self.config, len(inputs))
+
+
+def _takes_three(function: Callable[..., object], named: str) -> None:
+    """Refuse a function that cannot be called with times, inputs and parameters, before any run counts as failed."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # compiled code may say nothing of its arguments: the first run will
+        return
+    try:
+        signature.bind(None, None, None)
+    except TypeError:
+        name = named.rpartition(":")[2]
+        raise ConfigError(
+            "the function of the reference takes other arguments", where=f"python: {named}",
+            expected=f"{name}(time, inputs, parameters), with times (n,) in s, inputs (n, n_inputs) and parameters by "
+            "name, that gives outputs (n, n_outputs)",
+            got=f"{name}({', '.join(signature.parameters)})",
+            remedy=f"write a function of these three that calls {name}, and name that one",
+        ) from None  # fmt: skip
 
 
 def _imported(module: str, folder: Path) -> ModuleType:

@@ -270,6 +270,11 @@ def gives(time: Array, inputs: Array, parameters: Mapping[str, float]) -> object
     ][int(parameters["how"])]()
 
 
+def two_arguments(inputs: NDArray[np.float64], sample_time: float = 0.1) -> NDArray[np.float64]:
+    """What a user's own function looks like: no times, no parameters."""
+    return inputs * sample_time
+
+
 NO_FUNCTION = 3
 
 

@@ -95,6 +95,15 @@ def test_what_is_no_function_is_refused_in_words(tmp_path: Path) -> None:
         run(reference("NO_FUNCTION"), tmp_path, CASES)
 
 
+def test_a_function_of_other_arguments_is_refused_with_those_that_are_given(tmp_path: Path) -> None:
+    """It failed in every run, with Python's own words and the advice to run it by itself."""
+    with pytest.raises(ConfigError, match="takes other arguments") as caught:
+        run(reference("two_arguments"), tmp_path, CASES)
+    said = str(caught.value)
+    assert "two_arguments(time, inputs, parameters), with times (n,) in s, inputs (n, n_inputs)" in said
+    assert "two_arguments(inputs, sample_time)" in said
+
+
 def test_what_has_been_run_is_found_whether_it_gave_a_record_or_not(tmp_path: Path) -> None:
     config = reference("raises")
     made = run(config, tmp_path, CASES)
