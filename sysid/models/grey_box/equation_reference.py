@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import operator
 from collections.abc import Callable
 from collections.abc import Mapping as Dict
 from functools import partial
@@ -30,7 +31,7 @@ class EquationTwin:
         self.system = model.grey.system
         free = model.grey.free
         self.values = {one.name: one.start for one in model.grey.fixed} | {"pi": np.pi}
-        self.values |= {one.name: theta[i] for i, one in enumerate(free)}
+        self.values |= dict(zip((one.name for one in free), theta.tolist(), strict=False))  # Python's own are quicker
         self.weights = theta[len(free) :]
 
     def run(self, inputs: NDArray[np.float64], begin: Dict[str, complex]) -> NDArray[np.complex128]:
@@ -44,7 +45,6 @@ class EquationTwin:
             Shape ``(n_samples, n_outputs)``.
         """
         system, model = self.system, self.model
-        right = {one.name: one.right for one in system.equations}
         ahead, self.way = model.lowered.ahead, 0.0
         # Where inputs move, the state is that of one sample before the first, at which they stand.
         self.inputs = np.concatenate([inputs[:1], inputs]) if ahead else inputs
@@ -57,7 +57,7 @@ class EquationTwin:
         for _ in self.inputs:
             now = self._all(states)
             found.append([now[name] for name in model.mapping.outputs])
-            later = {name: self._of(right[name], now) for name in system.discrete}
+            later = {name: self.right[name] for name in system.discrete}
             remembered = dict(self.remembered)
             moving = np.array([states[n] for n in system.continuous], dtype=np.complex128)
 
@@ -65,10 +65,9 @@ class EquationTwin:
                 x: NDArray[np.complex128], behind: float, part: int, held: Dict[str, complex] = states
             ) -> NDArray[np.complex128]:
                 self.way = (part + behind) / steps
-                here = self._all({**held, **dict(zip(system.continuous, x, strict=True))})
-                found = np.array([self._of(right[n], here) for n in system.continuous], dtype=np.complex128)
+                self._all({**held, **dict(zip(system.continuous, x.tolist(), strict=True))})
                 self.way = 0.0
-                return found
+                return np.array([self.right[n] for n in system.continuous], dtype=np.complex128)
 
             for part in range(steps if system.continuous else 0):
                 method = _explicit if model.solver == RUNGE_KUTTA else _implicit
@@ -87,14 +86,14 @@ class EquationTwin:
         return complex(now + way * (later - now))
 
     def _all(self, states: Dict[str, complex]) -> dict[str, complex]:
-        """Everything that has a name, at some states."""
+        """Everything that has a name, at some states; aside, what each state moves to, or how fast."""
         self.remembered: dict[str, complex] = {}
         now = {**self.values, **states}
         now |= {name: self._input(name, len(self.past)) for name in self.model.mapping.inputs}
         for name in self.system.order:
             now[name] = self._of(self.system.definitions[name].right, now)
-        for one in self.system.equations:
-            self._of(one.right, now)  # so that all that remembers has been asked
+        moves = (one for one in self.system.equations if one.name not in self.system.definitions)
+        self.right = {one.name: self._of(one.right, now) for one in moves}
         return now
 
     def _of(self, node: Node, now: Dict[str, complex]) -> complex:
@@ -235,10 +234,19 @@ _FUNCTIONS: dict[str, Callable[..., complex]] = {
 def _operated(sign: str, a: list[complex]) -> complex:
     if len(a) == 1:
         return -a[0] if sign == "-" else 1.0 - a[0]
-    x, y = a
-    compared = {"<": x.real < y.real, "<=": x.real <= y.real, ">": x.real > y.real, ">=": x.real >= y.real}
-    if sign in compared:
-        return float(compared[sign])
-    if sign in {"and", "or"}:
-        return (min if sign == "and" else max)(x, y, key=_real)
-    return {"+": lambda: x + y, "-": lambda: x - y, "*": lambda: x * y, "/": lambda: x / y, "^": lambda: x**y}[sign]()
+    return _OPERATIONS[sign](*a)
+
+
+_OPERATIONS: dict[str, Callable[[complex, complex], complex]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "^": operator.pow,
+    "<": lambda x, y: float(x.real < y.real),
+    "<=": lambda x, y: float(x.real <= y.real),
+    ">": lambda x, y: float(x.real > y.real),
+    ">=": lambda x, y: float(x.real >= y.real),
+    "and": _by_real(min),
+    "or": _by_real(max),
+}
