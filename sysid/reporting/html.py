@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
@@ -44,6 +45,12 @@ def page_template(name: str) -> Template:
     Returns:
         The template.
     """
+    return _environment().get_template(name)
+
+
+@cache
+def _environment() -> Environment:
+    """One for all pages of a process, which then translates each template once."""
     environment = Environment(
         loader=PackageLoader("sysid.reporting"),
         autoescape=select_autoescape(["j2"], default=True),
@@ -58,7 +65,7 @@ def page_template(name: str) -> Template:
     environment.tests["table"] = lambda part: isinstance(part, Table)
     # Our own drawings; every text inside them was escaped where they were made.
     environment.filters["drawing"] = lambda part: Markup(part.svg)  # noqa: S704
-    return environment.get_template(name)
+    return environment
 
 
 def _shown(value: Any) -> Any:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
+from copy import deepcopy
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,9 @@ PACKAGES = ("numpy", "scipy", "numba", "torch", "onnx", "onnxruntime", "mlflow",
 def environment() -> dict[str, Any]:
     """Versions, processor and commit as JSON values.
 
+    They are looked up once in a process: what runs is what was imported then, whatever is installed or committed
+    meanwhile.
+
     Returns:
         ``sysid``, ``python``, ``packages``, ``cpu``, ``cores``, ``platform`` and ``commit`` (``None`` outside a
         checkout).
@@ -26,6 +31,11 @@ def environment() -> dict[str, Any]:
         >>> environment()["sysid"] == sysid.__version__
         True
     """
+    return deepcopy(_environment())
+
+
+@cache
+def _environment() -> dict[str, Any]:
     return {
         "sysid": sysid.__version__,
         "python": platform.python_version(),

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from jsonschema import validate
+from jsonschema import Draft202012Validator
 
 from sysid.content import content_folders
 from sysid.errors import ConfigError
@@ -93,7 +93,14 @@ def test_the_command_prints_what_is_read_as_the_same(tmp_path, capsys):
     assert refused.value.got == "kind: fits"
 
 
-def test_parameters_are_those_of_equations_and_limits_and_printed_as_the_same(tmp_path, capsys):
+@pytest.fixture(scope="module")
+def schema() -> Draft202012Validator:
+    found = AssemblyConfig.model_json_schema()
+    Draft202012Validator.check_schema(found)
+    return Draft202012Validator(found)
+
+
+def test_parameters_are_those_of_equations_and_limits_and_printed_as_the_same(tmp_path, capsys, schema):
     known = """\
 fixed:
   - unit: cm
@@ -107,7 +114,7 @@ fixed:
     given = config(tmp_path, text + known)
     assert given.composite.free == ("k", "on", "edge")
     assert [one.output for one in given.composite.fixed if one.free] == ["flow", "open", "lower high"]
-    validate(read_yaml(tmp_path / "tanks.yaml"), AssemblyConfig.model_json_schema())
+    schema.validate(read_yaml(tmp_path / "tanks.yaml"))
     equations_command(str(tmp_path / "tanks.yaml"))
     assert config(tmp_path, text + capsys.readouterr().out) == given
     named = text.replace("together:", "together:\n  members: [lower, flow, lower high]")
@@ -126,9 +133,9 @@ BUILT_IN = [
 
 
 @pytest.mark.parametrize("pipeline", BUILT_IN, ids=lambda one: one.stem)
-def test_what_is_built_in_is_written_by_equations_and_printed_as_the_same(tmp_path, pipeline):
+def test_what_is_built_in_is_written_by_equations_and_printed_as_the_same(tmp_path, pipeline, schema):
     assert all("equations" in one for one in read_yaml(pipeline)["fixed"])
-    validate(read_yaml(pipeline), AssemblyConfig.model_json_schema())
+    schema.validate(read_yaml(pipeline))
     data = read_joined(pipeline).data
     (tmp_path / "printed.yaml").write_text(equations_text(check(AssemblyConfig, data, where=pipeline).composite.fixed))
     assert check(AssemblyConfig, {**data, **read_joined(tmp_path / "printed.yaml").data}, where=pipeline) == check(
