@@ -9,7 +9,7 @@ from typing import Any
 from sysid.api.fits import Fit
 from sysid.api.given import ESTIMATED, TracesLike, check_order, path_of, traces_of
 from sysid.api.system_fit import SystemFit
-from sysid.estimation import FitResult, StabilityOptions, estimators
+from sysid.estimation import FitResult, StabilityOptions, estimators, fitting
 from sysid.estimation.estimator import Options
 from sysid.ingest import load_dataset
 from sysid.ingest.inspecting.undescribed import load_file
@@ -90,7 +90,7 @@ def fit(
     check_order(mapping, structure)
     mapped, start = Mapping.of(mapping), Start.of(start)
     estimators.estimator_of(structure)
-    estimators.check_given(initial, stability)
+    fitting.check_given(initial, stability)
     rest = levels_at_rest(rest_output, mapped.outputs)
     estimation, selection = traces.estimation, traces.with_role(Role.SELECTION)
     for trace in estimation:  # before the structure: "u1, u2" as one name would be told as orders that do not match
@@ -100,7 +100,7 @@ def fit(
     structure.check_records([one.name for one in estimation], traces.names, start)
     fits: list[Fit] = []
     for one in chosen:
-        found = estimators.fit(
+        found = fitting.fit(
             estimation,
             one,
             structure,

@@ -11,7 +11,7 @@ import numpy as np
 from sysid.api.fits import Fit
 from sysid.api.per_output import PerOutput, framed
 from sysid.errors import ConfigError
-from sysid.estimation import StabilityOptions, estimators
+from sysid.estimation import StabilityOptions, fitting
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.estimation.linear.state_space.orders import StateOrders
 from sysid.extras import need
@@ -107,7 +107,7 @@ class OrderSearch:
         # Those of the search were fitted by the dozen, and say nothing.
         checked = StabilityOptions() if isinstance(structure, ARX) else None
         estimation = self.traces.with_role(Role.ESTIMATION)
-        found = estimators.fit(estimation, self.mapping, structure, start=self.start, stability=checked)
+        found = fitting.fit(estimation, self.mapping, structure, start=self.start, stability=checked)
         return Fit.of(found, self.traces, self.start)
 
     @property

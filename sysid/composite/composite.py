@@ -14,7 +14,7 @@ from sysid.composite.fixed.limits import named_limits
 from sysid.composite.fixed.member import FixedMember, Standing, parameters_of
 from sysid.composite.parameters import check_names, declared
 from sysid.errors import ConfigError
-from sysid.estimation import StabilityOptions, Training, estimators
+from sysid.estimation import StabilityOptions, Training, estimators, fitting
 from sysid.models import NARX, AbstractStructure, Limit, Mapping
 from sysid.models.cascades.cascade_run import Level
 from sysid.models.grey_box.declared import Parameter
@@ -109,7 +109,7 @@ def _check_structure(mapping: Mapping, structure: AbstractStructure, training: T
             got=structure.kind,
             remedy=f"use the kind {estimators.JOINING[0]}",
         )
-    estimators.check(structure, mapping, training=training)
+    fitting.check(structure, mapping, training=training)
 
 
 @dataclass(frozen=True, kw_only=True)

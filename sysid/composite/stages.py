@@ -24,7 +24,7 @@ from sysid.composite.members import (
 )
 from sysid.composite.plan import OneStep
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult, Training, estimators
+from sysid.estimation import FitResult, Training, fitting
 from sysid.estimation.networks.initialise import Layout
 from sysid.estimation.networks.warm_start import grown, widened
 from sysid.estimation.results.result import Loop, Status
@@ -55,7 +55,7 @@ def fit_member(
     Returns:
         The fit, over the names of its first instance.
     """
-    return estimators.fit(
+    return fitting.fit(
         own_traces(member, traces[: member.traces]),
         member.mapping,
         member.structure,

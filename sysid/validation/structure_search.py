@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, UserError
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.linear.order_search import Criterion, OrderLosses, weighed
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import FitResult

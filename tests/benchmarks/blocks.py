@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.signal import lfilter
 
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.networks.training import Training
 from sysid.models import AbstractStructure, HammersteinWiener, Mapping, WienerHammerstein
 from sysid.traces import Channel, Trace

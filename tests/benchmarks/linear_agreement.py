@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.models import ARMAX, ARX, OE, AbstractStructure, VectorStateSpace
 from tests.benchmarks._findings import found
 from tests.benchmarks._linear_systems import THREE_STATES, impulse_response, same_estimate

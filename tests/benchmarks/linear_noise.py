@@ -25,7 +25,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sysid.estimation import StateSpaceTraining
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.search import search
 from sysid.kernels import linear as kernel

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation import StabilityOptions, Training
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.models import (
     ARX,
     NARX,

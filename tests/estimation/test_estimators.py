@@ -10,8 +10,9 @@ import pytest
 import scipy
 
 from sysid.errors import ConfigError
-from sysid.estimation import StabilityOptions, Status, Training, fit_arx
-from sysid.estimation.estimators import ESTIMATORS, JOINING, estimator_of, fit, with_stability
+from sysid.estimation import StabilityOptions, Training
+from sysid.estimation.estimators import ESTIMATORS, JOINING, estimator_of
+from sysid.estimation.fitting import fit
 from sysid.models import ARX, NARX, Mapping, NeuralStateSpace, Start
 from sysid.traces import Trace
 from tests.traces.made import trace_of
@@ -48,11 +49,6 @@ def test_a_structure_without_a_row_is_refused() -> None:
     assert "VectorNARX" in str(caught.value.expected)
 
 
-def test_a_structure_of_one_output_refuses_several() -> None:
-    with pytest.raises(ConfigError, match="an ARX model has one output"):
-        fit([trace()], Mapping.parse("u -> y+u2"), ARX(na=1, nb=1, nk=1))
-
-
 def test_a_row_says_what_its_function_knows() -> None:
     assert {kind for kind, row in ESTIMATORS.items() if row.selects} == {
         "GreyBox",
@@ -79,20 +75,6 @@ def test_a_row_says_what_its_function_knows() -> None:
         "VectorARX",
         "VectorSS",
     }
-
-
-@pytest.mark.parametrize(("pole", "status"), [(0.9, Status.EXACT), (1.05, Status.UNSTABLE)])
-def test_a_linear_fit_with_a_pole_outside_the_unit_circle_is_unstable(pole: float, status: Status) -> None:
-    assert fit([trace(pole)], MAPPING, ORDERS).status is status
-    alone = fit_arx([trace(pole)], MAPPING, ORDERS)
-    assert with_stability(alone, [trace(pole)], StabilityOptions()).status is status
-    assert with_stability(alone, [trace(pole)], None) is alone
-
-
-def test_an_initial_fit_at_another_sample_time_is_refused() -> None:
-    first = fit([replace(trace(), sample_time=1.0)], MAPPING, ORDERS)
-    with pytest.raises(ConfigError, match="the initial fit has another sample time"):
-        fit([trace()], MAPPING, NETWORK, Training(max_iterations=1), initial=first)
 
 
 def test_a_fit_without_intervals_says_which_reason_it_has() -> None:

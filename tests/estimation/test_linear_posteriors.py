@@ -11,7 +11,7 @@ import pytest
 import sysid
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import Posterior, StateSpaceTraining
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import Loop
 from sysid.models import ARMAX, ARX, LinearStateSpace, Mapping, Start, TransferFunction

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid.estimation import FitResult, Status
-from sysid.estimation.estimators import with_stability
+from sysid.estimation.fitting import with_stability
 from sysid.estimation.results.tolerance import outside, spans_of
 from sysid.models import AbstractModel
 from sysid.traces import Role, Trace

@@ -18,8 +18,8 @@ from pydantic import (
 from sysid.content import content_folders, nearest_file, nearest_name, what_to_do_with_data
 from sysid.errors import ConfigError, did_you_mean
 from sysid.estimation.estimator import Options
-from sysid.estimation.estimators import check as check_request
 from sysid.estimation.estimators import estimator_of
+from sysid.estimation.fitting import check as check_request
 from sysid.field_checks import FieldError
 from sysid.models import AbstractStructure
 from sysid.names import slug

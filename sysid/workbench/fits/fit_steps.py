@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.estimation import FitResult
-from sysid.estimation.estimators import seedless
+from sysid.estimation.fitting import seedless
 from sysid.export.exporters import wanted_formats
 from sysid.reporting.published.tables import read_published
 from sysid.reporting.results import Results, parse_results

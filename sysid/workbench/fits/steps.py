@@ -18,7 +18,7 @@ import numpy as np
 from sysid.advice import advise, looked_at
 from sysid.code_digest import code_digest
 from sysid.errors import ConfigError
-from sysid.estimation import FitProgress, FitResult, estimators
+from sysid.estimation import FitProgress, FitResult, fitting
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.grey_box.by_case import for_case
 from sysid.estimation.results.tolerance import spans_of
@@ -153,7 +153,7 @@ def fit_traces(
         ConfigError: If what is asked does not go together.
     """
     fit.structure.check_records([trace.name for trace in data.estimation], data.traces.names, config.start)
-    return estimators.fit(
+    return fitting.fit(
         data.estimation,
         config.mapping,
         fit.structure,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sysid.composite.growth import in_rounds, worst_of
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult, StabilityOptions, Training, estimators
+from sysid.estimation import FitResult, StabilityOptions, Training, fitting
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.results.tolerance import outside, spans_of
 from sysid.models import Start
@@ -286,7 +286,7 @@ class Grower:
             return read_fit(place)
         if row.training is Training and self.seconds is not None:
             given["max_time_s"] = max(1.0, self.seconds / (2.0 * self.config.rounds * len(self.outputs)))
-        found = estimators.fit(
+        found = fitting.fit(
             traces.with_role(Role.ESTIMATION), model.mapping, model.structure,
             row.options(given or None, seed=seed) if row.training is not None else None,
             start=Start(), rest_output=dict(self.rest), selection=traces.with_role(Role.SELECTION), initial=initial,

@@ -12,7 +12,8 @@ import numpy as np
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status, Training
-from sysid.estimation.estimators import estimator_of, with_stability
+from sysid.estimation.estimators import estimator_of
+from sysid.estimation.fitting import with_stability
 from sysid.estimation.networks.starts.choosing import VETTED
 from sysid.reporting.sweep_record import Trial
 from sysid.traces import Role, Trace

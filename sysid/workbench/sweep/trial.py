@@ -17,7 +17,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sysid.errors import SysidError
-from sysid.estimation import FitProgress, FitResult, StabilityOptions, Training, estimators
+from sysid.estimation import FitProgress, FitResult, StabilityOptions, Training, fitting
 from sysid.estimation.clock import processor_time
 from sysid.estimation.estimator import Estimator, Options
 from sysid.estimation.estimators import ESTIMATORS, estimator_of
@@ -289,7 +289,7 @@ def train(
     found: list[tuple[FitResult, Checkpoint | None]] = []
     for number, model in enumerate(models):
         kept: list[Checkpoint] = []
-        result = estimators.fit(
+        result = fitting.fit(
             data.estimation,
             model.config.mapping,
             model.fit.structure,

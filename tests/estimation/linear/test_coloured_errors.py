@@ -5,7 +5,7 @@ import pytest
 from scipy import linalg, signal
 
 from sysid.estimation import FitResult, TransferFunctionTraining
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.linear.coloured_errors import colour, information, sandwich
 from sysid.models import OE, AbstractStructure, LinearStateSpace, Mapping, Start, TransferFunction
 from sysid.traces import Channel, Trace

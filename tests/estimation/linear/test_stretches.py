@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.linear import transfer_function
 from sysid.estimation.linear.polynomial import fit as polynomial
 from sysid.estimation.linear.stretches import KEPT, LONG, SHORTEST, stretches

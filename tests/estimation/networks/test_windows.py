@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sysid.errors import ConfigError
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.networks.training import Training
 from sysid.estimation.networks.windows import COUNT, LONG, SAMPLES, Windows
 from sysid.estimation.records.experiment import Experiment

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from sysid.errors import TraceError
 from sysid.estimation import Loop, Training, fit_arx, fit_narx
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.linear.instrumental import fit_iv4
 from sysid.estimation.linear.order_search import OrderGrid, search_orders
 from sysid.estimation.records.experiment import Experiment

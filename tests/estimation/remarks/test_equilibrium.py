@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid.estimation import StabilityOptions, Status, Training
-from sysid.estimation.estimators import fit
+from sysid.estimation.fitting import fit
 from sysid.estimation.remarks.equilibrium import equilibrium_notes
 from sysid.models import (
     ARX,

@@ -17,7 +17,7 @@ import pytest
 
 import sysid
 from sysid.errors import ConfigError
-from sysid.estimation import estimators
+from sysid.estimation import fitting
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.ingest import write_csv
 from sysid.reporting.results import read_results
@@ -86,7 +86,7 @@ def test_a_last_fit_is_judged_by_the_traces_on_which_it_leaves_the_tolerance(kno
     structure = sysid.ARX(na=1, nb=(1,), nk=(1,))
     config = AutoConfig(**FIELDS).sweep(structure).pipeline([FitConfig(name="lag", structure=structure)])
     judging = [record(f"bent {bend:g}", 80, seed=2, bend=bend) for bend in (0.01, 3.0)]
-    fit = estimators.fit([record("a", 150, bend=0.01)], config.mapping, structure, start=config.start)
+    fit = fitting.fit([record("a", 150, bend=0.01)], config.mapping, structure, start=config.start)
     free, plain = _error(fit, judging, config, None), _error(fit, judging, config, 0.01)
     assert free == (0, plain[1])
     assert plain[0] == 1

@@ -97,7 +97,7 @@ def test_what_a_killed_growth_has_trained_is_found(
     def refuse(*_: object, **__: object) -> FitResult:
         raise AssertionError("trained twice")
 
-    monkeypatch.setattr("sysid.workbench.surrogates.grow.estimators.fit", refuse)
+    monkeypatch.setattr("sysid.workbench.surrogates.grow.fitting.fit", refuse)
     again = replace(grower, _rows=[], _ran=0).grow([started[1]])
     same = [(one.how, one.fitted, one.error) for one in again.record.rounds]
     assert same == [(one.how, one.fitted, one.error) for one in grown.record.rounds]
