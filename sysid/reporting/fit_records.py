@@ -154,7 +154,7 @@ class StabilityRecord(Record):
     judged: int = Field(description="How many had a plateau to settle on.")
     unsettled: int = Field(description="How many of those settled elsewhere.")
     apart: int = Field(
-        default=0, description="On how many of the first hundred it hangs on where it began; 0 where that is few."
+        default=0, description="On how many of a hundred it hangs on where it began; 0 where that is few."
     )
     tolerance: Number = Field(
         description="How far from its plateau a run may settle, as a share of the output's range."

@@ -9,18 +9,16 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sysid.errors import ConfigError, TraceError, shortened
 from sysid.estimation.clock import now
-from sysid.estimation.linear.arx import fit_arx
 from sysid.estimation.results.result import NOT_STABLE, FitResult, Loop, Status
 from sysid.estimation.stability.beginnings import TWICE, Beginnings
 from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import SEED, SEQUENCES, TOLERANCE, Run, Stability, check_stability
-from sysid.estimation.stability.sequences import AbstractSequences, InputSequence, TraceSequences
-from sysid.models import ARX, AbstractModel, Mapping, Start, StartKind, beginning
+from sysid.estimation.stability.linear_stand_in import GROWTH, linear_stand_in
+from sysid.estimation.stability.other_commands import OtherCommands
+from sysid.estimation.stability.sequences import AbstractSequences, TraceSequences
+from sysid.models import AbstractModel, Mapping
 from sysid.models.orders.lags import whole
 from sysid.models.orders.typed_fields import TypedFields
 from sysid.traces import Trace
@@ -28,15 +26,8 @@ from sysid.traces import Trace
 STILL_S = 20.0
 """Seconds for which a declared sequence's output has to stand still before it is judged."""
 
-GROWTH = 1e-6
-"""By how much a pole's magnitude may exceed 1: an integrator that is estimated has a pole at 1 but for rounding and
-noise, and a free run of 100,000 samples is then off by a tenth at most."""
-
 LEAST_S, TIME_SHARE = 60.0, 1.0
 """Seconds that a check may take whatever its fit took, and share of the fit's time that it may take beyond these."""
-
-FOLLOWS = 0.1
-"""Share of an output that a linear model may leave and still say where the recorded system would go."""
 
 Vet = Callable[[AbstractModel], bool]
 """Whether a model's free run is stable."""
@@ -283,6 +274,18 @@ class FreeRunCheck(AbstractStabilityCheck):
         self.reasons.add(NOT_STABLE)
         return False
 
+    def apart(self, model: AbstractModel) -> int:
+        """On how many commands a model's free run hangs on where it began.
+
+        Args:
+            model: The model.
+
+        Returns:
+            The number; 0 where nothing is asked.
+        """
+        found = self.finding(model)
+        return 0 if found is None or found.beginnings is None else found.beginnings.apart
+
     @property
     def refusal(self) -> str:
         """Why candidates were refused, in words."""
@@ -301,33 +304,16 @@ class FreeRunCheck(AbstractStabilityCheck):
         return replace(fit, status=status, stability=found.to_dict(), attempts=attempts, notes=notes, warnings=warnings)
 
     @cached_property
+    def commands(self) -> OtherCommands | None:
+        """What the system may be asked next, over which a run is to forget where it began; of what is recorded."""
+        if self.mapping is None:
+            return None
+        return OtherCommands.of(self.estimation, self.mapping.inputs, self.mapping.outputs)
+
+    @cached_property
     def reference(self) -> Run | None:
-        """Stable linear models that follow the estimation traces, one an output, as one run over a sequence.
-
-        ``None`` where an output has none, or none is asked.
-        """
-        found = [self._linear(mapping) for mapping in self.mapping.each] if self.mapping else []
-        models = [one for one in found if one is not None]
-        if not models or len(models) < len(found):
-            return None
-
-        def run(sequence: InputSequence) -> NDArray[np.float64]:
-            past = (sequence.history(several=False, output=j) for j in range(len(models)))
-            return np.column_stack([m.simulate(sequence.inputs, h) for m, h in zip(models, past, strict=True)])
-
-        return run
-
-    def _linear(self, mapping: Mapping) -> AbstractModel | None:
-        """A stable linear model of one output that follows the estimation traces; ``None`` where there is none."""
-        m = len(mapping.inputs)
-        start = Start(kind=StartKind.ESTIMATED)
-        try:
-            found = fit_arx(self.estimation, mapping, ARX(na=2, nb=(2,) * m, nk=(0,) * m), start=start).model
-        except TraceError:
-            return None
-        if found.pole_radius is None or found.pole_radius > 1.0 + GROWTH:
-            return None
-        return found if all(_follows(found, trace, start) for trace in self.estimation) else None
+        """Linear models that follow the estimation traces; ``None`` where there are none, or none is asked."""
+        return linear_stand_in(self.estimation, self.mapping) if self.mapping else None
 
     def finding(self, model: AbstractModel, *, trained_s: float = 0.0) -> Stability | None:
         """What the sequences say of a model.
@@ -346,26 +332,10 @@ class FreeRunCheck(AbstractStabilityCheck):
             with self.clock.left(asked.time_share, trained_s) as seconds:
                 found = check_stability(
                     model, self.source, tolerance=asked.tolerance, count=asked.count, seed=asked.seed,
-                    reference=lambda: self.reference, seconds=seconds,
+                    reference=lambda: self.reference, seconds=seconds, commands=self.commands,
                 )  # fmt: skip
             self.found[id(model)] = (model, found)
         return self.found[id(model)][1]
-
-
-def _follows(model: AbstractModel, trace: Trace, start: Start) -> bool:
-    """Whether the free run of a model leaves no more than :data:`FOLLOWS` of a record's output."""
-    inputs, output, usable = (
-        trace.columns(model.mapping.inputs),
-        trace[model.mapping.output],
-        trace.usable_of(model.mapping.channels),
-    )
-    begun = beginning(model, inputs, output, start, usable)
-    run, counted = model.simulate(inputs[begun.first :], begun.history), usable[begun.first :]
-    if not counted.any():
-        return False
-    target = output[begun.first :][counted]
-    error = float(np.linalg.norm(run[counted] - target))
-    return error <= FOLLOWS * float(np.linalg.norm(target - target.mean()))
 
 
 def _unchecked(fit: FitResult) -> FitResult:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
-from sysid.estimation.stability.beginnings import TWICE, Beginnings, compare_beginnings
+from sysid.estimation.stability.beginnings import TWICE, Beginnings, Begun, compare_beginnings
 from sysid.estimation.stability.sequences import AbstractSequences, InputSequence
 from sysid.models import AbstractModel, Beginning, Start, StartKind, beginning
 from sysid.names import csv_cell
@@ -164,6 +164,7 @@ def check_stability(
     tolerance: float = TOLERANCE,
     reference: Callable[[], Run | None] = lambda: None,
     seconds: float = math.inf,
+    commands: AbstractSequences | None = None,
 ) -> Stability:
     """Run a model over random sequences and see whether it stays bounded and settles where it should.
 
@@ -177,6 +178,7 @@ def check_stability(
             bounds or does not settle: a sequence on which these do the same says nothing. A sequence asks for more than
             was recorded, or a slow system is not back at its plateau by then.
         seconds: Wall time after which no further sequence is begun; the first :data:`FEWEST` always are.
+        commands: Sequences over which it is asked whether the run forgets where it began; by default the same.
 
     Returns:
         What was found, and on how many sequences where the time ended before all were run.
@@ -202,12 +204,17 @@ def check_stability(
     unbounded = judged = unsettled = drawn = further = 0
     largest = np.nan
     worst: tuple[tuple[bool, float], InputSequence, NDArray[np.float64]] | None = None
-    begun: list[tuple[InputSequence, NDArray[np.float64]]] = []
+    begun: list[Begun] = []
     runs = partial(free_runs, model, within=(low, high))
+
+    def again() -> list[Begun]:
+        drawn_again = () if commands is None else commands.draw(min(drawn, TWICE), seed)
+        return [(one, output.reshape(len(one.inputs), -1)) for one, output in runs(drawn_again)]
+
     for sequence, output in runs(_in_time(sequences.draw(count, seed), until)):
         drawn += 1
         outputs = output.reshape(len(sequence.inputs), -1)
-        begun += [(sequence, outputs)] if drawn <= TWICE else []
+        begun += [(sequence, outputs)] if commands is None and drawn <= TWICE else []
         lost, error = _lost(outputs, low, high), _away(outputs, sequence, width)
         if (lost or error > tolerance) and _says_nothing(sequence, reference(), (low, high), tolerance, lost=lost):
             further += 1
@@ -239,7 +246,7 @@ def check_stability(
         beyond=further,
         asked=sequences.available(count),
         # What runs away is not asked whether it forgets.
-        beginnings=None if unbounded or unsettled else compare_beginnings(runs, begun, width),
+        beginnings=None if unbounded or unsettled else compare_beginnings(runs, begun or again(), width),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from sysid.estimation import FitResult, Status
 from sysid.estimation.fitting import with_stability
+from sysid.estimation.networks.starts.choosing import NEAR
 from sysid.estimation.results.tolerance import outside, spans_of
 from sysid.models import AbstractModel
 from sysid.traces import Role, Trace
@@ -18,7 +19,6 @@ from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig, PipelineConfig
 from sysid.workbench.fits.data import Data
 from sysid.workbench.runner.steps import Work
-from sysid.workbench.sweep.checks import NEAR
 
 BETTER, KEPT = (
     "Fitted once more, to all of the record, after it was chosen on a part of it.",

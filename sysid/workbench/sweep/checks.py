@@ -14,7 +14,7 @@ from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Loop, Status, Training
 from sysid.estimation.estimators import estimator_of
 from sysid.estimation.fitting import with_stability
-from sysid.estimation.networks.starts.choosing import VETTED
+from sysid.estimation.networks.starts.choosing import NEAR, VETTED
 from sysid.reporting.sweep_record import Trial
 from sysid.traces import Role, Trace
 from sysid.workbench.fits.fit_steps import GivenFit
@@ -26,9 +26,6 @@ from sysid.workbench.sweep.trial import Bench, fit_of, stored_models, train
 
 if TYPE_CHECKING:
     from sysid.estimation.networks.posterior import Posterior
-
-NEAR = 0.2
-"""Share of its error by which a fit that forgets where it began may be worse than one that does not."""
 
 FOLDER = "checked"
 """Beside the trials: those whose free run was checked."""

@@ -13,6 +13,7 @@ from sysid.estimation.stability.beginnings import Beginnings, compare_beginnings
 from sysid.estimation.stability.check import FreeRunCheck
 from sysid.estimation.stability.excursions import Excursions
 from sysid.estimation.stability.free_run import Run, check_stability
+from sysid.estimation.stability.other_commands import OtherCommands
 from sysid.estimation.stability.sequences import InputSequence
 from sysid.models import ARX, ARXModel, Mapping
 from sysid.traces import Trace
@@ -56,6 +57,31 @@ def test_a_run_that_swings_by_itself_does_not_forget_where_it_began(run: Run | A
     assert found.beginnings.sequences == 100
     assert found.forgets is forgets
     assert found.to_dict().get("apart", 0) == (0 if forgets else found.beginnings.apart)
+
+
+def test_a_run_is_asked_over_commands_in_another_order_than_the_record_had() -> None:
+    """Passages that match where the one before ended pass by what the record does not: a run had a second place to
+    stand, and was 300 % off on new commands, with one excursion in a hundred that showed it."""
+    record = trace_of({"u": np.repeat([0.0, 1.0, 2.0, 1.0], 100), "y": np.zeros(400)}, sample_time=0.5)
+
+    def latched(sequence: InputSequence) -> np.ndarray:
+        """Follows what is recorded, and stays wherever it once goes up by two at once."""
+        up = np.diff(sequence.inputs[:, 0], prepend=sequence.inputs[0, 0]) > 1.5
+        return np.maximum.accumulate(up).astype(np.float64)
+
+    excursions, commands = Excursions.of([record], ["u"], ["y"]), OtherCommands.of([record], ["u"], ["y"])
+    assert check_stability(latched, excursions, count=100).forgets
+    found = check_stability(latched, excursions, count=100, commands=commands)
+    assert not found.forgets
+    assert found.beginnings is not None
+    assert found.beginnings.sequences == 100
+
+
+def test_a_check_of_records_asks_commands_of_them() -> None:
+    found = FreeRunCheck.of(StabilityOptions(count=20), MAPPING, [record()])
+    assert found.commands is not None
+    assert found.apart(model()) == 0
+    assert FreeRunCheck.of(StabilityOptions(sequences=(record(),)), MAPPING, []).commands is None
 
 
 @pytest.mark.parametrize("far", [1e200, np.inf, np.nan])

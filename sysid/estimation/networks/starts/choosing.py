@@ -1,4 +1,8 @@
-"""The choice between the candidates of a multistart: by selection traces or evidence, and only what is stable."""
+"""The choice between the candidates of a multistart: by selection traces or evidence, and only what is stable.
+
+Of those alike one is taken that forgets where it began: of a record without noise, starts that all follow it to a
+hundredth differ in what they do beyond it, and one that does not forget has a second place to stand there.
+"""
 
 from __future__ import annotations
 
@@ -43,6 +47,12 @@ LOOKS = 2
 """Of them how many may be looks at the same start: what runs away at one look mostly does at the next."""
 
 
+NEAR = 0.2
+"""Share of its error by which a model that forgets where it began may be worse than one that does not."""
+EXACT = 1e-2
+"""Root mean square of a scaled output, within which two fits follow their record as well as anybody asks."""
+
+
 def refusal(vet: Callable[[Network], bool] | None) -> str:
     """Why candidates were refused, in words.
 
@@ -64,12 +74,14 @@ class Choice:
         stable: Of each candidate, whether its free run was found stable; ``None`` where it was not looked at.
         by: As for :func:`rank`.
         refusal: Why some were refused, in words.
+        forgetful: Whether it was taken in place of one alike that hangs on where it began.
     """
 
     chosen: Candidate
     stable: tuple[bool | None, ...]
     by: str
     refusal: str = NOT_STABLE
+    forgetful: bool = False
 
     @property
     def by_selection(self) -> bool:
@@ -95,14 +107,40 @@ def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Netwo
     """
     order = sorted(range(len(candidates)), key=lambda i: rank(candidates[i], choose_by))
     found: dict[int, bool] = {}
+    forgetful = None
     if vet is not None:
-        for i in _few_of_each(candidates, order)[:VETTED]:
+        looked = _few_of_each(candidates, order)[:VETTED]
+        for place, i in enumerate(looked):
             found[i] = vet(candidates[i].model)
             if found[i]:
+                forgetful = _one_that_forgets(candidates, looked[place:], choose_by, vet)
                 break
-    chosen = next((i for i, stable in found.items() if stable), order[0])
+    if forgetful is not None:
+        found[forgetful] = True
+    chosen = next((i for i, stable in found.items() if stable), order[0]) if forgetful is None else forgetful
     stable = tuple(found.get(i) for i in range(len(candidates)))
-    return Choice(chosen=candidates[chosen], stable=stable, by=choose_by, refusal=refusal(vet))
+    return Choice(
+        chosen=candidates[chosen], stable=stable, by=choose_by, refusal=refusal(vet), forgetful=forgetful is not None
+    )
+
+
+def _one_that_forgets(
+    candidates: Sequence[Candidate], places: Sequence[int], choose_by: str, vet: Callable[[Network], bool]
+) -> int | None:
+    """Of stable candidates alike the first that forgets where it began, if the first of all does not.
+
+    Where most of them do not, the system itself may integrate or lock.
+    """
+    apart: Callable[[Network], int] | None = getattr(vet, "apart", None)
+    first = places[0]
+    if apart is None or not apart(candidates[first].model):
+        return None
+    scored = choose_by != "evidence" and np.isfinite(candidates[first].score)
+    error = {i: candidates[i].score if scored else candidates[i].solution.curve[-1].mse for i in places}
+    limit = max((1.0 + NEAR) ** 2 * error[first], 0.0 if scored else EXACT**2)
+    near = [i for i in places if candidates[i].solution.status.usable and error[i] <= limit]
+    forget = [i for i in near if vet(candidates[i].model) and not apart(candidates[i].model)]
+    return forget[0] if 2 * len(forget) >= len(near) else None
 
 
 def _few_of_each(candidates: Sequence[Candidate], order: Sequence[int]) -> list[int]:

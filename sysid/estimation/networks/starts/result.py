@@ -195,4 +195,8 @@ def _notes(choice: Choice, candidates: Sequence[starts.Candidate], training: Tra
     refused = sum(stable is False for stable in choice.stable)
     if refused and any(choice.stable):
         notes.append(f"{refused} that ranked higher were passed over: {choice.refusal}.")
+    if choice.forgetful:
+        notes.append(
+            "It was taken in place of one that follows the record as well: what that puts out hangs on where it began."
+        )
     return tuple(notes)
