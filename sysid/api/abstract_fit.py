@@ -19,18 +19,8 @@ if TYPE_CHECKING:
     from sysid.traces import TraceSet
 
 
-class AbstractFit(ABC):
-    """A fit with the data that it was made of; the models of several outputs answer all at once."""
-
-    if TYPE_CHECKING:  # fields of the dataclasses below
-
-        @property
-        def traces(self) -> TraceSet:
-            """The data set."""
-
-        @property
-        def start(self) -> Start:
-            """How each free run begins where nothing else is said."""
+class AbstractResponses(ABC):
+    """A fit that says what it is, and answers to steps and to sines where it is linear."""
 
     @abstractmethod
     def summary(self) -> str:
@@ -81,6 +71,23 @@ class AbstractFit(ABC):
 
         return poles(self)
 
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+
+class AbstractFit(AbstractResponses):
+    """A fit with the data that it was made of; the models of several outputs answer all at once."""
+
+    if TYPE_CHECKING:  # fields of the dataclasses below
+
+        @property
+        def traces(self) -> TraceSet:
+            """The data set."""
+
+        @property
+        def start(self) -> Start:
+            """How each free run begins where nothing else is said."""
+
     def plot(self, traces: TraceSet | None = None) -> Figure:
         """Its free run over the measured output, case by case.
 
@@ -115,6 +122,3 @@ class AbstractFit(ABC):
 
         fit: Any = self
         return save(fit, self.traces if traces is None else traces, folder, formats=formats, start=self.start)
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"

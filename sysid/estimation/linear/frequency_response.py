@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.state import Iteration
+from sysid.estimation.linear.integrators import all_at_one, with_integrators
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import scattered, sections_of, stabilised
-from sysid.estimation.linear.sanathanan_koerner import sk_poles
+from sysid.estimation.linear.sanathanan_koerner import MAX_ITERATIONS, sk_poles
 from sysid.estimation.linear.spectral_record import SpectralRecord
 from sysid.estimation.linear.transfer_function_problem import AbstractProblem
+from sysid.estimation.linear.transfer_function_runs import End, tried
 from sysid.estimation.linear.transfer_function_search import solve
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
@@ -93,6 +95,15 @@ class Spectrum:
         )
 
 
+FAR_BELOW = 0.2
+"""Of the lowest frequency, below which a pole is asked about, whether it is that of an integrator."""
+FEW_STEPS = 6
+"""Sanathanan-Koerner iterations by which dead times are told apart."""
+PERIODS, SCANNED = 50.0, 4
+"""Of the highest frequency, up to which dead times are scanned; and scanned dead times in each of these, as many as
+tell a turn from none."""
+
+
 def _ignore(_: Iteration) -> None:
     """The callback of those who do not watch."""
 
@@ -130,7 +141,7 @@ def fit_spectra(
 
     Raises:
         ConfigError: If the orders do not fit the inputs.
-        TraceError: If the orders do not fit the data.
+        TraceError: If the orders do not fit the data, or a frequency is beyond half the rate of a discrete model.
         FitDivergedError: If no start gives a finite model.
     """
     m = len(mapping.inputs)
@@ -143,6 +154,7 @@ def fit_spectra(
             f"{'an' if orders.intercept else 'no'} intercept",
             remedy="set intercept: false, and give one input column for each input",
         )
+    _check_nyquist(spectra, orders, sample_time)
     largest = [max(float(np.abs(s.inputs[:, j]).max()) for s in spectra) or 1.0 for j in range(m)]
     scale = max(float(np.abs(s.output).max()) for s in spectra) or 1.0
     problem = _Problem(
@@ -159,6 +171,18 @@ def fit_spectra(
         ),
     )
     return solve(problem, began, on_iteration, None)
+
+
+def _check_nyquist(spectra: Sequence[Spectrum], orders: TransferFunction, sample_time: float) -> None:
+    """Refuse frequencies at which a discrete model repeats what it does at others."""
+    highest, half = max(float(s.frequency.max()) for s in spectra), np.pi / sample_time
+    if orders.domain is Domain.DISCRETE and highest > half * (1.0 + 1e-9):
+        raise TraceError(
+            "a discrete transfer function has no response beyond half of its sampling rate",
+            expected=f"frequencies up to {half:.6g} rad/s, as the sample time is {sample_time:g} s",
+            got=f"up to {highest:.6g} rad/s",
+            remedy=f"leave these out, take a sample time of {np.pi / highest:.3g} s or less, or domain: continuous",
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -193,23 +217,83 @@ class _Problem(AbstractProblem):
         alone: bool = True,  # noqa: ARG002 - none of them takes long
     ) -> list[PoleStart]:
         """Sanathanan-Koerner iterations from scattered poles, and some of these as they are; see the base class."""
-        training, domain = self.training, self.orders.domain
-        records = [record for record in provider.records if isinstance(record, SpectralRecord)]
-        rng = np.random.default_rng(training.seed)
-        starts = []
-        for k in range(1 if few else 1 + training.scattered_starts):
-            first = tuple(self._scattered(n, rng) for n in self.orders.poles)
-            found = tuple(self._sk(records, j, poles) for j, poles in enumerate(first))
+        domain, starts = self.orders.domain, []
+        for k, first in enumerate(self._scattered_poles(1 if few else 1 + self.training.scattered_starts), start=1):
+            found = tuple(self._sk(provider, j, poles) for j, poles in enumerate(first))
             plain = tuple(sections_of(stabilised(poles, domain), domain) for poles in first)
-            starts.append(PoleStart(name=f"Sanathanan-Koerner from scattered poles {k + 1}", sections=found))
-            if k:
-                starts.append(PoleStart(name=f"scattered poles {k + 1}", sections=plain))
+            starts.append(PoleStart(name=f"Sanathanan-Koerner from scattered poles {k}", sections=found))
+            if k > 1:
+                starts.append(PoleStart(name=f"scattered poles {k}", sections=plain))
         return starts
 
+    def unbounded(self) -> _Problem:
+        """With poles anywhere: what integrates, or is unstable, is measured in a loop; see the base class."""
+        return replace(self, training=replace(self.training, stable=False))
+
+    def asked_from(self, end: End) -> float:  # noqa: ARG002 - as well as its frequencies tell it
+        """Far below every frequency; see the base class."""
+        return float(np.exp(-FAR_BELOW * 2.0 * np.pi / self._span))
+
+    def free_starts(self, provider: SeparableProvider) -> list[PoleStart]:
+        """Sanathanan-Koerner iterations whose poles stay where they come to; see the base class."""
+        return [
+            PoleStart(
+                name=f"free Sanathanan-Koerner from scattered poles {k}",
+                sections=tuple(self._sk(provider, j, poles, stable=False) for j, poles in enumerate(first)),
+            )
+            for k, first in enumerate(self._scattered_poles(1 + self.training.scattered_starts), start=1)
+        ]
+
+    def at_one(self, end: End, *, every: bool = False) -> End:
+        """With poles at 1 that lie far below every frequency; see the base class."""
+        put = all_at_one if every else with_integrators
+        return put(end, self.orders.domain, self.terms.sample_time, FAR_BELOW * 2.0 * np.pi / self._span)
+
+    def delay_range(self) -> tuple[int, int]:
+        """As far as half a period of the lowest frequency, or many of the highest; see the base class."""
+        least, most = super().delay_range()
+        if self.training.max_delay is not None:
+            return least, most
+        return least, max(most, int(min(self._span / 2.0, PERIODS * self._shortest)))
+
+    def likely_delays(self, least: int, most: int) -> list[list[int]]:
+        """Those with the least loss of a scan, one input after the other; see the base class."""
+        m = len(self.orders.poles)
+        best, losses = [least] * m, dict[tuple[int, ...], float]()
+
+        def loss(j: int, delay: int) -> float:
+            delays = (*best[:j], delay, *best[j + 1 :])
+            if delays not in losses:
+                provider, (first,) = self.provider(delays), self._scattered_poles(1)
+                found = tuple(self._sk(provider, i, poles, iterations=FEW_STEPS) for i, poles in enumerate(first))
+                losses[delays] = tried(PoleStart(name="scan", sections=found), delays, provider).loss
+            return losses[delays]
+
+        for j in [*range(m)] * min(m, 2):
+            step = max(1, round(self._shortest / SCANNED))
+            found = min(range(least, most + 1, step), key=lambda delay: loss(j, delay))
+            while step > 1:
+                low, high, step = max(least, found - step), min(most, found + step), max(1, step // SCANNED)
+                found = min(range(low, high + 1, step), key=lambda delay: loss(j, delay))
+            best[j] = found
+        return [[one, least] for one in best]
+
+    def _scattered_poles(self, count: int) -> list[tuple[NDArray[np.complex128], ...]]:
+        """Random poles of every input, as often as asked."""
+        rng = np.random.default_rng(self.training.seed)
+        return [tuple(self._scattered(n, rng) for n in self.orders.poles) for _ in range(count)]
+
     def _sk(
-        self, records: Sequence[SpectralRecord], j: int, first: NDArray[np.complex128]
+        self,
+        provider: SeparableProvider,
+        j: int,
+        first: NDArray[np.complex128],
+        *,
+        stable: bool = True,
+        iterations: int = MAX_ITERATIONS,
     ) -> tuple[NDArray[np.float64], ...]:
         """Poles of one input, from the records in which it is the only one, or from all with common poles."""
+        records = [record for record in provider.records if isinstance(record, SpectralRecord)]
         alone = [r for r in records if not np.delete(r.inputs, j, axis=1).any() and r.inputs[:, j].any()]
         chosen = alone or list(records)
         inputs = np.concatenate([r.inputs[:, j : j + 1] if alone else r.inputs for r in chosen])
@@ -225,6 +309,8 @@ class _Problem(AbstractProblem):
             zeros,
             domain=self.orders.domain,
             weights=np.concatenate([np.split(r.root_weights, 2)[0] for r in chosen]),
+            stable=stable,
+            iterations=iterations,
         )
         return sections_of(poles, self.orders.domain)
 
@@ -233,6 +319,11 @@ class _Problem(AbstractProblem):
         """Period of the lowest frequency, in samples."""
         lowest = min(float(s.frequency[s.frequency > 0.0].min(initial=np.inf)) for s in self.spectra)
         return 2.0 * np.pi / lowest / self.terms.sample_time if np.isfinite(lowest) else 1.0
+
+    @property
+    def _shortest(self) -> float:
+        """Period of the highest frequency, in samples."""
+        return 2.0 * np.pi / max(float(s.frequency.max()) for s in self.spectra) / self.terms.sample_time
 
     def _scattered(self, n: int, rng: np.random.Generator) -> NDArray[np.complex128]:
         """Random poles at the frequencies of the data."""

@@ -33,6 +33,7 @@ def sk_poles(
     domain: Domain,
     weights: NDArray[np.float64] | None = None,
     iterations: int = MAX_ITERATIONS,
+    stable: bool = True,
 ) -> NDArray[np.complex128]:
     """Common poles of all inputs.
 
@@ -45,9 +46,10 @@ def sk_poles(
         domain: Of the poles.
         weights: Of each point's error, shape ``(n_points,)``; all ones by default.
         iterations: How many at most.
+        stable: Whether poles outside the stable region are mirrored into it.
 
     Returns:
-        Stable poles, the same number.
+        Poles, the same number.
     """
     w = np.ones(len(output)) if weights is None else weights
     poles = start
@@ -69,7 +71,8 @@ def sk_poles(
         poles = following
         if moved < 1e-8 * max(float(np.abs(poles).max()), 1e-300):
             break
-    return stabilised(np.asarray(poles, dtype=np.complex128), domain)
+    found = np.asarray(poles, dtype=np.complex128)
+    return stabilised(found, domain) if stable else found
 
 
 def _state_responses(

@@ -125,6 +125,17 @@ class AbstractProblem(ABC):
         """
         return None
 
+    def asked_from(self, end: End) -> float:
+        """Magnitude in the z plane from which a pole is asked about, whether it may lie at the edge or beyond.
+
+        Args:
+            end: The minimum among stable poles.
+
+        Returns:
+            It. Where noise and wrong dynamics hide an integrator, that search ends a few of them within the edge.
+        """
+        return 1.0 - slow_poles.REACH / max(end.lengths)
+
     def free_starts(self, provider: SeparableProvider) -> list[PoleStart]:  # noqa: ARG002 - see the base class
         """Starts whose poles need not be stable.
 

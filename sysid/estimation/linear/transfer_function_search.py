@@ -239,13 +239,11 @@ def _free_poles(
     if free is None:
         return own, end
     domain, sample_time, provider = own.orders.domain, own.terms.sample_time, free.provider(delays)
-    # Where noise and wrong dynamics hide an integrator, a search among stable poles ends a few of them within the edge.
-    asked_from = 1.0 - slow_poles.REACH / max(end.lengths)
     slowest = slowness(end.sections, domain, sample_time)
     # A search among stable poles may put a dead time in place of an integrator: the shortest is asked, too.
     asked = {delays} if own.orders.delays is not None else {delays, (own.delay_range()[0],) * len(delays)}
     suggested = [free.free_starts(free.provider(one))[0].sections for one in sorted(asked)]
-    if max(slowest, *(slowness(sections, domain, sample_time) for sections in suggested)) < asked_from:
+    if max(slowest, *(slowness(sections, domain, sample_time) for sections in suggested)) < own.asked_from(end):
         return own, end
     told: tuple[str, ...] = ()
     if own.orders.delays is None:  # those of a plant that cannot integrate need not be those of one that does

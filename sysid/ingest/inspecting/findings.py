@@ -78,6 +78,7 @@ class FileFinding:
         table: The file as it was read.
         notes: What the reader recognised.
         cases: The records that the file holds, where they are several; their channels are then those of all.
+        frequencies: What is said of a column of frequencies that makes the rows no samples over time; empty without.
     """
 
     path: Path
@@ -98,6 +99,7 @@ class FileFinding:
     guessed: frozenset[str] = frozenset()
     notes: tuple[str, ...] = field(default=())
     cases: tuple[CaseFinding, ...] = field(default=())
+    frequencies: str = ""
 
     @property
     def time_guessed(self) -> bool:

@@ -17,7 +17,6 @@ from sysid.ingest.inspecting.attempts import Attempt, read_somehow
 from sysid.ingest.inspecting.column_findings import column_finding
 from sysid.ingest.inspecting.events import are_events
 from sysid.ingest.inspecting.findings import CaseFinding, ColumnFinding, FileFinding, counted, listed
-from sysid.ingest.inspecting.over_frequency import frequencies_in, over_frequency
 from sysid.ingest.inspecting.restarts import finer_than_clock, of_few_digits, records_by_clock
 from sysid.ingest.inspecting.second_clocks import without_second_clocks
 from sysid.ingest.inspecting.time_findings import (
@@ -31,6 +30,7 @@ from sysid.ingest.inspecting.time_findings import (
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
+from sysid.ingest.tables.over_frequency import frequencies_in
 from sysid.ingest.tables.table import RawTable
 
 _MOST_APART = 6  # records of other kinds that are told one by one
@@ -144,8 +144,8 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         told_apart = tuple(replace(c, aside="says the sample time") if c.name == said[0] else c for c in told_apart)
         if clock.time.step == said[1] and not table.step:
             notes = (*notes, f"sample time {clock.step:g} s, from column {said[0]}")
-    frequencies = frequencies_in(table.columns) if clock.time.column is None and table.step is None else None
-    notes = (*notes, over_frequency(frequencies)) if frequencies is not None else notes
+    frequencies = _told_of_frequencies(table, clock, files)
+    notes = (*notes, frequencies) if frequencies else notes
     columns = tuple(column_finding(column) for column in told_apart if column.name != clock.column) + others
     needed = {
         "ragged": repairs.ragged,
@@ -171,7 +171,19 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
         table=table,
         guessed=attempt.guessed,
         notes=notes,
+        frequencies=frequencies,
     )
+
+
+def _told_of_frequencies(table: RawTable, clock: _Clock, files: FileOptions) -> str:
+    """What is said of rows that are frequencies; nothing where something says the time of samples."""
+    timed = clock.time.column is not None or table.step is not None or files.time.step is not None
+    found = None if timed else frequencies_in(table.columns)
+    if found is None:
+        return ""
+    from sysid.ingest.tables.no_record import over_frequency  # here: a record needs no word of it
+
+    return over_frequency(found)
 
 
 def _repairs_of_values(table: RawTable, channels: Sequence[ColumnFinding]) -> dict[str, object]:

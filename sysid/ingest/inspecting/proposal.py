@@ -33,7 +33,7 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None, split: 
         YAML to be saved as ``dataset.yaml``.
 
     Raises:
-        ReaderError: If the file has no column that can be a channel.
+        ReaderError: If the file has no column that can be a channel, or its rows are no samples over time.
     """
     if not finding.channels:
         raise ReaderError(
@@ -52,6 +52,10 @@ def propose_dataset(finding: FileFinding, *, folder: Path | None = None, split: 
             got=f"{finding.samples} row",
             remedy="check that the recording was saved, and the options separator and skip_lines",
         )
+    if finding.frequencies:
+        from sysid.ingest.tables.no_record import refuse_frequencies  # here: a record needs no word of it
+
+        raise refuse_frequencies(finding.frequencies, finding.path)
     finding = _in_parts(finding, split) if split and not finding.cases else finding
     # A data set under datasets/ is called by its folder, whatever the file is called.
     place = finding.path if folder is None else folder.resolve()

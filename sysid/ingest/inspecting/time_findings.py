@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from sysid.ingest.assembling.timing import Timing, even_step, round_step, rounded_step, survey
 from sysid.ingest.cells.headers import unit_in_name
-from sysid.ingest.inspecting.over_frequency import frequencies_in
 from sysid.ingest.inspecting.second_clocks import counts_rows
 from sysid.ingest.readers.leaves import step_in
 from sysid.ingest.tables.clocks import clock_of, since_1970
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, GridOptions, TimeOptions
+from sysid.ingest.tables.over_frequency import frequencies_in
 from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import is_counter, is_time_unit, unit_of_clock
 

@@ -20,6 +20,7 @@ from sysid.ingest.inspecting.second_clocks import without_clocks
 from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file, typed_options
 from sysid.ingest.readers.text_source import bare_stem
 from sysid.ingest.reading import read_table, trace_of
+from sysid.ingest.tables.no_record import refuse_frequencies
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
 from sysid.ingest.tables.table import RawTable
 from sysid.traces import Role, TraceSet
@@ -74,9 +75,11 @@ def _as_proposed(path: Path, error: UserError | None = None) -> TraceSet:
         found = inspect_file(path)
         # A channel that never changes is no fault of the samples: those that use it say what it is worth.
         left = replace(found, needed=RepairOptions(constant=found.needed.constant))
-        proposed = yaml.safe_load(propose_dataset(left))
+        proposed = None if found.frequencies else yaml.safe_load(propose_dataset(left))
     except UserError as also:  # which the command that describes a file comes to as well
         raise typed_options(also if error is None or isinstance(error, UnitError) else error, path) from None
+    if proposed is None:
+        raise refuse_frequencies(found.frequencies, path)
     if found.time.step is not None and found.time_guessed and (dated := _unread_dates(found)):
         raise typed_options(dated, path)
     with remedies_of_a_file(path):

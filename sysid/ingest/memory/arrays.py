@@ -22,7 +22,9 @@ from sysid.ingest.memory.memory_table import check_lengths, table_of
 from sysid.ingest.split import Split, split_traces
 from sysid.ingest.tables.durations import length_of_time
 from sysid.ingest.tables.frames import check_distinct, check_rows
+from sysid.ingest.tables.no_record import over_frequency
 from sysid.ingest.tables.options import ColumnOptions, FileOptions, GridOptions, RepairOptions, TimeOptions
+from sysid.ingest.tables.over_frequency import frequencies_in
 from sysid.ingest.tables.table import RawTable
 from sysid.traces import Channel, Trace, TraceSet
 from sysid.units import Reference, check_unit
@@ -177,6 +179,15 @@ def _trace(
     time = TimeOptions(step=sample_time) if table.time is None and sample_time is not None else TimeOptions()
     files = FileOptions(columns=given, time=time)
     if table.time is None and sample_time is None:
+        if (swept := frequencies_in(table.columns)) is not None:
+            raise ConfigError(
+                "a frequency response is no record over time",
+                where=label,
+                expected="a row for each sample",
+                got=over_frequency(swept),
+                remedy="fit it as it is: sysid.fit_response(sysid.response_data(table), structure). Where the rows are "
+                "samples over time, say how far apart: sample_time=0.1",
+            )
         raise ConfigError(
             "nothing tells the sample time",
             where=label,

@@ -32,6 +32,7 @@ class RawColumn:
         problem: Why the column cannot be used; raised only when it is asked for, so that a column of
             remarks beside the measurements does no harm. Its values are NaN then.
         aside: Why it is not proposed as a channel, though it can be one.
+        complex_values: The numbers of a column of complex ones, shape ``(n_rows,)``, which is no channel.
         words: The texts of a column of words.
         strange: Texts in a column of numbers that are none.
         counted_from: What the values are counted from: a clock that counts further than float64 can.
@@ -49,6 +50,7 @@ class RawColumn:
     counted_from: int = 0
     began: Began | None = None
     aside: str = ""
+    complex_values: NDArray[np.complex128] | None = None
 
 
 def array_column(
@@ -108,6 +110,7 @@ def array_column(
         problem=problem,
         counted_from=origin,
         began=began,
+        complex_values=array.astype(np.complex128) if array.dtype.kind == "c" else None,
     )
 
 

@@ -14,6 +14,7 @@ from sysid.estimation.nonparametric.response import FrequencyResponse
 from sysid.reporting.figures.style import DASHES, PALETTE, TARGET, new_figure, styled
 from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.reporting.linear_views import linear_views
+from sysid.traces.measured_response import MeasuredResponse
 from sysid.units import per
 
 BAND_COLOUR = "#DDDDDD"
@@ -73,6 +74,40 @@ def response_figure(found: FrequencyResponse, fits: Sequence[FitResult] = (), un
         place.set_ylim(0.0, 1.02)
         place.set_ylabel("coherence")
         place.set_xlabel(unit.label)
+        return figure
+
+
+def measured_figure(found: MeasuredResponse, fit: FitResult, unit: FrequencyUnit = HERTZ) -> Figure:
+    """A measured response point by point, and a model over it.
+
+    Args:
+        found: The response.
+        fit: A linear model of one input.
+        unit: Of frequencies.
+
+    Returns:
+        Gain above, phase below.
+    """
+    w = found.frequency[found.frequency > 0.0]
+    values = found.values[found.frequency > 0.0]
+    model = fit.model.response(0, w) if hasattr(fit.model, "response") else np.full(len(w), np.nan)
+    ends = fit.model.ends
+    with styled():
+        figure = new_figure(7.6, 5.0)
+        above, below = figure.subplots(2, 1, sharex=True)
+        look = {"color": PALETTE[0]}
+        points = {"color": TARGET, "linestyle": "none", "marker": ".", "markersize": 4}
+        above.loglog(unit.told(w), np.abs(values), label="measured", **points)
+        above.loglog(unit.told(w), np.abs(model), label=fit.model.label, **look)
+        measured, phase = (np.degrees(np.unwrap(np.angle(one))) for one in (values, model))
+        phase += 360.0 * np.round(np.median(measured - phase) / 360.0)
+        below.semilogx(unit.told(w), measured, **points)
+        below.semilogx(unit.told(w), phase, **look)
+        units = ends.units[ends.outputs[0]], ends.units[ends.inputs[0]]
+        above.set_ylabel(f"gain [{per(*units)}]")
+        below.set_ylabel("phase [degrees]")
+        below.set_xlabel(unit.label)
+        above.legend(loc="lower left")
         return figure
 
 

@@ -111,6 +111,52 @@ def auto(  # noqa: PLR0917 - one parameter an option, by name on the command lin
     raise typer.Exit(auto_command(source, given=given, fresh=fresh, out=out, tracking=not no_tracking))
 
 
+@commands.command(
+    "fit-response", epilog="Example: sysid fit-response sweep.csv --poles 2 --unit phase=deg", cls=ReaderCommand
+)
+def fit_response(
+    ctx: typer.Context,
+    source: Annotated[Path, typer.Argument(help="File of a frequency response: gain and phase, or complex numbers.")],
+    *,
+    poles: Annotated[int, typer.Option(min=1, help="Number of poles.")],
+    zeros: Annotated[int | None, typer.Option(min=0, help="Number of zeros; one less than poles by default.")] = None,
+    dead_time: Annotated[float | None, typer.Option(min=0.0, help="In seconds; it is searched by default.")] = None,
+    sample_time: Annotated[
+        float | None,
+        typer.Option(help="Of the model in seconds; a 20th of the period of the highest frequency by default."),
+    ] = None,
+    discrete: Annotated[bool, typer.Option("--discrete", help="A discrete model, of --sample-time.")] = False,
+    weighting: Annotated[
+        str,
+        typer.Option(help="What counts of the error: none, relative to the response's size, root of it, or coherence."),
+    ] = "none",
+    mapping: Annotated[str, typer.Option(help="What input and output are called.")] = "u -> y",
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROLE=NAME",
+            help="Which column is frequency, gain, phase, real, imaginary, complex or coherence; repeated.",
+        ),
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ROLE=UNIT", help="frequency=Hz, kHz or rad/s, gain=dB or 1, phase=deg or rad; repeated."),
+    ] = None,
+    frequency: Annotated[str, typer.Option(help="Unit of the frequencies that are drawn: Hz or rad/s.")] = "Hz",
+    out: Annotated[Path | None, typer.Option(help="Folder of the bundle to write: C, ONNX, model.json.")] = None,
+) -> None:
+    """Fit a transfer function to a measured frequency response, as a sweep or an analyser saves it."""
+    from sysid.workbench.commands.fit_response import ResponseWish, fit_response_command
+
+    fit_response_command(
+        ResponseWish(
+            source=source, poles=poles, zeros=zeros, dead_time=dead_time, sample_time=sample_time, discrete=discrete,
+            weighting=weighting, mapping=mapping, columns=column or [], units=unit or [], frequency=frequency, out=out,
+            reading=ctx.meta[META],
+        )
+    )  # fmt: skip
+
+
 @commands.command(epilog="Example: sysid excite multisine --samples 4000 --sample-time 0.01 --range 0:10 --out u.csv")
 def excite(
     kind: Annotated[

@@ -110,3 +110,48 @@ def test_an_intercept_is_refused() -> None:
             input_units=("1", "1"),
             **TERMS,
         )
+
+
+BEYOND = {
+    "an integrator": ([2.0], [1.0, 1.0, 0.0], [-1.0, 0.0]),
+    "two of them": ([2.0], [1.0, 0.0, 0.0], [0.0, 0.0]),
+    "an unstable plant, measured in its loop": ([9.0], [1.0, 1.0, -6.0], [-3.0, 2.0]),
+}
+
+
+@pytest.mark.parametrize("case", BEYOND)
+def test_poles_lie_where_the_response_puts_them(case: str) -> None:
+    """They had been held within the stable region, CONVERGED, and told to be stable."""
+    top, bottom, poles = BEYOND[case]
+    rng = np.random.default_rng(0)
+    response = signal.freqs(top, bottom, W)[1] * (1.0 + 0.01 * (rng.normal(size=200) + 1j * rng.normal(size=200)))
+    two = TransferFunction(poles=(2,), zeros=(0,), delays=(0,), domain=Domain.CONTINUOUS, intercept=False)
+    relative = Spectrum.of_response(W, response, weights=np.abs(response) ** -2)
+    fit = fit_spectra(relative, ONE, two, QUICK, input_units=("1",), **TERMS)
+    assert any("is not stable" in note for note in fit.notes)
+    np.testing.assert_allclose(np.sort(fit.model.poles(0).real), np.sort(poles), atol=0.03)
+    integrating = [pole for pole in poles if pole == 0.0]
+    assert np.count_nonzero(fit.model.poles(0) == 0.0) == len(integrating)
+
+
+@pytest.mark.parametrize("samples", [11, 83])
+def test_a_dead_time_of_many_samples_is_found(samples: int) -> None:
+    """It had been searched up to four."""
+    rng = np.random.default_rng(1)
+    response = signal.freqs([1.0], [1.0, 1.0, 4.0], W)[1] * np.exp(-0.01j * samples * W)
+    response = response * (1.0 + 0.01 * (rng.normal(size=200) + 1j * rng.normal(size=200)))
+    two = TransferFunction(poles=(2,), zeros=(0,), domain=Domain.CONTINUOUS, intercept=False)
+    relative = Spectrum.of_response(W, response, weights=np.abs(response) ** -2)
+    fit = fit_spectra(relative, ONE, two, QUICK, input_units=("1",), sample_time=0.01, output_unit="1")
+    assert fit.model.delays == (samples,)
+
+
+def test_frequencies_beyond_half_the_sampling_rate_are_refused() -> None:
+    with pytest.raises(TraceError, match=r"(?s)beyond half of its sampling rate.*0\.0126 s or less"):
+        fit_spectra(
+            Spectrum.of_response(10.0 * W, responses(Domain.DISCRETE)),
+            TWO,
+            orders(Domain.DISCRETE, DELAYS[Domain.DISCRETE]),
+            input_units=("1", "1"),
+            **TERMS,
+        )

@@ -1,0 +1,250 @@
+"""Measured frequency responses: the columns of a file or a table as complex numbers over rad/s."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid.errors import ChannelError, ConfigError, ReaderError
+from sysid.ingest.cells.headers import unit_in_name
+from sysid.ingest.inspecting.undescribed import GuessedWarning
+from sysid.ingest.memory.memory_table import table_of
+from sysid.ingest.readers.text_source import bare_stem
+from sysid.ingest.reading import read_table
+from sysid.ingest.tables.columns import RawColumn
+from sysid.ingest.tables.frames import columns_by_name
+from sysid.ingest.tables.options import FileOptions
+from sysid.ingest.tables.over_frequency import frequencies_in
+from sysid.traces.measured_response import MeasuredResponse
+
+Array = NDArray[np.float64]
+
+_CALLED: Final = {
+    "coherence": re.compile(r"\bcoh|\bgamma", re.IGNORECASE),
+    "real": re.compile(r"\bz?re(?:al)?\b", re.IGNORECASE),
+    "imaginary": re.compile(r"\bz?im(?:ag(?:inary)?)?\b", re.IGNORECASE),
+    "phase": re.compile(r"\bz?ph(?:ase|i|z|s)?\b|\barg|\bangle|\bwinkel|\bfase", re.IGNORECASE),
+    "gain": re.compile(
+        r"\bz?mag|\bgain|\bampl|\babs|\bz?mod(?:ulus)?\b|\bbetrag|\bdb\b|\bratio\b|\bverst", re.IGNORECASE
+    ),
+}
+"""What columns are called, the surest word first."""
+_PARTNERS: Final = {"gain": "phase", "phase": "gain", "real": "imaginary", "imaginary": "real"}
+ROLES: Final = ("frequency", *_CALLED, "complex")
+"""What a column may hold."""
+_FACTORS: Final = {
+    "frequency": {"hz": 2e0 * np.pi, "khz": 2e3 * np.pi, "mhz": 2e6 * np.pi, "ghz": 2e9 * np.pi, "rad/s": 1.0},
+    "phase": {"deg": np.pi / 180.0, "rad": 1.0},
+    "gain": {"db": 0.0, "1": 1.0},
+}
+_SPELT: Final = {
+    **{"°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "abs": "1", "-": "1"},
+    **{"radians/second": "rad/s", "rad/sec": "rad/s", "hertz": "hz", "decibel": "db", "": ""},
+}
+_RADIANS: Final = re.compile(r"^(?:w|omega|ω|rad.*)$", re.IGNORECASE)
+_TURN: Final = 2.0 * np.pi
+
+
+def read_response(
+    source: Any,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    files: FileOptions | None = None,
+    name: str | None = None,
+) -> MeasuredResponse:
+    """Read a measured frequency response.
+
+    Args:
+        source: A file; or a frame, or a dict of columns, whose names may carry units (``"mag [dB]"``).
+        columns: Which column holds what, where their names do not say it: ``frequency``, and ``gain`` and ``phase``, or
+            ``real`` and ``imaginary``, or ``complex``; and ``coherence``.
+        units: Of ``frequency`` (``Hz``, ``kHz``, ``MHz``, ``GHz``, ``rad/s``), ``gain`` (``dB`` or ``1``) and ``phase``
+            (``deg`` or ``rad``), where the columns do not say them.
+        files: How a file is read.
+        name: What it is called; the file's name by default.
+
+    Returns:
+        The response, its frequencies rising; rows with a blank are left out.
+
+    Raises:
+        ReaderError: If the file cannot be read, no column rises as frequencies do, or there are several responses.
+        ConfigError: If ``columns`` or ``units`` do not apply.
+        ChannelError: If a named column is missing.
+
+    Warns:
+        GuessedWarning: If a unit was guessed.
+    """
+    columns, units = dict(columns or {}), dict(units or {})
+    _check_names(columns, units)
+    if isinstance(source, str | Path):
+        table = read_table(source, files=files)
+        called, where, held = name or bare_stem(Path(source)), str(source), list(table.columns)
+    else:
+        named = columns_by_name(source)
+        if named is None:
+            raise ConfigError(
+                "not a frequency response", where="source", expected="a file, a frame, or a dict of columns",
+                got=type(source).__name__, remedy='give for example {"freq [Hz]": f, "mag [dB]": m, "phase [deg]": p}',
+            )  # fmt: skip
+        called = where = name or "response"
+        held = list(table_of(dict(named), name=called, channels=[], timed=False).columns)
+    chosen = _chosen(held, columns, where)
+    notes: list[str] = []
+    frequency = chosen["frequency"].values * _factor("frequency", chosen["frequency"], units, notes)
+    values = _values(held, chosen, units, notes, where)
+    coherence = chosen["coherence"].values if "coherence" in chosen else None
+    guessed = len(notes)
+    order = _whole_rows(frequency, values, coherence, notes, where)
+    for told in notes[:guessed]:
+        warnings.warn(f"{where}: guessed: {told}", GuessedWarning, stacklevel=3)
+    return MeasuredResponse(
+        name=called,
+        frequency=frequency[order],
+        values=values[order],
+        coherence=None if coherence is None else coherence[order],
+        notes=tuple(notes),
+    )
+
+
+def _check_names(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
+    for what, given, known in (("columns", columns, ROLES), ("units", units, tuple(_FACTORS))):
+        for role in given:
+            if role not in known:
+                raise ConfigError.unknown(f"{what} has no {role}", role, known, f"correct {what}", where=what)
+
+
+def _chosen(held: Sequence[RawColumn], columns: Mapping[str, str], where: str) -> dict[str, RawColumn]:
+    """The columns by what they hold: as they were named, and else as they are called."""
+    by_name = {column.name: column for column in held}
+    missing = [named for named in columns.values() if named not in by_name]
+    if missing:
+        raise ChannelError(missing, list(by_name), where=where)
+    found = {role: by_name[named] for role, named in columns.items()}
+    if "frequency" not in found:
+        swept = frequencies_in(held)
+        if swept is None:
+            raise ReaderError(
+                "no column rises as the frequencies of a sweep do", where=where,
+                expected="a column of frequencies, each above the one before", got=", ".join(by_name),
+                remedy="name it: columns={'frequency': 'f'} (--column frequency=f)",
+            )  # fmt: skip
+        found["frequency"] = swept
+    rest = [column for column in held if column is not found["frequency"] and column.name not in columns.values()]
+    partners = [_PARTNERS[role] for role in columns if role in _PARTNERS]
+    for role in ("coherence", *partners) if {*_PARTNERS, "complex"} & set(columns) else ("complex", *_CALLED):
+        if role in columns:
+            continue
+        fitting = [column for column in rest if _role(column) == role]
+        if len(fitting) > 1:
+            raise ReaderError(
+                f"several columns may be the {role}", where=where, expected="the columns of one response",
+                got=", ".join(column.name for column in fitting),
+                remedy=f"name those of one: columns={{'{role}': {fitting[0].name!r}, ...}} "
+                f"(--column {role}={fitting[0].name})",
+            )  # fmt: skip
+        found |= {role: fitting[0]} if fitting else {}
+    return found
+
+
+def _role(column: RawColumn) -> str:
+    """What a column holds by its name and unit; empty where nothing says it."""
+    if column.complex_values is not None:
+        return "complex"
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])|[_\W\d]+", " ", column.name)
+    unit = _spelt(column.unit or unit_in_name(column.name) or "")
+    by_unit = {"deg": "phase", "rad": "phase", "db": "gain"}.get(unit, "")
+    return next((role for role, called in _CALLED.items() if called.search(words)), by_unit)
+
+
+def _others(held: Sequence[RawColumn], chosen: Mapping[str, RawColumn]) -> str:
+    """The columns of which nothing says what they hold."""
+    rest = [column.name for column in held if all(column is not one for one in chosen.values())]
+    return f"; and {', '.join(rest)}" if rest else ""
+
+
+def _values(
+    held: Sequence[RawColumn], chosen: Mapping[str, RawColumn], units: Mapping[str, str], notes: list[str], where: str
+) -> NDArray[Any]:
+    """The complex numbers."""
+    if "complex" in chosen:
+        values = chosen["complex"].complex_values
+        return chosen["complex"].values.astype(np.complex128) if values is None else values
+    if {"real", "imaginary"} <= set(chosen):
+        sign = -1.0 if chosen["imaginary"].name.lstrip().startswith("-") else 1.0
+        return np.asarray(chosen["real"].values + 1j * sign * chosen["imaginary"].values)
+    if {"gain", "phase"} <= set(chosen):
+        gain = chosen["gain"].values
+        size = 10.0 ** (gain / 20.0) if not _factor("gain", chosen["gain"], units, notes) else gain
+        return np.asarray(size * np.exp(1j * chosen["phase"].values * _factor("phase", chosen["phase"], units, notes)))
+    lacking = next((other for role, other in _PARTNERS.items() if role in chosen), "phase, and the gain")
+    raise ReaderError(
+        f"the {lacking} of the response is missing",
+        where=where,
+        expected="gain and phase, real and imaginary part, or complex numbers",
+        got=", ".join(f"{role}: {column.name}" for role, column in chosen.items()) + _others(held, chosen),
+        remedy="name the columns: columns={'gain': 'A', 'phase': 'B'} (--column gain=A --column phase=B)",
+    )
+
+
+def _spelt(unit: str) -> str:
+    word = unit.strip().lower()
+    return _SPELT.get(word, word)
+
+
+def _factor(role: str, column: RawColumn, units: Mapping[str, str], notes: list[str]) -> float:
+    """By what a column is multiplied; 0 for dB. A unit that nothing says is guessed, and told."""
+    known = _FACTORS[role]
+    if role in units:
+        word = _spelt(units[role])
+        if word not in known:
+            raise ConfigError.unknown(f"no such unit of {role}", units[role], known, "correct units", where="units")
+        return known[word]
+    said = [column.unit or "", unit_in_name(column.name) or "", *re.split(r"[_\s/]+", column.name)]
+    found = next((known[word] for word in map(_spelt, said) if word in known), None)
+    if found is not None:
+        return found
+    unit, why = _guessed(role, column)
+    notes.append(f"{column.name} in {unit}, {why}; units={{'{role}': ...}} (--unit {role}=...) says another")
+    return known[_spelt(unit)]
+
+
+def _guessed(role: str, column: RawColumn) -> tuple[str, str]:
+    """The likely unit of a column, and why."""
+    values = column.values[np.isfinite(column.values)]
+    if role == "frequency":
+        # An frd of MATLAB counts in rad/s unless it says another unit.
+        radians = _RADIANS.match(column.name) or column.name == "Frequency"
+        return ("rad/s", "as it is called") if radians else ("Hz", "as nothing says its unit")
+    if role == "gain":
+        negative = len(values) > 0 and values.min() < 0.0
+        return ("dB", "as some are below 0") if negative else ("1", "a ratio, as none is below 0")
+    wide = len(values) > 0 and float(np.abs(values).max()) > _TURN
+    return ("deg", "as some are beyond a turn in rad") if wide else ("rad", "as all are within a turn")
+
+
+def _whole_rows(
+    frequency: Array, values: NDArray[Any], coherence: Array | None, notes: list[str], where: str
+) -> NDArray[np.intp]:
+    """Rows without a blank, by rising frequency."""
+    whole = np.isfinite(frequency) & np.isfinite(values)
+    whole &= True if coherence is None else np.isfinite(coherence)
+    kept = np.flatnonzero(whole)
+    if len(kept) < len(frequency):
+        notes.append(f"{len(frequency) - len(kept)} rows with a blank left out")
+    rising = kept[np.argsort(frequency[kept], kind="stable")]
+    if len(kept) < 2 or np.any(np.diff(frequency[rising]) == 0.0):
+        raise ReaderError(
+            "these are several sweeps, or none",
+            where=where,
+            expected="each frequency once",
+            got=f"{len(kept)} rows, {len(np.unique(frequency[kept]))} frequencies",
+            remedy="keep the rows of one sweep (rows: of the file, --rows 1:50), or average those that repeat one",
+        )
+    return rising
