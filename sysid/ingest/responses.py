@@ -20,7 +20,7 @@ from sysid.ingest.reading import read_table
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.frames import columns_by_name
 from sysid.ingest.tables.options import FileOptions
-from sysid.ingest.tables.over_frequency import frequencies_in
+from sysid.ingest.tables.over_frequency import called_frequency, frequencies_in
 from sysid.traces.measured_response import MeasuredResponse
 
 Array = NDArray[np.float64]
@@ -129,13 +129,14 @@ def _chosen(held: Sequence[RawColumn], columns: Mapping[str, str], where: str) -
     found = {role: by_name[named] for role, named in columns.items()}
     if "frequency" not in found:
         swept = frequencies_in(held)
-        if swept is None:
+        likely = [swept] if swept is not None else [one for one in held if called_frequency(one)]
+        if len(likely) != 1:
             raise ReaderError(
                 "no column rises as the frequencies of a sweep do", where=where,
                 expected="a column of frequencies, each above the one before", got=", ".join(by_name),
                 remedy="name it: columns={'frequency': 'f'} (--column frequency=f)",
             )  # fmt: skip
-        found["frequency"] = swept
+        found["frequency"] = likely[0]
     rest = [column for column in held if column is not found["frequency"] and column.name not in columns.values()]
     partners = [_PARTNERS[role] for role in columns if role in _PARTNERS]
     for role in ("coherence", *partners) if {*_PARTNERS, "complex"} & set(columns) else ("complex", *_CALLED):
