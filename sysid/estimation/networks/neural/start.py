@@ -196,10 +196,10 @@ def _realise(
     # An unstable regression is slowed down to the edge; what is wanted is the shape of its first samples.
     shrink = LARGEST_POLE / max(radius, LARGEST_POLE)
     past = past * (shrink ** np.arange(1, order + 1))[:, np.newaxis, np.newaxis]
-    for t in range(len(responses)):
-        if t < len(inputs):
-            responses[t] = inputs[t]
-        responses[t] += sum(past[i] @ responses[t - 1 - i] for i in range(min(order, t)))
+    responses[: len(inputs)] = inputs[: len(responses)]
+    for t in range(1, len(responses) if order else 0):
+        reach = min(order, t)
+        responses[t] += np.cumsum(past[:reach] @ responses[t - reach : t][::-1], axis=0)[-1]
     places = 1 + np.arange(horizon)[:, None] + np.arange(horizon)
     hankel = responses[places].transpose(0, 2, 1, 3).reshape(horizon * n_y, -1)
     left, values, right = linalg.svd(hankel, full_matrices=False)
