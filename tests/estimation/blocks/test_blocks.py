@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 import sysid
 from sysid.errors import ConfigError
-from sysid.estimation import FitResult, Status
+from sysid.estimation import FitResult, StabilityOptions, Status
 from sysid.estimation.blocks.fit import fit_blocks
 from sysid.estimation.blocks.polynomial_narx import fit_polynomial_narx
 from sysid.estimation.blocks.sections import block_of, responses, sections_of
@@ -105,11 +105,11 @@ NAMED = {
 
 @cache
 def named(structure: str, given: str, comes: str) -> sysid.Fit:
-    """A fit of channels with these names; how well it ends is no matter of theirs."""
-    u = steps(0)
+    """A fit of channels with these names; how well it ends, and how long its record is, are no matter of theirs."""
+    u = steps(0, 160)
     trace = trace_of({given: u, comes: saturated(u)}, name="r")
-    brief = Training(starts=2, max_iterations=5, workers=1)
-    return sysid.fit(trace, Mapping(inputs=(given,), outputs=(comes,)), NAMED[structure], brief)
+    brief, few = Training(starts=2, max_iterations=5, workers=1), StabilityOptions(count=20)
+    return sysid.fit(trace, Mapping(inputs=(given,), outputs=(comes,)), NAMED[structure], brief, stability=few)
 
 
 @pytest.mark.parametrize(
