@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -136,13 +136,28 @@ def usable(name: str) -> AbstractExporter:
     return found
 
 
-def open_file(row: Row, surrogate: Surrogate, folder: Path) -> Exported:
-    """Write a surrogate and load one of its files."""
+def open_file(row: Row, surrogate: Surrogate, folder: Path, written: Sequence[ExportedFile] | None = None) -> Exported:
+    """Write a surrogate, unless it is written already, and load one of its files."""
     exporter = usable(row.format)
-    written = exporter.write(surrogate, folder)
-    (file,) = [file for file in written if (matches(row, file, surrogate))]
+    files = exporter.write(surrogate, folder) if written is None else written
+    (file,) = [file for file in files if matches(row, file, surrogate)]
     run = exporter.load(file, folder)
     return Exported(surrogate=surrogate, file=file, folder=folder, run=run, tolerance=row.tolerance)
+
+
+@pytest.fixture(scope="session")
+def opened_of_a_format(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Exported]:
+    """Opens a file by the name of what is exported and its row; all files of a format are written at once."""
+
+    @cache
+    def written(build: Callable[[], Surrogate], name: str) -> tuple[Surrogate, Path, tuple[ExportedFile, ...]]:
+        surrogate, folder = build(), tmp_path_factory.mktemp("exported")
+        return surrogate, folder, usable(name).write(surrogate, folder)
+
+    def opened(build: Callable[[], Surrogate], row: Row) -> Exported:
+        return open_file(row, *written(build, row.format))
+
+    return opened
 
 
 def matches(row: Row, file: ExportedFile, surrogate: Surrogate) -> bool:
@@ -180,17 +195,27 @@ WIRED = [(c, r) for c in CASCADES for r, row in ROWS.items() if c in WIRED_MET.g
 
 
 @pytest.fixture(params=PAIRS, ids=[" - ".join(pair) for pair in PAIRS], scope="session")
-def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Exported:
+def exported(request: pytest.FixtureRequest, opened_of_a_format: Callable[..., Exported]) -> Exported:
     name, row = request.param
-    return open_file(ROWS[row], surrogate_of(MODELS[name]()), tmp_path_factory.mktemp("exported"))
+    return opened_of_a_format(declared_model(name), ROWS[row])
+
+
+@cache
+def declared_model(name: str) -> Callable[[], Surrogate]:
+    return lambda: surrogate_of(MODELS[name]())
+
+
+@cache
+def declared_cascade(name: str) -> Callable[[], Surrogate]:
+    build, outputs = CASCADES[name]
+    return lambda: Surrogate.of(build(), {"STP": (0.0, 80.0)}, outputs=outputs)
 
 
 @pytest.fixture(params=WIRED, ids=[" - ".join(pair) for pair in WIRED], scope="session")
-def wired(request: pytest.FixtureRequest) -> tuple[Surrogate, Row]:
-    """Models wired, and a file to write of them."""
+def wired(request: pytest.FixtureRequest, opened_of_a_format: Callable[..., Exported]) -> Exported:
+    """Models wired, and a file of them."""
     name, row = request.param
-    build, outputs = CASCADES[name]
-    return Surrogate.of(build(), {"STP": (0.0, 80.0)}, outputs=outputs), ROWS[row]
+    return opened_of_a_format(declared_cascade(name), ROWS[row])
 
 
 def random_inputs(n_samples: int, n_inputs: int, *, seed: int = 3) -> np.ndarray:

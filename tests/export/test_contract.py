@@ -136,26 +136,25 @@ def test_no_input_brings_it_down_and_a_bounded_output_stays_bounded(exported, in
             assert (run.flags[5:8] & Flag.OUTSIDE_RANGE).all()
 
 
-def test_models_wired_run_as_one(wired, opened, inputs, tmp_path):
-    surrogate, row = wired
-    exported = opened(row, surrogate, tmp_path)
+def test_models_wired_run_as_one(wired, inputs):
+    surrogate = wired.surrogate
     u = np.stack([inputs(200, len(surrogate.inputs), seed=i) for i in range(3)], axis=1)
     states = np.stack([surrogate.at_rest(u[0, i]) for i in range(3)])
-    run = exported.run(u, states)
+    run = wired.run(u, states)
     assert run.output.shape == (200, 3, len(surrogate.outputs))
     lost = u[:20].copy()
     lost[5, 0, 0], lost[5, 1, -1], lost[5, 2, 0] = np.nan, np.inf, -np.inf
     # Far beyond what they know: each is held at a bound, or at a limit that lies beyond its bound.
     far = u[:40].copy()
     far[10:12], far[20:22, :, 0], far[30:32, :, -1] = 200.0, 1e4, -50.0
-    for fed, found in ((u, run), (lost, exported.run(lost, states)), (far, exported.run(far, states))):
+    for fed, found in ((u, run), (lost, wired.run(lost, states)), (far, wired.run(far, states))):
         for i in range(3):
             expected = surrogate.simulate(fed[:, i])
-            assert largest_difference(found.output[:, i], expected) <= row.tolerance
+            assert largest_difference(found.output[:, i], expected) <= wired.tolerance
             flags = expected_flags(surrogate, fed[:, i], surrogate.compute(fed[:, i]))
             np.testing.assert_array_equal(found.flags[:, i], flags)
-    half = exported.run(u[:90], states)
-    rest = exported.run(u[90:], half.state)
+    half = wired.run(u[:90], states)
+    rest = wired.run(u[90:], half.state)
     np.testing.assert_array_equal(np.concatenate([half.output, rest.output]), run.output)
     np.testing.assert_array_equal(rest.state, run.state)
 
