@@ -21,7 +21,8 @@ LITTLE, LESS, CHANCE = 1e-4, 0.2, 20.0
 sample must take away to be taken for one; and how much less, in twice the log likelihood, chance does not do."""
 READ_BACKWARDS = (
     "The output answers within the sample: a dead time of 0 leaves clearly less than 1. Where a controller sets the "
-    "input from the output of its own sample, this is the controller read backwards: give delays: 1 then."
+    "input from the output of its own sample, this is the controller read backwards: give delays: 1 then. An "
+    "input that moves between samples looks the same: domain: continuous with intersample: foh says so."
 )
 
 

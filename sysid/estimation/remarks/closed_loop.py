@@ -65,7 +65,7 @@ def _by_prediction(model: AbstractModel, training: object) -> bool:
 
 def _said(model: AbstractModel, output: str, names: Sequence[str], early: Sequence[str], direct: bool) -> str:
     acts = f"{output} acts on {' and '.join(names)} in these records"
-    begun = f"{acts}: they are of a closed loop (or the inputs are recorded late)"
+    begun = f"{acts}: they are of a closed loop (or the inputs are recorded late, or move between samples)"
     if early:
         late = "feedthrough: false" if getattr(model.structure, "feedthrough", False) else at_lag(model, 1)
         return (

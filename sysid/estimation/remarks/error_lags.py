@@ -32,7 +32,9 @@ NEARLY_ALL = 0.9
 """Part of what is new in an output that an input of the same sample explains, from which one may be the other."""
 
 
-def left_out(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> list[str]:
+def left_out(
+    model: AbstractModel, run: FreeRun, fed: Collection[int] = (), but: Collection[tuple[int, int]] = ()
+) -> list[str]:
     """Inputs that act at lags where the model lets them not.
 
     The error of the free run is explained by its own past and past inputs, and then by the inputs of the same sample as
@@ -43,6 +45,7 @@ def left_out(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> l
         model: The fitted model.
         run: Its free run over a record that was fitted.
         fed: Places of outputs that act on the inputs: what moves together within a sample is the controller's.
+        but: Places of outputs and inputs of which is told already that they act sooner.
 
     Returns:
         One sentence for each input and output of which this is so.
@@ -53,7 +56,7 @@ def left_out(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> l
         return []
     told = []
     for j in informative(run.inputs[usable]):
-        for i in range(len(model.mapping.outputs)):
+        for i in (i for i in range(len(model.mapping.outputs)) if (i, j) not in but):
             worth = np.std(error[usable, i]) > LEAST_ERROR * np.std(run.output[usable, i])
             if has_path(model, run, j, i):
                 told += [] if i in fed else _read_backwards(model, run, j, i)

@@ -12,6 +12,7 @@ from sysid.estimation.nonparametric.excitation_order import MOST, excitation_ord
 from sysid.estimation.nonparametric.segments import segments_of
 from sysid.estimation.records.informative import informative, own_part, still
 from sysid.estimation.remarks.bent_by_noise import bent_by_noise
+from sysid.estimation.remarks.between_samples import between_samples
 from sysid.estimation.remarks.closed_loop import feedback_told
 from sysid.estimation.remarks.error_causes import causes
 from sysid.estimation.remarks.error_lags import left_out
@@ -319,7 +320,8 @@ def _against(
     steps = resolution_told(model, runs)
     # Beside a drift, and steps of a converter, what moves together says little of lags.
     known = {**steps, **drifts}
-    lags = () if known else left_out(model, longest, fed)
+    sooner = {} if known else between_samples(model, longest, fed)
+    lags = [] if known else [*sooner.values(), *left_out(model, longest, fed, but=sooner)]
     ratios = _beside_constants(runs)
     bent = None if fed or known or levels else bent_by_noise(model, traces[:MOST_TRACES], runs, start)
     judged = longest if bent is None else max(bent.runs, key=lambda run: len(run.output))

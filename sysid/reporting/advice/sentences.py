@@ -136,7 +136,8 @@ SAID: Final[dict[str, Words]] = {
         "The output acts on {who}: inputs to come hold {share:.0%} of what the past leaves open of the output"
         " (at once: {share_at_once:.0%}).",
         "Closed loop: use ARX or a network one step ahead, with enough noise model; instrumental variables and"
-        " correlations from these inputs are biased. Record with an external set point.",
+        " correlations from these inputs are biased. Record with an external set point. An input that is not set but"
+        " measured, and moves between samples, looks the same: then fit with intersample: foh, or nk: 0.",
     ),
     "feedback.exchanged": Words(
         "{who} answers the output, and not the output {who}: a linear response explains {backward:.0%} of {who}, and"
