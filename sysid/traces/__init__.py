@@ -6,7 +6,8 @@ starts afresh in each of them.
 """
 
 from sysid.traces.channel import Channel
-from sysid.traces.trace import Trace, check_units
+from sysid.traces.trace import Trace
 from sysid.traces.trace_set import Role, TraceSet
+from sysid.traces.unit_check import check_units
 
 __all__ = ["Channel", "Role", "Trace", "TraceSet", "check_units"]

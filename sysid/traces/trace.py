@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import ChannelError, ConfigError, TraceError
+from sysid.errors import ChannelError, TraceError
 from sysid.traces.channel import Channel, check_text
 from sysid.traces.stretch import Stretch
-from sysid.units import is_same_unit
 
 SMALLEST, LARGEST = 1e-150, 1e150
 """Magnitudes between which a channel's largest value may lie: beyond them a sum of squares is none in float64."""
@@ -380,26 +379,3 @@ class Trace:
         """
         self.require(names)
         return np.ascontiguousarray(self.values[:, [self.index(name) for name in names]])
-
-
-def check_units(units: Mapping[str, str], trace: Trace) -> None:
-    """Refuse a record whose numbers would be taken for others.
-
-    Args:
-        units: The unit of each channel that is read, of which the record may lack some.
-        trace: The record.
-
-    Raises:
-        ConfigError: If a channel is in another unit.
-    """
-    there = {channel.name: channel.unit for channel in trace.channels}
-    for name, unit in units.items():
-        if name in there and not is_same_unit(there[name], unit):
-            raise ConfigError(
-                "the record has a channel in another unit than the model",
-                where=f"trace {trace.name}, channel {name}",
-                expected=unit,
-                got=there[name],
-                remedy=f"read it in {unit}: the channel's unit in a dataset.yaml converts it; sysid.data takes numbers "
-                f"as they are, so bring them to {unit} first and say units={{{name!r}: {unit!r}}}",
-            )

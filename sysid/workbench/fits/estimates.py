@@ -11,10 +11,12 @@ import os
 import statistics
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from sysid.errors import ConfigError
 from sysid.estimation import FitProgress, FitResult, Training
 from sysid.estimation.estimators import estimator_of
+from sysid.estimation.fitting import seedless
 from sysid.estimation.networks.middle import most_iterations
 from sysid.estimation.networks.starts.halving import planned_iterations
 from sysid.estimation.stability.check import LEAST_S
@@ -45,6 +47,24 @@ FEW_SEQUENCES = 20
 
 SHARE = 8
 """A linear fit is timed on this part of the samples: its work is proportional to them."""
+
+
+def amount(fit: FitConfig, data: Data) -> dict[str, Any]:
+    """How much work a fit is: another seed is as much.
+
+    Args:
+        fit: The fit.
+        data: The traces.
+
+    Returns:
+        What is the same for as much work, as JSON values.
+    """
+    return {
+        "structure": fit.structure.to_dict(),
+        "initial": fit.initial,
+        "training": str(seedless(fit.training_options(0))),
+        "samples": {trace.name: len(trace) for trace in data.traces},
+    }
 
 
 def how_long(fit: FitConfig, config: PipelineConfig, data: Data) -> Estimate:

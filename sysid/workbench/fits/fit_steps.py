@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.estimation import FitResult
-from sysid.estimation.fitting import seedless
 from sysid.export.exporters import wanted_formats
 from sysid.reporting.published.tables import read_published
 from sysid.reporting.results import Results, parse_results
@@ -20,7 +19,7 @@ from sysid.workbench.fits import steps
 from sysid.workbench.fits.choice import Choice, choose
 from sysid.workbench.fits.config import FitConfig, Pipeline, PipelineConfig
 from sysid.workbench.fits.data import Data, load_data, unmade_data
-from sysid.workbench.fits.estimates import EXPORT_TIME, SCORING_TIME, how_long
+from sysid.workbench.fits.estimates import EXPORT_TIME, SCORING_TIME, amount, how_long
 from sysid.workbench.fits.evidence import curves, residuals
 from sysid.workbench.fits.fitted import Fitted, Scored
 from sysid.workbench.fits.orders import orders_key, said, search
@@ -249,7 +248,7 @@ class FitSteps:
             read=lambda _: read_fit(folder),
             outcome=how_ended,
             final=is_final,
-            amount=lambda: _amount(fit, loaded.value),
+            amount=lambda: amount(fit, loaded.value),
             how_long=lambda: how_long(fit, config, loaded.value),
             called=fit.name,
             export=lambda result, into, provenance: self._bundle(model, result, loaded.value, into, provenance),
@@ -389,13 +388,3 @@ class FitSteps:
 
 def _loaded(data: Data) -> events.DataLoaded:
     return events.DataLoaded(traces=data.traces, selection=tuple(trace.name for trace in data.selection))
-
-
-def _amount(fit: FitConfig, data: Data) -> dict[str, Any]:
-    """How much work a fit is: another seed is as much."""
-    return {
-        "structure": fit.structure.to_dict(),
-        "initial": fit.initial,
-        "training": str(seedless(fit.training_options(0))),
-        "samples": {trace.name: len(trace) for trace in data.traces},
-    }
