@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 import sysid
-from sysid.estimation import estimators
+from sysid.estimation import fitting
 from sysid.models import Mapping, Start, StartKind
 from sysid.traces import Trace
 from tests.estimation.linear_systems import trace_of
@@ -49,7 +49,7 @@ def structures(poles: int) -> list:
 
 
 def warned(structure, u, y, mapping=ONE) -> list[str]:
-    fit = estimators.fit([trace_of(u, y, sample_time=T)], mapping, structure, start=ESTIMATED, stability=None)
+    fit = fitting.fit([trace_of(u, y, sample_time=T)], mapping, structure, start=ESTIMATED, stability=None)
     return [told for told in fit.warnings if SOONER in told]
 
 
@@ -71,7 +71,7 @@ def test_what_it_says_is_what_the_option_gives() -> None:
     )
     (told,) = warned(held, u, y)
     fits = [
-        estimators.fit([trace_of(u, y, sample_time=T)], ONE, one, start=ESTIMATED, stability=None)
+        fitting.fit([trace_of(u, y, sample_time=T)], ONE, one, start=ESTIMATED, stability=None)
         for one in (held, moving)
     ]
     for fit, said in zip(fits, ("without it one of", "has a fit of"), strict=True):
@@ -114,5 +114,5 @@ def test_masked_samples_say_nothing() -> None:
     usable = np.arange(600) % 7 != 0
     trace = trace_of(u, np.where(usable, y, 0.0), sample_time=T)
     masked = Trace(name="masked", sample_time=T, channels=trace.channels, values=trace.values, usable=usable)
-    fit = estimators.fit([masked], ONE, sysid.OE(nb=(1,), nf=(1,), nk=(1,)), start=ESTIMATED, stability=None)
+    fit = fitting.fit([masked], ONE, sysid.OE(nb=(1,), nf=(1,), nk=(1,)), start=ESTIMATED, stability=None)
     assert any(SOONER in told for told in fit.warnings)
