@@ -71,6 +71,7 @@ _WRITTEN = {
 }
 _EXACT = {
     **{f"{prefix}{text}": f"{prefix}VA" for prefix in ("", "k", "M") for text in ("var", "VAr", "VAR", "Var")},
+    **{f"{prefix}Ohm": f"{prefix}ohm" for prefix in ("m", "k", "M")},
     **{"nm": "nm", "kn": "knot", "mS": "mS", "MS": "MS", "mPa": "mPa", "mpa": "mPa", "KG": "kg", "Kg": "kg"},
     **{"C": "degC", "F": "degF", "PS": "metric_horsepower", "mb": "mbar", "mNm": "mN*m", "MNm": "MN*m"},
     **{"В": "V", "А": "A", "Вт": "W", "кВт": "kW", "Па": "Pa", "кПа": "kPa", "МПа": "MPa", "бар": "bar", "Гц": "Hz"},

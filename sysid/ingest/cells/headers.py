@@ -31,6 +31,11 @@ _UNITS_IN_NAMES = frozenset(
     | {"N", "kN", "Nm", "rpm", "m", "mm", "cm", "s", "ms", "us", "min", "K", "degC", "W", "kW", "Hz", "kHz", "kg"}
     | {"g", "rad", "deg", "%"}
 )
+_OF_CYCLERS = frozenset(
+    {"h", "Ah", "mAh", "Wh", "mWh", "Ohm", "ohm", "mOhm", "kOhm", "uA", "µA", "µV", "uV", "MHz", "mW"}
+)
+"""Further units behind a stroke, as battery cyclers and potentiostats have them."""
+_QUOTIENT = re.compile(r"(?P<name>[^/\s][^/]*)/(?P<unit>\S+)")
 _LASTS = re.compile(r"(?:^|[_. ])(?:t|[Tt]ime|[Zz]eit|[Tt]id|[Ee]lapsed|[Rr]untime|[Dd]uration|[Dd]auer)[_.]min$")
 _WRITTEN_OUT = {
     "second": "s", "sec": "s", "millisecond": "ms", "microsecond": "us", "minute": "min", "hour": "h", "volt": "V",
@@ -175,8 +180,12 @@ def parse_headers(texts: Sequence[str]) -> list[Header]:
         ['time', 'V(in)', 'I(R1)']
         >>> [header.unit for header in parse_headers(["t (s)", "U (V)", "U2 (mV)"])]
         ['s', 'V', 'mV']
+        >>> [(header.name, header.unit) for header in parse_headers(["time/s", "Ewe/V", "Q/mAh/g", "speed"])]
+        [('time', 's'), ('Ewe', 'V'), ('Q', 'mAh/g'), ('speed', None)]
+        >>> [header.unit for header in parse_headers(["time", "v km/h", "km/h", "rig/V", "rig/A", "dQ/dV"])]
+        [None, None, None, None, None, None]
     """
-    headers = [parse_header(text) for text in texts]
+    headers = _with_quotients(texts, [parse_header(text) for text in texts])
     found = [_PARENTHESES.match(text.strip()) for text in texts]
     nodes = [
         match is not None and _NODE.fullmatch(text.strip()) is not None
@@ -191,6 +200,33 @@ def parse_headers(texts: Sequence[str]) -> list[Header]:
         else header
         for text, header, match, node in zip(texts, headers, found, nodes, strict=True)
     ]
+
+
+def _with_quotients(texts: Sequence[str], headers: Sequence[Header]) -> list[Header]:
+    """With the units of quotients, as ISO 80000 and cyclers write them, ``Ewe/V``, where two columns or more have some.
+
+    What stands before the mark is a group where it comes again, and half of a unit where it is one: ``km/h``.
+    """
+    pairs = [
+        _QUOTIENT.fullmatch(text.strip()) if one.unit is None else None
+        for text, one in zip(texts, headers, strict=True)
+    ]
+    said = [None if pair is None else _quotient(pair["name"], pair["unit"]) for pair in pairs]
+    names = [one.name for one in said if one is not None]
+    if len(names) < 2 or len(set(names)) < len(names):
+        return list(headers)
+    return [header if one is None else one for header, one in zip(headers, said, strict=True)]
+
+
+def _quotient(name: str, unit: str) -> Header | None:
+    """A name and a usual unit behind a stroke."""
+    written = _WRITTEN_OUT.get(unit.casefold(), unit)
+    usual = all(part in _UNITS_IN_NAMES | _OF_CYCLERS for part in written.split("/"))
+    half = name in _UNITS_IN_NAMES or (len(name) > 1 and is_unit(name)) or re.search(r"\s", name) is not None
+    if not usual or half or not is_unit(written):
+        return None
+    found, reference = split_reference(written)
+    return Header(name=name, unit=found, reference=reference)
 
 
 def _is_spoken(unit: str, mark: str | None) -> bool:

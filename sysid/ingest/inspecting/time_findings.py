@@ -25,6 +25,7 @@ _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
 _MOSTLY_ALIKE, _OFTEN, _MOST_UNEVEN = 0.5, 0.05, 20.0
 _ARRAYS = {"matlab", "numpy"}
 _MINUTE = 60.0
+_ENDS_IN_TIME = re.compile(r"time(?![a-z])", re.IGNORECASE)
 _YEARS, _CALLED_YEAR = (1700.0, 2300.0), re.compile(r"year|jahr|date|année|año", re.IGNORECASE)
 
 
@@ -115,10 +116,18 @@ def finite_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _rising(columns: Sequence[RawColumn]) -> str | None:
-    """A column that rises like a clock: nearly always, and by much the same step, or from 1970 on."""
+    """A column that rises like a clock: nearly always, and by much the same step, or from 1970 on.
+
+    One that is called so in a word of its own, ``cputime_pru``, need not be even.
+    """
     frequencies = frequencies_in(columns)
-    # A clock goes before a counter, and one that says the date before any.
-    for column in sorted(columns, key=lambda c: (not since_1970(c.values), is_counter(c.name) or counts_rows(c))):
+
+    def rank(column: RawColumn) -> tuple[bool, bool, bool]:
+        """A clock goes before a counter, and one that says the date before any."""
+        counts = is_counter(column.name) or counts_rows(column)
+        return not since_1970(column.values), counts, _ENDS_IN_TIME.search(column.name) is None
+
+    for column in sorted(columns, key=rank):
         with np.errstate(invalid="ignore"):
             steps = np.diff(column.values)
         if (
@@ -129,7 +138,8 @@ def _rising(columns: Sequence[RawColumn]) -> str | None:
         ):
             continue
         usual = np.median(steps)
-        if since_1970(column.values) or np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
+        named = _ENDS_IN_TIME.search(column.name) is not None and float(steps.min()) > 0.0
+        if named or since_1970(column.values) or np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
             return column.name
     return None
 

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from sysid.errors import ReaderError, shortened
+from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.readers.csv_above import names_last
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, is_units, kind_of, trimmed
 from sysid.ingest.readers.csv_split import Split
 from sysid.ingest.readers.csv_widths import has_no_column, rises, without_name
 from sysid.ingest.tables.options import FileOptions
-from sysid.ingest.tables.time_columns import is_called_time
+from sysid.ingest.tables.time_columns import is_called_time, is_time_unit
 
 _BRACKET = re.compile(r"(?P<name>.*?)\s*(?P<unit>[\[(<][^\])>]*[\])>])")
 
@@ -124,7 +125,7 @@ def _take_names(found: Header, above: list[Row], split: Split) -> bool:
     grouped = None if upper is None or cells is None else _in_groups(upper, cells)
     if grouped is not None:
         row, cells = above[-2], grouped
-    elif upper is not None:  # a line of types or of numbers of channels below the names
+    elif upper is not None and not _heads(upper, cells):  # a line of types or of numbers of channels below the names
         row, cells = above[-2], upper
     if cells is not None:
         found.names, found.line = [re.sub(r"^(?:%|//|!|;|\*)+\s*(?=\S)", "", cells[0]), *cells[1:]], row.line
@@ -145,6 +146,13 @@ def _take_names(found: Header, above: list[Row], split: Split) -> bool:
             "which are numbered; names: [...] names them"
         )
     return False
+
+
+def _heads(upper: list[str], cells: list[str] | None) -> bool:
+    """Whether the lower of two lines has the names, though one comes again: it says units, or the upper repeats."""
+    above, below = ([cell.strip() for cell in row or [] if _filled(cell)] for row in (upper, cells))
+    own = all(parse_header(cell).unit for cell in below) and not any(parse_header(cell).unit for cell in above)
+    return own or len(set(above)) < len(above)
 
 
 def _tell_width(found: Header, row: Row, split: Split) -> None:
@@ -216,7 +224,10 @@ def _is_units(above: list[Row], split: Split) -> bool:
         return False
     if _says_of_record(names):
         return False
-    return sum(map(_filled, names)) >= sum(map(_filled, units)) and not any(kind_of(cell) in DATA for cell in names[:1])
+    # A clock needs no name where its unit says what it is.
+    clock = not _filled(names[0]) and is_time_unit(units[0].strip())
+    named = sum(map(_filled, names)) + clock
+    return named >= sum(map(_filled, units)) and not any(kind_of(cell) in DATA for cell in names[:1])
 
 
 def _says_of_record(cells: list[str]) -> bool:

@@ -67,7 +67,7 @@ def _load(path: Path) -> dict[str, Any]:
     need("matio", f"reading {path.name}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it sets an option of pandas that is on its way out
-        from matio import load_from_mat, whosmat
+        from matio import load_from_mat
 
         from sysid.ingest.readers.mat5_check import check_mat5
 
@@ -75,7 +75,7 @@ def _load(path: Path) -> dict[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it cannot read comes back as an object, which is refused by name
             check_mat5(path)
-            there = whosmat(path)
+            there = _listed(path)
             check_claim(path, ((name, shape) for name, (shape, kind) in there.items() if kind not in _NOT_NUMBERS))
             try:
                 loaded = load_from_mat(path, add_table_attrs=True)
@@ -90,6 +90,22 @@ def _load(path: Path) -> dict[str, Any]:
         for name, value in loaded.items()
         if not name.startswith("__")
     }
+
+
+def _listed(path: Path) -> Mapping[str, Any]:
+    """Shape and class of every variable."""
+    from matio import whosmat
+
+    try:
+        found: Mapping[str, Any] = whosmat(path)
+    except AttributeError:  # of what Simulink streams into a file of version 7.3, which is a group of HDF5
+        from h5py import Dataset, File
+
+        with File(path) as file:
+            held = {name: one for name, one in file.items() if isinstance(one, Dataset)}
+            kinds = {name: one.attrs.get("MATLAB_class", b"").decode() for name, one in held.items()}
+            return {name: (one.shape[::-1], kinds[name]) for name, one in held.items()}
+    return found
 
 
 def _is_reference(value: Any) -> bool:
@@ -205,6 +221,7 @@ def _only_matlab(name: str, kind: str, path: Path, error: Exception | None = Non
         expected="plain numeric arrays, structures, cells, iddata, tables",
         got=f"class {kind}" + (f" ({error})" if error is not None else ""),
         remedy="in MATLAB, for a timeseries ts: t = ts.Time; u = ts.Data; save('plain.mat', 't', 'u'); "
+        "for a Simulink Dataset d: ts = d{1}.Values; "
         "for a table T: s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's'); "
         "for iddata z: u = z.u; y = z.y; Ts = z.Ts; save('plain.mat', 'u', 'y', 'Ts')",
     )

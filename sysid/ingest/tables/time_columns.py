@@ -17,7 +17,8 @@ _TIME_NAMES = {
     "elapsed time", "elapsed", "seconds", "tout", "date", "datum", "datetime", "date time", "date/time", "date & time",
     "uhrzeit", "zeitstempel", "tijdstip", "clock", "hora", "heure", "fecha", "epoch", "unix time", "unixtime", "utc",
     "local time", "localtime", "time of day", "timeofday", "test time", "run time", "sim time", "simulation time",
-    "total time", "relative time", "rel time", "record time", "recording time", "measurement time", "system time",
+    "total time", "relative time", "cumulative time", "absolute time", "rel time",
+    "record time", "recording time", "measurement time", "system time",
     "unix timestamp", "timestring", "time string", "millis", "micros",
 }  # fmt: skip
 _TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
@@ -37,6 +38,7 @@ MOSTLY = 0.8
 _FALLS = 0.1
 _NAMELESS = re.compile(r"column_\d+")
 
+_ON = 3.0  # usual steps, within which a clock runs on
 GOES_BACK = 0.25
 """Part of the steps that lead back, from which on a column moves as a signal does; stamps that do are out of order."""
 
@@ -62,7 +64,8 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
     timed = [column for column in timed if column in named or _goes_on(column)]
     likely = [*plain, *clocks, *timed]
     back = {one.name for one in likely if _goes_back(one) or (_has_other_unit(one) and not _goes_on(one))}
-    found = next((column for column in likely if column.name not in back), None) or next(
+    forward = [column for column in likely if column.name not in back]
+    found = next((going_on_beside(one, forward) or one for one in forward), None) or next(
         (column for column in likely if not _has_other_unit(column)), None
     )
     return None if found is None else found.name
@@ -71,6 +74,28 @@ def recognise_time(columns: Sequence[RawColumn]) -> str | None:
 def _goes_back(column: RawColumn) -> bool:
     steps = np.diff(column.values)
     return bool(len(steps)) and float(np.mean(steps < 0.0)) > GOES_BACK
+
+
+def going_on_beside(clock: RawColumn, others: Sequence[RawColumn]) -> RawColumn | None:
+    """The clock of the whole record beside one of its parts, as cyclers of batteries write both.
+
+    Args:
+        clock: Which may begin anew, with each step of a program.
+        others: Of which one may run on there, as it does from sample to sample.
+
+    Returns:
+        The other; ``None`` where the clock itself runs on, or all of them stop where it begins anew, as between
+        records.
+    """
+    anew = np.flatnonzero(np.diff(clock.values) < 0.0)
+    for other in others if len(anew) else ():
+        steps = np.diff(other.values) if len(other.values) == len(clock.values) else np.empty(0)
+        if other is clock or not len(steps) or not np.isfinite(steps).all() or steps.min() < 0.0:
+            continue
+        usual = float(np.median(steps))
+        if usual > 0.0 and float(np.median(steps[anew])) <= _ON * usual:
+            return other
+    return None
 
 
 def _goes_on(column: RawColumn) -> bool:

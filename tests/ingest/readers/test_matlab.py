@@ -49,6 +49,17 @@ def test_a_matlab_object_is_refused_with_the_line_that_exports_it(
         read_table(tmp_path / "run.mat")
 
 
+def test_what_simulink_streams_into_a_file_is_an_object_and_no_damage(tmp_path: Path) -> None:
+    """It lies in a group of HDF5, at which the library stops that lists the variables."""
+    import h5py
+
+    _opaque_mat73(tmp_path / "run.mat")
+    with h5py.File(tmp_path / "run.mat", "a") as file:
+        file.create_group("#sigstream#").create_dataset("0", data=np.zeros(3))
+    with pytest.raises(ReaderError, match=r"(?s)ts is a MATLAB object.*d\{1\}\.Values"):
+        read_table(tmp_path / "run.mat")
+
+
 @pytest.mark.parametrize("wrapped", [True, False], ids=["in a structure", "as variables"])
 def test_names_and_units_that_stand_beside_u_and_y_are_theirs(tmp_path: Path, *, wrapped: bool) -> None:
     about = {"InputName": "voltage", "OutputName": cells("speed"), "InputUnit": "V", "OutputUnit": "rad/s"}

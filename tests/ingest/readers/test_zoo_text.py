@@ -286,6 +286,19 @@ ZOO = {
             lambda k: f"{k},{U[k]:.2e},{Y[k]:.6e},", "X,u,y,Start,Increment,", "Sequence,Volt,Volt,-2.5e0,1.0e-1"
         )
     ),
+    "Rigol: a clock whose unit is all that names it": Animal(
+        text=table(lambda k: f"{T[k] - 1:.5e},{U[k]:.2e},{Y[k]:.6e}, ", ",u,y", "Second,Volt,Volt")
+    ),
+    "Rigol: the same name over both channels, words above them": Animal(
+        text=table(
+            plain, '"Sampling Frequency (Hz)=",10,', '"Channel Data","CH 1","CH 2"', '"Inverted = ","NO","YES"',
+            '"Time (s)","Voltage (V)","Voltage (V)"',
+        ),
+        u="Voltage", y="Voltage 2",
+    ),
+    "potentiostats: units behind strokes": Animal(
+        text=table(lambda k: plain(k, "\t"), "time/s\tu/V\t<y>/mA"), y="<y>", suffix=".txt"
+    ),
     "Tektronix: units in a line of their own further above": Animal(
         text=table(plain, "Model,MSO44", "Sample Interval,1.0e-01", "Vertical Units,V,V", "Labels,,", "TIME,u,y")
     ),
