@@ -158,6 +158,8 @@ def _role(column: RawColumn) -> str:
     """What a column holds by its name and unit; empty where nothing says it."""
     if column.complex_values is not None:
         return "complex"
+    if "'" in column.name:  # of an impedance Z' and Z''
+        return "imaginary" if "''" in column.name else "real"
     words = re.sub(r"(?<=[a-z])(?=[A-Z])|[_\W\d]+", " ", column.name)
     unit = _spelt(column.unit or unit_in_name(column.name) or "")
     by_unit = {"deg": "phase", "rad": "phase", "db": "gain"}.get(unit, "")

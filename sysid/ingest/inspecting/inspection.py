@@ -30,7 +30,7 @@ from sysid.ingest.inspecting.time_findings import (
 from sysid.ingest.readers.records import role_of
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
-from sysid.ingest.tables.over_frequency import frequencies_in
+from sysid.ingest.tables.over_frequency import frequencies_in, swept_beside
 from sysid.ingest.tables.table import RawTable
 
 _MOST_APART = 6  # records of other kinds that are told one by one
@@ -176,9 +176,11 @@ def _finding(table: RawTable, attempt: Attempt) -> FileFinding:
 
 
 def _told_of_frequencies(table: RawTable, clock: _Clock, files: FileOptions) -> str:
-    """What is said of rows that are frequencies; nothing where something says the time of samples."""
-    timed = clock.time.column is not None or table.step is not None or files.time.step is not None
-    found = None if timed else frequencies_in(table.columns)
+    """What is said of rows that are frequencies; nothing where a person says the time of samples."""
+    if files.time.step is not None or files.time.column is not None:
+        return ""
+    timed = clock.time.column is not None or table.step is not None
+    found = swept_beside(table.columns) if timed else frequencies_in(table.columns)
     if found is None:
         return ""
     from sysid.ingest.tables.no_record import over_frequency  # here: a record needs no word of it

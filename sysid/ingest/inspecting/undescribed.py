@@ -20,8 +20,9 @@ from sysid.ingest.inspecting.second_clocks import without_clocks
 from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file, typed_options
 from sysid.ingest.readers.text_source import bare_stem
 from sysid.ingest.reading import read_table, trace_of
-from sysid.ingest.tables.no_record import refuse_frequencies
+from sysid.ingest.tables.no_record import over_frequency, refuse_frequencies
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
+from sysid.ingest.tables.over_frequency import swept_beside
 from sysid.ingest.tables.table import RawTable
 from sysid.traces import Role, TraceSet
 
@@ -52,6 +53,8 @@ def load_file(path: Path) -> TraceSet:
     """
     try:
         held = [read_table(path)]
+        if (swept := swept_beside(held[0].columns)) is not None:
+            raise refuse_frequencies(over_frequency(swept), path)
         several = bool(held[0].records)
         others = [f"{column.name} ({len(column.values)} samples)" for column in held[0].others]
         words = any(c.words is not None and c.problem is not None for c in held[0].columns)

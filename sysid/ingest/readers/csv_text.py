@@ -21,7 +21,6 @@ from sysid.ingest.readers.csv_above import NO_UNITS
 from sysid.ingest.readers.csv_beside import records_beside
 from sysid.ingest.readers.csv_body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
 from sysid.ingest.readers.csv_cells import Kind, unit_text
-from sysid.ingest.readers.csv_clock import running_on
 from sysid.ingest.readers.csv_layout import Layout, recognise
 from sysid.ingest.readers.csv_sideways import sideways
 from sysid.ingest.readers.reader import Reader
@@ -85,7 +84,10 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
     body = Body(file=file, layout=layout, columns=columns, comment=options.comment, repairs=repairs)
     rows = body.read()
     notes = [*layout.notes, *body.notes]
-    time = time if options.time.column is not None else running_on(columns, time)
+    if options.time.column is None and sum(isinstance(column, Stamps) for column in columns) > 1:
+        from sysid.ingest.readers.csv_clock import running_on  # here: most tables have one
+
+        time = running_on(columns, time)
     raw, guess = _finished(headers, columns, layout, path, notes, calendar=time)
     if layout.numbers.decimal != ".":
         notes.append("decimal comma")

@@ -13,6 +13,12 @@ from sysid.ingest.tables.columns import RawColumn
 
 _CALLED = re.compile(r"(?:^|[^a-z])(?:freq(?:uency|uenz|uence|s)?|omega|hz|khz)(?:$|[^a-z])", re.IGNORECASE)
 _NAMELESS = re.compile(r"(?:[a-z]*[ _.]?\d+|[fwxω]|fr)$", re.IGNORECASE)
+_PARTS = re.compile(
+    r"(?P<ii>''|\")|(?P<r>')|\b[ZYHG]?(?:(?P<re>re(?:al)?)|(?P<im>im(?:ag(?:inary)?)?)|(?P<ph>ph(?:ase|z))|"
+    r"(?P<g>mod(?:ulus)?|mag(?:nitude)?|gain))(?![a-z])",
+    re.IGNORECASE,
+)
+_PART = {"ii": "imaginary", "im": "imaginary", "r": "real", "re": "real", "ph": "phase", "g": "gain"}
 _UNITS = {"Hz", "kHz", "MHz", "GHz", "rad/s"}
 _LEAST = 5  # rows of a sweep
 _DECADE, _SAME_RATIO = 10.0, 0.05
@@ -49,6 +55,23 @@ def _swept(values: NDArray[np.float64]) -> bool:
         return False
     again = values[1:][np.diff(values) <= 0.0]
     return bool(len(again) <= len(values) / _LEAST and np.all(again == values.min()))
+
+
+def swept_beside(columns: Sequence[RawColumn]) -> RawColumn | None:
+    """The column of frequencies of a response whose rows have times, too, as analysers of impedances write them.
+
+    Args:
+        columns: Of a file with a clock.
+
+    Returns:
+        The column; ``None`` where nothing beside it is both parts of a response: a frequency that rises over time is
+        a signal.
+    """
+    parts = {_PART[match.lastgroup] for c in columns if (match := _PARTS.search(c.name)) and match.lastgroup}
+    if not ({"real", "imaginary"} <= parts or {"gain", "phase"} <= parts):
+        return None
+    swept = frequencies_in([c for c in columns if called_frequency(c)])
+    return swept if swept is not None and np.ptp(swept.values) > 0.0 else None
 
 
 def called_frequency(column: RawColumn) -> bool:

@@ -25,9 +25,16 @@ SWEEPS: dict[str, dict[str, np.ndarray]] = {
     "one that only its numbers tell": {"c1": LOGARITHMIC, "c2": -EVEN, "c3": -EVEN},
 }
 
+STAMPED: dict[str, dict[str, np.ndarray]] = {
+    "potentiostats": {"freq/Hz": LOGARITHMIC[::-1], "Re(Z)/Ohm": EVEN, "-Im(Z)/Ohm": EVEN, "time/s": 1.5 * EVEN},
+    "gain analysers": {"Time (Sec)": EVEN, "Freq(Hz)": LOGARITHMIC, "Zmod (ohm)": EVEN, "Zphz (deg)": -EVEN},
+    "primes": {"Time(Sec)": EVEN, "Freq(Hz)": LOGARITHMIC, "Z'(a)": EVEN, "Z''(b)": -EVEN},
+}
+
 RECORDS: dict[str, dict[str, np.ndarray]] = {
     "a frequency that is a signal": {"freq [Hz]": 50 + np.sin(EVEN), "y": np.cos(EVEN)},
     "an instantaneous frequency beside a clock": {"t [s]": EVEN, "freq [Hz]": LOGARITHMIC, "y": np.cos(EVEN)},
+    "the phase of what is swept": {"t [s]": EVEN, "freq [Hz]": LOGARITHMIC, "phase [rad]": np.sin(EVEN)},
     "a ramp of something else": {"speed": LOGARITHMIC, "y": np.cos(EVEN)},
 }
 
@@ -51,6 +58,16 @@ def test_a_frequency_response_is_no_record_at_any_door(tmp_path: Path, case: str
         assert f"sysid fit-response {path} --poles 2" in str(caught.value)
     with pytest.raises(UserError, match=r"(?s)no record over time.*sysid\.fit_response"):
         sysid.data(pd.DataFrame(SWEEPS[case]))
+
+
+@pytest.mark.parametrize("case", STAMPED)
+def test_a_response_whose_rows_have_times_is_no_record_either(tmp_path: Path, case: str) -> None:
+    path = tmp_path / "a.csv"
+    pd.DataFrame(STAMPED[case]).to_csv(path, index=False)
+    for door in (lambda: sysid.load(path), lambda: propose_dataset(inspect_file(path))):
+        with pytest.raises(UserError, match="no record over time"):
+            door()
+    assert len(sysid.response_data(path, units={"gain": "1"})) == N
 
 
 @pytest.mark.parametrize("case", ["a sweep", "one that only its numbers tell"])
