@@ -183,6 +183,8 @@ class ObserverBlock:
 
 
 def _padded(values: NDArray[Any], length: int) -> NDArray[Any]:
+    if len(values) == length:
+        return values
     return np.concatenate([values, np.zeros(length - len(values), dtype=values.dtype)])
 
 

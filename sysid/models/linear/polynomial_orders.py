@@ -98,16 +98,22 @@ class AbstractPolynomial(AbstractStructure):
         Returns:
             The polynomials.
         """
-        sizes = [*self.nb, *self.denominators, *(self.order(name) for name in ("na", "nc", "nd"))]
-        parts = np.split(theta, np.cumsum(sizes))
-        rest = parts.pop()
-        m, one = len(self.nb), np.ones(1, dtype=theta.dtype)
-        B = [np.concatenate([np.zeros(nk, dtype=theta.dtype), b]) for b, nk in zip(parts[:m], self.nk, strict=True)]
-        F = [np.concatenate([one, f]) for f in parts[m : 2 * m]]
-        A, C, D = (np.concatenate([one, part]) for part in parts[2 * m :])
+        at = 0
+
+        def following(n: int, *, dead: int = 0, one: int = 0) -> NDArray[Any]:
+            nonlocal at
+            part = np.zeros(dead + one + n, dtype=theta.dtype)
+            part[:one] = 1.0
+            part[dead + one :] = theta[at : at + n]
+            at += n
+            return part
+
+        B = tuple(following(n, dead=nk) for n, nk in zip(self.nb, self.nk, strict=True))
+        F = tuple(following(n, one=1) for n in self.denominators)
+        A, C, D = (following(self.order(name), one=1) for name in ("na", "nc", "nd"))
         if self.drifts:
             D = np.convolve(D, np.array([1.0, -1.0]))
-        return Polynomials(A=A, B=tuple(B), F=tuple(F), C=C, D=D, constant=rest[0] if self.level else 0.0 * one[0])
+        return Polynomials(A=A, B=B, F=F, C=C, D=D, constant=theta[at] if self.level else theta.dtype.type(0.0))
 
     def _check(self, example: str) -> None:
         """Bring fields for each input into their form, and refuse what are no orders."""
