@@ -15,6 +15,7 @@ import pytest
 from sysid.errors import ConfigError
 from sysid.reporting import read_results, write_report
 from sysid.reporting.figures import fit_figures as figures
+from sysid.reporting.html import page_template
 from sysid.validation.metrics import MERITS
 
 PAIR = ("ARX", "NARX free run")
@@ -237,6 +238,10 @@ def test_what_the_run_says_in_words_is_on_the_page_and_escaped(page: Page, path:
     ):
         assert text in words
     assert "<stable>" not in path.read_text(encoding="utf-8")
+
+
+def test_a_template_is_translated_once_a_process() -> None:
+    assert page_template("report.html.j2") is page_template("report.html.j2")
 
 
 def test_a_report_made_twice_is_the_same_to_the_byte(make_run: Callable[..., Path], tmp_path: Path) -> None:
