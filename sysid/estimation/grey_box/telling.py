@@ -10,6 +10,7 @@ import numpy as np
 from sysid.equations.units_checked import unit_contradictions
 from sysid.estimation.grey_box.by_case import case_notes
 from sysid.estimation.grey_box.finishing import Done
+from sysid.estimation.grey_box.open_runs import OpenRuns
 from sysid.estimation.grey_box.profile import Profiler
 from sysid.estimation.grey_box.readying import power_remedy
 from sysid.estimation.grey_box.stepping import step_note, step_warning
@@ -76,7 +77,11 @@ def told(
         warnings = [*_contradictions(model), *_not_there(model)]
         found = replace(found, status=Status.STALLED) if found.status is Status.CONVERGED else found
     else:
-        warnings = list(findings.more_than_shown if built else [*_contradictions(model), *findings.warnings])
+        warnings = [] if built else [*_contradictions(model), *findings.warnings]
+    if built and posterior is not None and (runs := OpenRuns.of(model, posterior, data[0])) is not None:
+        said, warned = runs.told(findings)
+        notes += said
+        warnings += warned
     if model.lowered.n_continuous and not done.stepping.enough:
         warnings.append(step_warning(model, done.stepping))
     return replace(

@@ -212,21 +212,15 @@ class Findings:
         )
 
     @property
-    def more_than_shown(self) -> tuple[str, ...]:
-        """Of equations that nobody wrote, whose parameters nobody can fix: that they hold more than records show."""
+    def left_open(self) -> str:
+        """How many of the parameters of equations that nobody wrote the records leave open, with names; or nothing."""
         # Breakpoints and coefficients of poles are of the order of 1: one that may be anything there is not known.
         wide = np.sqrt(np.diag(self.covariance)) > np.maximum(1.0, np.abs(self.values))
         wide &= [WITHIN.search(one.name) is not None for one in self.named]
         open_, n = self.open, len(self.named)
         left = [one.name for one, far in zip(self.named, wide, strict=True) if far or one.name in open_]
-        if not left:
-            return ()
         names = ", ".join(left[:MOST_NAMES]) + (", ..." if len(left) > MOST_NAMES else "")
-        return (
-            f"The records do not tell {len(left)} of {n} parameters apart from the others ({names}): the free run "
-            "beyond what was recorded is open there. A simpler curve, fewer pieces, states or terms would do; or "
-            "record more of the range.",
-        )
+        return f"{len(left)} ({names}) of {n}" if left else ""
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -368,16 +368,6 @@ def test_a_plant_that_integrates_behind_a_valve_and_a_lag_is_found() -> None:
     assert fit.status.usable
 
 
-def test_a_curve_with_more_pieces_than_the_record_shows_is_told_in_one_sentence() -> None:
-    u = steps(1)
-    y = first_order(u, 0.8, 0.0)
-    fit = fit_blocks([a_trace(u, y)], MAPPING, WienerHammerstein(first=1, second=1), ONE)
-    (told,) = fit.warnings
-    assert "simpler curve" in told
-    plain = fit_blocks([a_trace(u, block(u))], MAPPING, HammersteinWiener(states=2), Training(starts=1))
-    assert plain.warnings == ()
-
-
 @pytest.mark.parametrize(("kind", "drift"), [(StartKind.REST, 0.0), (StartKind.ESTIMATED, -0.02)])
 def test_a_block_may_integrate_an_input_that_is_off(kind: StartKind, drift: float) -> None:
     u = steps(7)
