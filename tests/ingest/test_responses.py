@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from scipy.io import savemat
 
+import sysid
 from sysid.errors import UserError
 from sysid.ingest.inspecting.undescribed import GuessedWarning
 from sysid.ingest.responses import read_response
@@ -56,11 +57,28 @@ def test_what_is_guessed_is_told_and_can_be_said(tmp_path: Path) -> None:
     np.testing.assert_allclose(said.frequency, HZ)
 
 
-def test_an_frd_of_matlab_is_read(tmp_path: Path) -> None:
-    savemat(tmp_path / "a.mat", {"G": {"ResponseData": H.reshape(1, 1, -1), "Frequency": W, "Ts": 0.0}})
-    with pytest.warns(GuessedWarning, match="Frequency in rad/s"):
+@pytest.mark.parametrize(
+    ("unit", "frequency"), [("rad/TimeUnit", W), ("Hz", HZ), ("kHz", HZ / 1e3), ("rad/s", W)], ids=str
+)
+def test_an_frd_of_matlab_is_read_in_the_unit_that_it_says(tmp_path: Path, unit: str, frequency: np.ndarray) -> None:
+    about = {"Frequency": frequency, "FrequencyUnit": unit, "TimeUnit": "seconds", "Ts": 0.01}
+    savemat(tmp_path / "a.mat", {"G": {"ResponseData": H.reshape(1, 1, -1), **about}})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
         found = read_response(tmp_path / "a.mat")
     np.testing.assert_array_equal(found.values, H)
+    np.testing.assert_allclose(found.frequency, W)
+    with pytest.raises(UserError, match="no record over time"):
+        sysid.load(tmp_path / "a.mat")
+
+
+def test_one_of_several_responses_of_an_frd_is_named(tmp_path: Path) -> None:
+    several = np.stack([1 * H, 2 * H, 3 * H, 4 * H]).reshape(2, 2, -1)
+    savemat(tmp_path / "a.mat", {"G": {"ResponseData": several, "Frequency": W, "FrequencyUnit": "rad/s"}})
+    with pytest.raises(UserError, match="several columns may be the complex"):
+        read_response(tmp_path / "a.mat")
+    found = read_response(tmp_path / "a.mat", columns={"complex": "ResponseData(2,1)"})
+    np.testing.assert_array_equal(found.values, 3 * H)
 
 
 def test_columns_are_named_where_nothing_tells_them(tmp_path: Path) -> None:

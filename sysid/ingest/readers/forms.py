@@ -127,6 +127,30 @@ def _iddata(node: Mapping[str, Any]) -> Any:
     return dict(zip(names, records, strict=True)) if len(set(names)) == count else records
 
 
+def _is_frd(node: Mapping[str, Any]) -> bool:
+    return "ResponseData" in node and "Frequency" in node
+
+
+def _frd(node: Mapping[str, Any]) -> dict[str, Any]:
+    """The responses of an ``frd`` or ``idfrd`` that was saved as a structure, an array of outputs, inputs, frequencies.
+
+    Its sample time is the model's, and says nothing of the rows.
+    """
+    frequency, held = leaf_of(node["Frequency"]), node["ResponseData"]
+    values = held.values if isinstance(held, Leaf) else held
+    if frequency is None or not isinstance(values, np.ndarray) or values.dtype.kind not in "buifc":
+        return {str(key): value for key, value in node.items()}
+    said = " ".join(texts_of(node.get("FrequencyUnit", node.get("Units")))) or "rad/TimeUnit"
+    unit = {"rad/TimeUnit": "rad/s", "cycles/TimeUnit": "Hz"}.get(said, said)
+    if said.endswith("TimeUnit") and _SECONDS.get(" ".join(texts_of(node.get("TimeUnit"))).casefold()) != 1.0:
+        unit = ""  # of another unit of time, which a person has to say
+    columns: dict[str, Any] = {"Frequency": Leaf(values=frequency.values.reshape(-1), unit=unit or None)}
+    if values.ndim != 3 or max(values.shape[:2]) == 1:
+        return columns | {"ResponseData": Leaf(values=values.reshape(-1))}
+    pairs = np.ndindex(values.shape[:2])
+    return columns | {f"ResponseData({i + 1},{j + 1})": Leaf(values=values[i, j]) for i, j in pairs}
+
+
 def _experiments(value: Any) -> list[Any]:
     return list(value) if isinstance(value, list) else [value]
 
@@ -225,6 +249,7 @@ def _structure_with_time(node: Mapping[str, Any]) -> Any:
 
 
 _FORMS: tuple[tuple[Callable[[Mapping[str, Any]], bool], Callable[[Mapping[str, Any]], Any]], ...] = (
+    (_is_frd, _frd),
     (_is_iddata, _iddata),
     (_is_plain_iddata, _plain_iddata),
     (_is_timeseries, _timeseries),

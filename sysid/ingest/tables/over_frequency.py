@@ -68,7 +68,8 @@ def swept_beside(columns: Sequence[RawColumn]) -> RawColumn | None:
         a signal.
     """
     parts = {_PART[match.lastgroup] for c in columns if (match := _PARTS.search(c.name)) and match.lastgroup}
-    if not ({"real", "imaginary"} <= parts or {"gain", "phase"} <= parts):
+    whole = any(column.complex_values is not None for column in columns)
+    if not (whole or {"real", "imaginary"} <= parts or {"gain", "phase"} <= parts):
         return None
     swept = frequencies_in([c for c in columns if called_frequency(c)])
     return swept if swept is not None and np.ptp(swept.values) > 0.0 else None
