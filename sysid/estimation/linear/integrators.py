@@ -1,4 +1,6 @@
-"""Poles at 1: those that the records do not tell from an integrator are held there, and the others follow.
+"""Poles at the edge: those that the records do not tell from an integrator, or from a pair that swings undamped.
+
+They are held there, and the others follow.
 
 Each input has integrators of its own. One may be held where another is not: beside an integrator a slow pole may lie as
 near to 1 as records of that length can tell, and is none. What is held moves the rest a little, so that each choice
@@ -118,6 +120,21 @@ def all_at_one(end: End, domain: Domain, sample_time: float, near: float) -> End
     return _held(end, domain, found) if any(map(len, found)) else end
 
 
+def with_edge(end: End, domain: Domain, sample_time: float, near: float) -> End:
+    """An end with all poles at 1, and all pairs on the circle, that its records do not tell from there.
+
+    Args:
+        end: The end; its problem lets poles lie anywhere.
+        domain: Of its poles.
+        sample_time: Seconds.
+        near: How far from there, in the z plane, a pole may lie to be asked about.
+
+    Returns:
+        The end; see :func:`with_integrators`.
+    """
+    return _undamped(with_integrators(end, domain, sample_time, near), domain, sample_time, near)
+
+
 def with_integrators(end: End, domain: Domain, sample_time: float, near: float) -> End:
     """An end with all poles at 1 that its records do not tell from there.
 
@@ -164,9 +181,42 @@ def _close(part: Sequence[Array], domain: Domain, reach: float, *, one: bool = F
     return close[away[close] <= away[close].min() * (1.0 + TOGETHER)] if one and len(close) else close
 
 
+def _undamped(end: End, domain: Domain, sample_time: float, near: float) -> End:
+    """The end with pairs on the circle that are no further from there than its records tell.
+
+    A pair a little outside grows by next to nothing within the record, and by all numbers beyond it.
+    """
+    reached, left = end, _pairs(end, domain, sample_time, near)
+    for at in left:
+        theta = reached.theta.copy()
+        theta[at] = 1.0 if domain is Domain.DISCRETE else 0.0
+        tried = _from(reached, theta)
+        reached = reached if _worse(tried, end) else tried
+    return reached
+
+
+def _pairs(end: End, domain: Domain, sample_time: float, near: float) -> list[int]:
+    """Parameters that say how a pair of poles near the circle is damped, the nearest first."""
+    found, at = list[tuple[float, int]](), 0
+    discrete = domain is Domain.DISCRETE
+    for order in end.provider.poles.orders:
+        if order == 2:
+            first, last = end.theta[at : at + 2]
+            swings = abs(first) < 1.0 and last > 0.0 if discrete else 4.0 * last > first**2
+            away = abs(last - 1.0) / 2.0 if discrete else abs(first) / 2.0 * sample_time
+            if swings and 0.0 < away < near:
+                found.append((away, at + 1 if discrete else at))
+        at += order
+    return [at for _, at in sorted(found)]
+
+
 def _held(end: End, domain: Domain, which: Sequence[Places]) -> End:
     """The end with some poles put at 1, where the others lead to once all that are there are held."""
-    theta = end.provider.poles.theta(_put(end.sections, domain, which))
+    return _from(end, end.provider.poles.theta(_put(end.sections, domain, which)))
+
+
+def _from(end: End, theta: Array) -> End:
+    """Where poles lead to once all that are at the edge are held."""
     free = ~_stays(end.provider.poles, theta)
     if free.any() and np.isfinite(end.provider.loss(theta)):
         rest = _Free(whole=end.provider, at=theta, free=np.flatnonzero(free))
@@ -200,17 +250,18 @@ def _rank(end: End) -> int:
 def _stays(poles: PoleParameters, theta: Array) -> NDArray[np.bool_]:
     """Parameters that hold poles at 1: the first reflection coefficient of a section, or its constant coefficient.
 
-    Where both poles of a section are there, so do both parameters.
+    Where both poles of a section are there, so do both parameters. A pair on the circle is held by the second
+    reflection coefficient, or by the damping.
     """
     stays, at = np.zeros(len(theta), dtype=np.bool_), 0
     for order in poles.orders:
         first, last = theta[at], theta[at + order - 1]
         if poles.domain is Domain.DISCRETE:
             stays[at] = first == -1.0
-            stays[at + order - 1] |= first == -1.0 and last == 1.0
+            stays[at + order - 1] |= order > 1 and last == 1.0
         else:
             stays[at + order - 1] = last == 0.0
-            stays[at] |= last == 0.0 and first == 0.0
+            stays[at] |= order > 1 and first == 0.0
         at += order
     return stays
 

@@ -40,8 +40,8 @@ BOUND = (
     "the output back; where it drifts by itself, take that off first (repairs: {drift: {y: line}})."
 )
 ONE = (
-    "the plant is taken to integrate, from which these records do not tell it. A drift of the output by itself looks "
-    "the same: take that off first (repairs: {drift: {y: line}})."
+    "the plant is taken to integrate, or to swing undamped, from which these records do not tell it. A drift of the "
+    "output by itself looks the same: take that off first (repairs: {drift: {y: line}})."
 )
 SEEN = (
     "its interval says how well these records tell it from an integrator, unless the output drifts by itself, which "

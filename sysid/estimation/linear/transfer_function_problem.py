@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sysid.errors import FitDivergedError
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.delay_search import FEW
-from sysid.estimation.linear.integrators import all_at_one, with_integrators
+from sysid.estimation.linear.integrators import all_at_one, with_edge
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function_runs import End
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
@@ -217,7 +217,7 @@ class AbstractProblem(ABC):
         return model, known
 
     def at_one(self, end: End, *, every: bool = False) -> End:
-        """The end with all poles at 1 that records of this length do not tell from there.
+        """The end with all poles at 1, and pairs on the circle, that records of this length do not tell from there.
 
         Args:
             end: The end.
@@ -227,7 +227,7 @@ class AbstractProblem(ABC):
             The other one, with the loss that it has; see :mod:`sysid.estimation.linear.integrators`.
         """
         near = slow_poles.REACH / max(len(record.target) for record in end.provider.records)
-        put = all_at_one if every else with_integrators
+        put = all_at_one if every else with_edge
         return put(end, self.orders.domain, self.terms.sample_time, near)
 
 

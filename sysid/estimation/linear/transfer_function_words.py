@@ -53,9 +53,18 @@ def of_stability(model: TransferFunctionModel) -> str:
     def beyond(some: NDArray[np.complex128]) -> NDArray[np.float64]:
         return np.asarray(np.abs(some) - 1.0 if discrete else some.real)
 
-    away, at_edge = beyond(poles), max(int(np.count_nonzero(np.abs(beyond(some)) <= edge)) for some in each)
-    if at_edge and float(away.max()) <= edge:
-        word = {1: "an integrator", 2: "a double integrator"}.get(at_edge, f"{at_edge} poles at the edge")
+    away, at_edge = beyond(poles), [some[np.abs(beyond(some)) <= edge] for some in each]
+    swings = np.concatenate(at_edge)
+    swings = swings[np.abs(swings.imag) > edge]
+    if len(swings) and float(away.max()) <= edge:
+        w = float(np.abs(np.angle(swings[0]) / model.sample_time if discrete else swings[0].imag))
+        return (
+            f"The transfer function neither settles nor grows: it swings undamped at {w:.4g} rad/s, and an error of "
+            "its input stays for ever."
+        )
+    most = max(map(len, at_edge))
+    if most and float(away.max()) <= edge:
+        word = {1: "an integrator", 2: "a double integrator"}.get(most, f"{most} poles at the edge")
         return f"The transfer function is not stable: {word}; an error of its input adds up for ever."
     if model.stable:
         return "The transfer function is stable."

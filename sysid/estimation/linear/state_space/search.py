@@ -24,6 +24,8 @@ from sysid.models.linear.innovations import Innovations
 
 WORTH = 0.5
 """How much larger, as a logarithm, errors may be without a model of the noise for one to be begun there."""
+TOUCHING = 1e-9
+"""How far within the largest magnitude poles are brought that lie beyond it."""
 QUICK = 4
 """Steps after which dead times are compared, from one subspace estimate: that which feedback does not bias."""
 
@@ -80,6 +82,8 @@ def search(
             # Without inputs or a constant nothing makes a ramp of them.
             left = began + training.max_time_s - now()
             found, problem = held_at_one(found, problem, zero, iterations=iterations, seconds=left)
+        if training.stable is None and iterations:
+            found = _brought_in(found, problem, iterations, began + training.max_time_s - now())
         errors = None if orders.noise else problem.around_errors(found.system)
         if iterations:
             found = problem.with_colour(found)
@@ -150,6 +154,28 @@ def _better(inside: Found, beyond: Found, problem: Problem) -> Found:
     scale = float(np.mean([np.mean(segment.outputs**2) for segment in problem.segments]))
     size = beyond.chart.n_parameters
     return beyond if slow_poles.significantly_better(errors, than, parameters=size, scale=scale) else inside
+
+
+def _brought_in(found: Found, problem: Problem, iterations: int, seconds: float) -> Found:
+    """A system that hardly grows within a record, with its poles inside where that is as good but for chance.
+
+    So of one that swings undamped: beyond its record it would grow beyond all numbers.
+    """
+    beyond = found.system.radius - 1.0
+    if problem.sums or problem.stable or not 0.0 < beyond <= slow_poles.REACH / max(problem.lengths):
+        return found
+    inside = replace(problem, stable=True)
+    # All poles by the same small part: mirrored, a pair would begin further off than steps bring back.
+    just = replace(found.system, A=found.system.A * (inside.largest * (1.0 - TOUCHING) / found.system.radius))
+    begun = inside.with_inputs(just)
+    if begun is None:
+        return found
+    other = inside.refined(begun[1], iterations, seconds)
+    errors, than = (problem.around_errors(one.system) for one in (found, other))
+    scale = float(np.mean([np.mean(segment.outputs**2) for segment in problem.segments]))
+    if slow_poles.significantly_better(errors, than, parameters=0, scale=scale):
+        return found
+    return replace(other, weighting=found.weighting)
 
 
 def _from_white(found: Found, problem: Problem, iterations: int, until: float) -> Found:
