@@ -61,7 +61,7 @@ def test_a_run_that_swings_by_itself_does_not_forget_where_it_began(run: Run | A
 
 def test_a_run_is_asked_over_commands_in_another_order_than_the_record_had() -> None:
     """Passages that match where the one before ended pass by what the record does not: a run had a second place to
-    stand, and was 300 % off on new commands, with one excursion in a hundred that showed it."""
+    stand, and was far off on new commands, with one excursion in a hundred that showed it."""
     record = trace_of({"u": np.repeat([0.0, 1.0, 2.0, 1.0], 100), "y": np.zeros(400)}, sample_time=0.5)
 
     def latched(sequence: InputSequence) -> np.ndarray:
