@@ -16,6 +16,7 @@ from sysid.api.abstract_fit import AbstractResponses
 from sysid.api.estimates import FrequencyResponse
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Spectrum, TransferFunctionTraining, fit_spectra
+from sysid.estimation.linear.response_dead_time import with_dead_time
 from sysid.models import Cascade, Domain, Mapping, TransferFunction
 from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.traces import Channel, Role, Trace, TraceSet
@@ -242,8 +243,8 @@ def fit_response(
         response: Of :func:`response_data`; or one of :func:`sysid.frequency_response`, of one input.
         structure: With one number of poles and zeros; a response has no level, so that it has no intercept.
         mapping: What input and output are called; ``"u -> y"`` by default.
-        sample_time: Of the model in seconds, of which a dead time is a multiple. A continuous one has by default 20
-            samples in a period of the highest frequency.
+        sample_time: Of the model in seconds, of which a dead time is a multiple. A continuous one has by default some
+            20 samples in a period of the highest frequency, and so that they make the dead time that was found.
         weighting: What counts of the error at each frequency: ``"none"``, ``"relative"``, ``"root"`` or
             ``"coherence"``; see :class:`Weighting`.
         units: Of the input and the output, by name; ``"1"`` by default.
@@ -282,15 +283,23 @@ def fit_response(
             got=str(mapped), remedy="fit each pair by itself; sysid.estimation.fit_spectra takes several inputs",
         )  # fmt: skip
     known = {name: check_unit((units or {}).get(name, "1")) for name in mapped.channels}
-    found = fit_spectra(
-        Spectrum.of_response(measured.frequency, measured.values, weights=weighting.weights(measured)),
-        mapped,
-        replace(structure, intercept=False),
-        training,
-        sample_time=_sample_time(structure, measured, sample_time),
-        input_units=(known[mapped.inputs[0]],),
-        output_unit=known[mapped.output],
-    )
+    spectra = Spectrum.of_response(measured.frequency, measured.values, weights=weighting.weights(measured))
+    orders, training = replace(structure, intercept=False), training or TransferFunctionTraining()
+
+    def fit_at(time: float, delay: int | None = None, few: bool = False) -> FitResult:
+        return fit_spectra(
+            spectra,
+            mapped,
+            orders if delay is None else replace(orders, delays=(delay,)),
+            replace(training, scattered_starts=0) if few else training,
+            sample_time=time,
+            input_units=(known[mapped.inputs[0]],),
+            output_unit=known[mapped.output],
+        )
+
+    found = fit_at(_sample_time(structure, measured, sample_time))
+    if sample_time is None and structure.delays is None:
+        found = with_dead_time(found, fit_at, n_residuals=2 * len(measured))
     fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(FitResult)}
     fit = ResponseFit(**fields, response=measured, weighting=weighting)
     low, high = HERTZ.told(measured.frequency[[0, -1]])
