@@ -21,6 +21,7 @@ SWEEPS: dict[str, dict[str, np.ndarray]] = {
     "an even one, which rises as a clock does": {"freq [Hz]": EVEN, "mag [dB]": -EVEN},
     "one for each load": {"load": np.repeat([1.0, 2.0], N), "f [kHz]": np.tile(EVEN, 2), "gain": np.tile(1 / EVEN, 2)},
     "in rad/s": {"omega": LOGARITHMIC, "re": 1 / LOGARITHMIC, "im": -1 / LOGARITHMIC},
+    "a few even ones in rad/s": {"w [rad/s]": EVEN, "gain": 1 / EVEN, "phase [deg]": -EVEN},
     "one that falls, as of impedances": {"Freq": LOGARITHMIC[::-1], "Zreal": LOGARITHMIC, "Zimag": -EVEN},
     "one that only its numbers tell": {"c1": LOGARITHMIC, "c2": -EVEN, "c3": -EVEN},
 }
@@ -35,6 +36,8 @@ RECORDS: dict[str, dict[str, np.ndarray]] = {
     "a frequency that is a signal": {"freq [Hz]": 50 + np.sin(EVEN), "y": np.cos(EVEN)},
     "an instantaneous frequency beside a clock": {"t [s]": EVEN, "freq [Hz]": LOGARITHMIC, "y": np.cos(EVEN)},
     "the phase of what is swept": {"t [s]": EVEN, "freq [Hz]": LOGARITHMIC, "phase [rad]": np.sin(EVEN)},
+    "a motor that is started": {"u [V]": np.ones(N), "omega [rad/s]": 100 * (1 - np.exp(-EVEN / 20))},
+    "a shaft in rad/s that runs down": {"speed [rad/s]": 100 * np.exp(-EVEN / 20), "torque [N*m]": np.cos(EVEN)},
     "a ramp of something else": {"speed": LOGARITHMIC, "y": np.cos(EVEN)},
 }
 
