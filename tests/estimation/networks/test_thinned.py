@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -107,7 +108,7 @@ def test_a_number_that_thins_nothing_is_refused() -> None:
 
 
 def test_a_fit_whose_thinned_model_is_none_of_all_samples_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sysid.estimation.networks.neural.thinned.finer", lambda *_: None)
+    monkeypatch.setattr("sysid.estimation.networks.neural.thinned.finer", lambda *_: time.sleep(0.2))  # and gives none
     record, training = shaken(0, 2.0, n=1500), Training(starts=1, max_iterations=2, stable=True)
     structure = NeuralStateSpace(states=2, neurons=1)
     sparse, whole = (
@@ -115,7 +116,7 @@ def test_a_fit_whose_thinned_model_is_none_of_all_samples_begins_anew(monkeypatc
     )
     np.testing.assert_array_equal(sparse.model.theta, whole.model.theta)
     assert "every 5th sample" in sparse.notes[-1]
-    assert sparse.train_time_s > whole.train_time_s
+    assert sparse.train_time_s > 0.2  # what was given up is counted, too
 
 
 @pytest.mark.parametrize("turn", [0.2, 1.0])
