@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from sysid.estimation.results.result import FitResult
 from sysid.models import TransferFunctionModel
@@ -41,6 +40,8 @@ def with_dead_time(first: FitResult, fit_at: FitAt, *, n_residuals: int) -> FitR
     Returns:
         The fit, its intervals widened by what is not known of the dead time; the first one where that is as good.
     """
+    from scipy.optimize import minimize_scalar  # most fits do without
+
     model = first.model
     assert isinstance(model, TransferFunctionModel)  # noqa: S101 - no other is fitted to a response
     sample, delay = model.sample_time, model.delays[0]
