@@ -17,7 +17,7 @@ from sysid.api.estimates import FrequencyResponse
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Spectrum, TransferFunctionTraining, fit_spectra
 from sysid.estimation.linear.response_dead_time import with_dead_time
-from sysid.models import Cascade, Domain, Mapping, TransferFunction
+from sysid.models import Cascade, Domain, Mapping, TransferFunction, TransferFunctionModel
 from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.traces.measured_response import MeasuredResponse
@@ -284,14 +284,15 @@ def fit_response(
         )  # fmt: skip
     known = {name: check_unit((units or {}).get(name, "1")) for name in mapped.channels}
     spectra = Spectrum.of_response(measured.frequency, measured.values, weights=weighting.weights(measured))
-    orders, training = replace(structure, intercept=False), training or TransferFunctionTraining()
+    orders = replace(structure, intercept=False)
 
-    def fit_at(time: float, delay: int | None = None, few: bool = False) -> FitResult:
+    def fit_at(time: float, delay: int | None = None, begin: TransferFunctionModel | None = None) -> FitResult:
         return fit_spectra(
             spectra,
             mapped,
             orders if delay is None else replace(orders, delays=(delay,)),
-            replace(training, scattered_starts=0) if few else training,
+            training,
+            begin=begin,
             sample_time=time,
             input_units=(known[mapped.inputs[0]],),
             output_unit=known[mapped.output],

@@ -20,9 +20,9 @@ from sysid.estimation.linear.transfer_function_problem import AbstractProblem
 from sysid.estimation.linear.transfer_function_runs import End, tried
 from sysid.estimation.linear.transfer_function_search import solve
 from sysid.estimation.linear.transfer_function_training import Terms, TransferFunctionTraining
-from sysid.estimation.linear.variable_projection import SeparableProvider
+from sysid.estimation.linear.variable_projection import Sections, SeparableProvider
 from sysid.estimation.results.result import FitResult
-from sysid.models import Mapping, Scaling, TransferFunction
+from sysid.models import Mapping, Scaling, TransferFunction, TransferFunctionModel
 from sysid.models.converting.orthonormal_basis import Domain
 
 
@@ -97,6 +97,7 @@ class Spectrum:
 
 FAR_BELOW = 0.2
 """Of the lowest frequency, below which a pole is asked about, whether it is that of an integrator."""
+BEGUN = "the poles of another fit"
 FEW_STEPS = 6
 """Sanathanan-Koerner iterations by which dead times are told apart."""
 PERIODS, SCANNED = 50.0, 4
@@ -118,6 +119,7 @@ def fit_spectra(
     input_units: tuple[str, ...],
     output_unit: str,
     rest_output: float = 0.0,
+    begin: TransferFunctionModel | None = None,
     on_iteration: Callable[[Iteration], None] = _ignore,
 ) -> FitResult:
     """Fit a transfer function to data over frequency.
@@ -134,6 +136,7 @@ def fit_spectra(
         input_units: Unit of each input.
         output_unit: Unit of the output.
         rest_output: Output at rest, in its unit.
+        begin: A model of the same orders, whose poles are the only start; drawn and searched ones by default.
         on_iteration: Called after every iteration of the final run.
 
     Returns:
@@ -169,6 +172,7 @@ def fit_spectra(
             output_unit=output_unit,
             rest_output=rest_output,
         ),
+        begin=None if begin is None else tuple(sections_of(begin.poles(j), orders.domain) for j in range(m)),
     )
     return solve(problem, began, on_iteration, None)
 
@@ -194,6 +198,7 @@ class _Problem(AbstractProblem):
     orders: TransferFunction
     training: TransferFunctionTraining
     terms: Terms
+    begin: Sections | None = None
 
     def provider(
         self,
@@ -217,6 +222,8 @@ class _Problem(AbstractProblem):
         alone: bool = True,  # noqa: ARG002 - none of them takes long
     ) -> list[PoleStart]:
         """Sanathanan-Koerner iterations from scattered poles, and some of these as they are; see the base class."""
+        if self.begin is not None:
+            return [PoleStart(name=BEGUN, sections=self.begin)]
         domain, starts = self.orders.domain, []
         for k, first in enumerate(self._scattered_poles(1 if few else 1 + self.training.scattered_starts), start=1):
             found = tuple(self._sk(provider, j, poles) for j, poles in enumerate(first))
@@ -225,6 +232,11 @@ class _Problem(AbstractProblem):
             if k > 1:
                 starts.append(PoleStart(name=f"scattered poles {k}", sections=plain))
         return starts
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether it begins at another fit; see the base class."""
+        return self.begin is not None
 
     def unbounded(self) -> _Problem:
         """With poles anywhere: what integrates, or is unstable, is measured in a loop; see the base class."""
@@ -236,6 +248,8 @@ class _Problem(AbstractProblem):
 
     def free_starts(self, provider: SeparableProvider) -> list[PoleStart]:
         """Sanathanan-Koerner iterations whose poles stay where they come to; see the base class."""
+        if self.begin is not None:
+            return [PoleStart(name=BEGUN, sections=self.begin)]
         return [
             PoleStart(
                 name=f"free Sanathanan-Koerner from scattered poles {k}",

@@ -25,8 +25,8 @@ WORTH = 4.0
 NORMAL = 1.959964
 """Standard deviations of half a 95 % interval."""
 
-FitAt = Callable[[float, int, bool], FitResult]
-"""The fit with a sample time in seconds and a dead time in samples; from few starts, or from all."""
+FitAt = Callable[[float, int, TransferFunctionModel | None], FitResult]
+"""The fit with a sample time in seconds and a dead time in samples; from the poles of a model, or from all starts."""
 
 
 def with_dead_time(first: FitResult, fit_at: FitAt, *, n_residuals: int) -> FitResult:
@@ -44,25 +44,32 @@ def with_dead_time(first: FitResult, fit_at: FitAt, *, n_residuals: int) -> FitR
 
     model = first.model
     assert isinstance(model, TransferFunctionModel)  # noqa: S101 - no other is fitted to a response
-    sample, delay = model.sample_time, model.delays[0]
+    sample, delay, begun = model.sample_time, model.delays[0], model
 
-    def fitted(seconds: float, *, few: bool = True) -> FitResult:
+    def fitted(seconds: float, begin: TransferFunctionModel | None) -> FitResult:
         count = max(round(seconds / sample), 1)
-        return fit_at(float(f"{seconds / count:.7g}"), count, few)
+        return fit_at(float(f"{seconds / count:.7g}"), count, begin)
 
-    def loss(seconds: float) -> float:
-        return n_residuals * float(fitted(seconds).history["mse"][-1])
+    def squares(fit: FitResult) -> float:
+        return n_residuals * float(fit.history["mse"][-1])
 
     low, high = max(delay - 1, 0.0) * sample + NEAR * sample, (delay + 1) * sample
-    best = float(minimize_scalar(loss, bounds=(low, high), method="bounded", options={"xatol": NEAR * sample}).x)
-    found = fitted(best, few=False)
-    least = n_residuals * float(found.history["mse"][-1])
+    best = float(
+        minimize_scalar(
+            lambda seconds: squares(fitted(seconds, begun)), bounds=(low, high), method="bounded",
+            options={"xatol": NEAR * sample},
+        ).x
+    )  # fmt: skip
+    found = min((fitted(best, begun), fitted(best, None)), key=squares)
+    least = squares(found)
     variance = least / max(n_residuals - found.model.n_parameters - 1, 1)
-    if not n_residuals * float(first.history["mse"][-1]) - least > WORTH * variance:
+    if not squares(first) - least > WORTH * variance:
         return first
     by = min(APART * sample, best / 2.0)
-    sides = [fitted(best + way * by) for way in (-1.0, 1.0)]
-    curvature = sum(n_residuals * float(one.history["mse"][-1]) for one in sides) - 2.0 * least
+    own = found.model
+    assert isinstance(own, TransferFunctionModel)  # noqa: S101 - as above
+    sides = [fitted(best + way * by, own) for way in (-1.0, 1.0)]
+    curvature = sum(map(squares, sides)) - 2.0 * least
     if not curvature > 0.0:
         return replace(found, notes=(*found.notes, f"Dead time: {best:.4g} s; the response does not tell it well."))
     deviation = by * np.sqrt(2.0 * variance / curvature)

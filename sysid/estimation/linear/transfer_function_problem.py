@@ -110,6 +110,11 @@ class AbstractProblem(ABC):
         """
         return dataclasses.replace(self, orders=orders)  # type: ignore[type-var]
 
+    @property
+    def goes_on(self) -> bool:
+        """Whether it begins where another fit has ended, beside which smaller structures have nothing to say."""
+        return False
+
     def unbounded(self) -> Self | None:
         """The same problem with poles anywhere; ``None`` where that means nothing."""
         return None

@@ -193,7 +193,8 @@ def _smaller(
 ) -> list[Reached]:
     """What the structures that this one contains reach, each as it would alone."""
     found = []
-    for orders in next_smaller(replace(own.orders, delays=delays)) if own.training.max_iterations else []:
+    wanted = own.training.max_iterations and not own.goes_on
+    for orders in next_smaller(replace(own.orders, delays=delays)) if wanted else []:
         if orders not in known and now() - watch.began < own.training.max_time_s:
             known[orders] = _reached(own.with_orders(orders), delays, watch.unseen(), None, known)
         reached = known.get(orders)
