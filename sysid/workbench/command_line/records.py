@@ -123,7 +123,7 @@ def fit_response(
     dead_time: Annotated[float | None, typer.Option(min=0.0, help="In seconds; it is searched by default.")] = None,
     sample_time: Annotated[
         float | None,
-        typer.Option(help="Of the model in seconds; a 20th of the period of the highest frequency by default."),
+        typer.Option(help="Of the model in seconds; by default some 20th of the period of the highest frequency."),
     ] = None,
     discrete: Annotated[bool, typer.Option("--discrete", help="A discrete model, of --sample-time.")] = False,
     weighting: Annotated[

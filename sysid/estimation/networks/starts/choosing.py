@@ -107,17 +107,16 @@ def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Netwo
     """
     order = sorted(range(len(candidates)), key=lambda i: rank(candidates[i], choose_by))
     found: dict[int, bool] = {}
-    forgetful = None
+    chosen, forgetful = order[0], None
     if vet is not None:
         looked = _few_of_each(candidates, order)[:VETTED]
         for place, i in enumerate(looked):
             found[i] = vet(candidates[i].model)
             if found[i]:
                 forgetful = _one_that_forgets(candidates, looked[place:], choose_by, vet)
+                chosen = i if forgetful is None else forgetful
+                found[chosen] = True
                 break
-    if forgetful is not None:
-        found[forgetful] = True
-    chosen = next((i for i, stable in found.items() if stable), order[0]) if forgetful is None else forgetful
     stable = tuple(found.get(i) for i in range(len(candidates)))
     return Choice(
         chosen=candidates[chosen], stable=stable, by=choose_by, refusal=refusal(vet), forgetful=forgetful is not None
