@@ -39,9 +39,18 @@ def test_a_sweep_becomes_a_model(sweep: Path, capsys: pytest.CaptureFixture[str]
     assert sysid.read_bundle(sweep / "arm").inputs[0]["name"] == "torque"
 
 
+def test_orders_that_nobody_says_are_compared(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["fit-response", "sweep.csv", "--poles", "1:3", "--dead-time", "0", "--sample-time", "0.001", *SAID]
+    assert run_cli(asked) == 0
+    said = capsys.readouterr().out
+    assert "Orders by the errors at frequencies left out" in said
+    assert "Note: Orders: 2 poles and 0 zeros, of" in said
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
+        pytest.param(["--poles", "two", *SAID], "not a number of poles", id="no number of poles"),
         pytest.param(["--dead-time", "0.02", *SAID], "multiple of the sample time", id="a dead time alone"),
         pytest.param(["--column", "gain"], "--column needs a pair", id="no pair"),
         pytest.param(["--discrete", *SAID], "has a sample time", id="no sample time"),

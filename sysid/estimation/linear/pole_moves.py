@@ -14,6 +14,8 @@ from sysid.models.converting.orthonormal_basis import Domain, section_poles
 
 FASTEST = 30.0
 """Rate, times the sample time, of a pole that is there for no sample to see."""
+FASTEST = 700.0
+"""Growth within a sample beyond which numbers end."""
 GROWS, BACK = 1e-6, 1e-6
 """Rate per sample from which a pole is one that grows, and by how much such a one is drawn back."""
 MOST_CONTAINED = 12
@@ -93,7 +95,10 @@ def filled_up(sections: Sections, orders: TransferFunction, sample_time: float) 
 def _poles(sections: Sections, domain: Domain, sample_time: float) -> NDArray[np.complex128]:
     """All poles in the z plane."""
     poles = np.concatenate([section_poles(d, domain) for part in sections for d in part])
-    return poles if domain is Domain.DISCRETE else np.asarray(np.exp(poles * sample_time), dtype=np.complex128)
+    if domain is Domain.DISCRETE:
+        return poles
+    moved = poles * sample_time
+    return np.asarray(np.exp(np.minimum(moved.real, FASTEST) + 1j * moved.imag), dtype=np.complex128)
 
 
 def slowness(sections: Sections, domain: Domain, sample_time: float) -> float:

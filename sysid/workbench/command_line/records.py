@@ -118,8 +118,13 @@ def fit_response(
     ctx: typer.Context,
     source: Annotated[Path, typer.Argument(help="File of a frequency response: gain and phase, or complex numbers.")],
     *,
-    poles: Annotated[int, typer.Option(min=1, help="Number of poles.")],
-    zeros: Annotated[int | None, typer.Option(min=0, help="Number of zeros; one less than poles by default.")] = None,
+    poles: Annotated[
+        str, typer.Option(help="Number of poles, or a range of which the best is taken; 1:6 by default.")
+    ] = "",
+    zeros: Annotated[
+        int | None,
+        typer.Option(min=0, help="Number of zeros; by default one less than poles, of a range as many as needed."),
+    ] = None,
     dead_time: Annotated[float | None, typer.Option(min=0.0, help="In seconds; it is searched by default.")] = None,
     sample_time: Annotated[
         float | None,

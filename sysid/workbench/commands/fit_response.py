@@ -8,7 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sysid.api.response_fits import fit_response
+from rich.table import Table
+
+from sysid.api.response_fit import ResponseFit, response_fit
+from sysid.api.response_orders import FEWEST, MOST, ResponseOrderSearch, search_orders_of
+from sysid.api.response_problem import ResponseProblem
 from sysid.atomic import write_bytes
 from sysid.errors import ConfigError
 from sysid.ingest.readers.text_source import bare_stem
@@ -18,6 +22,7 @@ from sysid.names import slug
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import svg
 from sysid.reporting.frequency import FrequencyUnit
+from sysid.reporting.numbers import number
 from sysid.workbench.commands.pictures import kept_picture
 from sysid.workbench.commands.reader_options import as_typed, files_from
 from sysid.workbench.runner.console import console
@@ -30,8 +35,8 @@ class ResponseWish:
 
     Args:
         source: The file.
-        poles: How many.
-        zeros: How many; one less by default.
+        poles: How many, or ``least:largest``; empty for a search.
+        zeros: How many; one less by default, and in a search as many as are needed.
         dead_time: In seconds; searched by default.
         sample_time: In seconds.
         discrete: Whether the model is a discrete one.
@@ -45,7 +50,7 @@ class ResponseWish:
     """
 
     source: Path
-    poles: int
+    poles: str
     zeros: int | None
     dead_time: float | None
     sample_time: float | None
@@ -65,16 +70,14 @@ def fit_response_command(wish: ResponseWish) -> None:
     with as_typed(whole=False):
         columns, units = _pairs(wish.columns, "--column"), _pairs(wish.units, "--unit")
         found = read_response(wish.source, columns=columns, units=units, files=files_from(wish.reading))
-    structure = TransferFunction(
-        poles=(wish.poles,),
-        zeros=(wish.poles - 1 if wish.zeros is None else wish.zeros,),
-        delays=_delays(wish),
-        domain=Domain.DISCRETE if wish.discrete else Domain.CONTINUOUS,
-        intercept=False,
+    problem = ResponseProblem.of(
+        found, wish.mapping, sample_time=wish.sample_time, weighting=wish.weighting, units=None, training=None
     )
-    fit = fit_response(found, structure, wish.mapping, sample_time=wish.sample_time, weighting=wish.weighting)
     target = console()
     target.print(str(found).splitlines()[0], soft_wrap=True, markup=False)
+    fit = _fit(wish, problem)
+    if fit.orders is not None:
+        target.print(_table(fit.orders))
     target.print(fit.summary(), soft_wrap=True, markup=False)
     target.print(f"Poles\n{fit.poles()}", soft_wrap=True, markup=False)
     with styled():
@@ -89,6 +92,45 @@ def fit_response_command(wish: ResponseWish) -> None:
         target.print(f"bundle: {nearby(fit.save(wish.out).folder)}", soft_wrap=True, markup=False)
         return
     target.print("Next: the same with --out FOLDER writes it as C, ONNX and model.json", soft_wrap=True, markup=False)
+
+
+def _fit(wish: ResponseWish, problem: ResponseProblem) -> ResponseFit:
+    """The fit of the orders that were typed, or of the best of their range."""
+    domain, poles = Domain.DISCRETE if wish.discrete else Domain.CONTINUOUS, _poles(wish.poles)
+    if len(poles) == 2:
+        with console().status("fitting structures of rising order"):
+            found = search_orders_of(problem, (poles[0], poles[1]), wish.zeros, domain=domain, delays=_delays(wish))
+        return found.fit
+    zeros = poles[0] - 1 if wish.zeros is None else wish.zeros
+    structure = TransferFunction(
+        poles=(poles[0],), zeros=(zeros,), delays=_delays(wish), domain=domain, intercept=False
+    )
+    return response_fit(problem, problem.fitted(structure))
+
+
+def _poles(typed: str) -> tuple[int, ...]:
+    """One number, or the least and the largest."""
+    words = typed.split(":") if typed else [str(FEWEST), str(MOST)]
+    if len(words) > 2 or not all(word.strip().isdecimal() and int(word) > 0 for word in words):
+        raise ConfigError(
+            "not a number of poles", where="option --poles", expected="for example 2, or 1:6 for the best of these",
+            got=typed, remedy="write --poles 2, or leave it out",
+        )  # fmt: skip
+    return tuple(map(int, words))
+
+
+def _table(found: ResponseOrderSearch) -> Table:
+    """All that were tried, the best first."""
+    table = Table(title="Orders by the errors at frequencies left out of the fits", title_justify="left")
+    for head in ("poles", "zeros", "dead time [s]", "error where left out %", "fit %", "beyond the best"):
+        table.add_column(head, justify="right")
+    least = found.score(found.ranked[0])
+    for one in found.ranked:
+        table.add_row(
+            str(one.poles), str(one.zeros), number(one.dead_time), f"{found.left_out_percent(one):.3g}",
+            f"{one.fit.fit_percent:.2f}", f"{found.score(one) - least:.3g}",
+        )  # fmt: skip
+    return table
 
 
 def _delays(wish: ResponseWish) -> tuple[int, ...] | None:
