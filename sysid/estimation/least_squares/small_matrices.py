@@ -72,6 +72,34 @@ def inverse_of(factor: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(lapack.dtrtrs(factor, np.eye(len(factor)), lower=1)[0])
 
 
+def back_substituted(
+    upper: NDArray[np.float64], right: NDArray[np.float64], *, transposed: bool = False
+) -> NDArray[np.float64]:
+    """The solution of ``R x = right``, or of ``R^T x = right``.
+
+    Args:
+        upper: ``R``, finite, shape ``(n, n)``; what stands below its diagonal is not read.
+        right: Finite, shape ``(n,)`` or ``(n, m)``.
+        transposed: Whether the transposed system is solved.
+
+    Returns:
+        The shape of ``right``.
+
+    Raises:
+        numpy.linalg.LinAlgError: If there is a zero on the diagonal.
+
+    Example:
+        >>> back_substituted(np.array([[2.0, 1.0], [0.0, 4.0]]), np.array([4.0, 8.0])).tolist()
+        [1.0, 2.0]
+    """
+    if not right.size:  # LAPACK prints that it has an illegal value
+        return right.copy()
+    found, wrong = lapack.dtrtrs(upper, right, lower=0, trans=int(transposed))
+    if wrong:
+        raise np.linalg.LinAlgError(f"a zero on the diagonal, at {wrong - 1}")
+    return np.asarray(found)
+
+
 def orthogonal(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Orthonormal columns ``Q`` and an upper triangle ``R`` with ``Q R`` the matrix.
 

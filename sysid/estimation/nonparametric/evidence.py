@@ -22,6 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 from scipy.linalg.blas import dtrmm
+from scipy.linalg.lapack import dpotrf
+
+from sysid.estimation.least_squares.small_matrices import add_to_diagonal, back_substituted
 
 NOTHING = 1e-200
 """Least square that is said to be left of a target: of one that is 0 throughout, evidence stays a number."""
@@ -161,7 +164,7 @@ class Factored:
     def log_evidence(self) -> float:
         """Logarithm of the marginal likelihood at the best noise variance."""
         N = self.samples
-        determinant = 2.0 * float(np.sum(np.log(np.abs(np.diag(self.R)))))
+        determinant = 2.0 * float(np.log(np.abs(self.R.diagonal())).sum())
         return float(-0.5 * (N * np.log(self.rest / N) + determinant + N * (1.0 + np.log(2.0 * np.pi))))
 
 
@@ -191,11 +194,13 @@ def _from_products(data: Triangle, L: NDArray[np.float64]) -> Factored | None:
     """The same from products, at a third of the price; ``None`` where rounding would show in them."""
     both, target, size = data.gram
     M = dtrmm(1.0, L.T, from_the_left(L, both), side=1, lower=0, trans_a=1, overwrite_b=1)
-    if not np.diag(M).max(initial=0.0) < WELL_SCALED:
+    if not M.diagonal().max(initial=0.0) < WELL_SCALED:
         return None
-    M.flat[:: len(M) + 1] += 1.0
-    R = linalg.cholesky(M, overwrite_a=True, check_finite=False)
-    z = linalg.solve_triangular(R, L.T @ target, trans="T", check_finite=False)
+    add_to_diagonal(M, 1.0)
+    R, wrong = dpotrf(M, lower=0, clean=1, overwrite_a=1) if len(M) else (M, 0)
+    if wrong:
+        return None
+    z = back_substituted(R, L.T @ target, transposed=True)
     rest = size - float(z @ z)
     seen = rest > max(LEFT * size, data.floor)
     return Factored(R=R, z=z, rest=rest, samples=data.samples) if seen else None
@@ -219,10 +224,10 @@ def posterior(data: Triangle, L: NDArray[np.float64]) -> Posterior:
     whole = factored(data, L)
     Ra, n = whole.R, len(whole.R)
     variance = whole.rest / data.samples
-    half = linalg.solve_triangular(Ra, L.T, trans="T", check_finite=False)  # Ra^-T L^T
-    inverse = linalg.solve_triangular(Ra, np.eye(n), check_finite=False)
+    half = back_substituted(Ra, L.T, transposed=True)  # Ra^-T L^T
+    inverse = back_substituted(Ra, np.eye(n))
     return Posterior(
-        mean=L @ linalg.solve_triangular(Ra, whole.z, check_finite=False),
+        mean=L @ back_substituted(Ra, whole.z),
         covariance=variance * half.T @ half,
         noise_variance=variance,
         log_evidence=whole.log_evidence,

@@ -63,11 +63,13 @@ class Hyperparameters:
             >>> np.allclose(L @ L.T, [[2 * 0.64 ** max(i, j) for i in range(3)] for j in range(3)])
             True
         """
-        k = np.arange(n)
+        k = np.arange(n, dtype=np.float64)
         # rho ** (i - j) in the lower triangle: every row is a stretch of the same powers, after nothing.
-        powers = np.append(self.correlation ** k[::-1].astype(np.float64), np.zeros(n))
-        rows = np.lib.stride_tricks.sliding_window_view(powers, n)[n - 1 :: -1] if n else np.zeros((0, 0))
-        L = np.sqrt(self.scale) * self.decay ** (0.5 * k)[:, None] * rows
+        powers = np.zeros(2 * n)
+        powers[:n] = self.correlation ** np.arange(n - 1, -1, -1, dtype=np.float64)
+        size = powers.itemsize
+        rows = np.ndarray((n, n), buffer=powers, offset=max(n - 1, 0) * size, strides=(-size, size))
+        L = (np.sqrt(self.scale) * self.decay ** (0.5 * k))[:, None] * rows
         L[:, 1:] *= np.sqrt(max(1.0 - self.correlation**2, 0.0))
         return np.asarray(L)
 

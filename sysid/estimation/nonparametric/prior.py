@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
+from sysid.estimation.least_squares.small_matrices import back_substituted
 from sysid.estimation.nonparametric.evidence import Posterior, Triangle, factored, from_the_left, posterior
 from sysid.estimation.nonparametric.kernels import Hyperparameters, Kernel
 
@@ -72,6 +72,8 @@ class Prior:
     def factor(self) -> NDArray[np.float64]:
         """The Cholesky factor of the covariance of the lags that are kept."""
         parts = [h.factor(self.length - int(k)) for h, k in zip(self.hyperparameters, self.dead, strict=True)]
+        if len(parts) == 1:
+            return parts[0]
         ends = np.cumsum([0, *map(len, parts)])
         L = np.zeros((ends[-1], ends[-1]))
         for part, a, b in zip(parts, ends[:-1], ends[1:], strict=True):
@@ -299,10 +301,10 @@ class _Search:
         prior = self.prior(theta)
         data, L = self.kept, prior.factor()
         whole = factored(data, L)
-        mean = L @ linalg.solve_triangular(whole.R, whole.z, check_finite=False)
+        mean = L @ back_substituted(whole.R, whole.z)
         w = data.R.T @ (data.z - data.R @ mean)
         both = data.gram[0]
-        half = linalg.solve_triangular(whole.R, from_the_left(L, both), trans="T", check_finite=False)
+        half = back_substituted(whole.R, from_the_left(L, both), transposed=True)
         S = both - half.T @ half
         G = 0.5 * (S - np.outer(w, w) * (data.samples / whole.rest))
         return -whole.log_evidence, self._gradient(prior, L, G)
@@ -313,8 +315,8 @@ class _Search:
             n = self.length - int(k)
             block = slice(at, at + n)
             P = (L[block, block] @ L[block, block].T) * G[block, block]
-            i = np.arange(n, dtype=np.float64)
-            both, apart = float(P.sum(axis=1) @ i), float(np.sum(P * np.abs(i[:, None] - i[None, :])))
+            i, between = _places(n)
+            both, apart = float(P.sum(axis=1) @ i), float((P * between).sum())
             of_decay = both * 2.0 * np.exp(-row[1])  # both = sum P (i + j) / 2
             if self.kernel is Kernel.TC:
                 slopes += [float(P.sum()), of_decay + apart * np.exp(-row[1])]
@@ -322,3 +324,10 @@ class _Search:
                 slopes += [float(P.sum()), of_decay, apart * np.exp(-row[2])]
             at += n
         return np.array(slopes)
+
+
+@lru_cache(maxsize=16)
+def _places(n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lags, and how far each is from each."""
+    i = np.arange(n, dtype=np.float64)
+    return i, np.abs(i[:, None] - i[None, :])

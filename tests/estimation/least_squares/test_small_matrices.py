@@ -6,6 +6,7 @@ from scipy import linalg
 
 from sysid.estimation.least_squares.small_matrices import (
     add_to_diagonal,
+    back_substituted,
     cholesky,
     inverse_of,
     orthogonal,
@@ -23,6 +24,26 @@ def test_factor_solution_and_inverse_are_those_of_scipy(n):
     np.testing.assert_array_equal(factor, linalg.cholesky(matrix, lower=True))
     np.testing.assert_array_equal(solved(factor, right), linalg.cho_solve(linalg.cho_factor(matrix, lower=True), right))
     np.testing.assert_array_equal(inverse_of(factor), linalg.solve_triangular(factor, np.eye(n), lower=True))
+
+
+@pytest.mark.parametrize("right", [(65,), (65, 7)], ids=["one", "seven"])
+@pytest.mark.parametrize("transposed", [False, True], ids=["R", "transposed"])
+def test_an_upper_triangle_is_solved_as_scipy_does_and_nothing_is_written(transposed, right):
+    rng = np.random.default_rng(1)
+    upper = np.asfortranarray(np.triu(rng.standard_normal((65, 65))) + 9.0 * np.eye(65))
+    b = np.asfortranarray(rng.standard_normal(right))
+    before = upper.copy(), b.copy()
+    expected = linalg.solve_triangular(upper, b, trans=int(transposed))
+    np.testing.assert_array_equal(back_substituted(upper, b, transposed=transposed), expected, strict=True)
+    for one, other in zip((upper, b), before, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_an_upper_triangle_without_an_answer_is_refused_and_one_of_nothing_has_none(capfd):
+    with pytest.raises(np.linalg.LinAlgError, match="at 1"):
+        back_substituted(np.diag([1.0, 0.0, 2.0]), np.ones(3))
+    assert back_substituted(np.zeros((0, 0)), np.zeros((0, 2))).shape == (0, 2)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_of_nothing_the_inverse_is_nothing_and_nothing_is_printed(capfd):

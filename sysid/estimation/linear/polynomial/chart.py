@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +38,16 @@ class PolynomialChart:
         return self.orders.polynomials(theta).system()
 
     def directions(self, theta: Array) -> Directions:
-        """Derivatives of each matrix with respect to the coefficients."""
-        moved = [
-            self.orders.polynomials(theta + 1j * STEP * unit).system() for unit in np.eye(self.n_parameters)
-        ]  # fmt: skip
+        """Derivatives of each matrix with respect to the coefficients; not to be changed, others have them too."""
+        return self._moved(theta) if min(self.orders.nk, default=1) == 0 else self._same_everywhere
+
+    @cached_property
+    def _same_everywhere(self) -> Directions:
+        """Where no input acts at once: each entry is then a coefficient, or a difference of two."""
+        return self._moved(np.zeros(self.n_parameters))
+
+    def _moved(self, theta: Array) -> Directions:
+        moved = [self.orders.polynomials(theta + 1j * STEP * unit).system() for unit in np.eye(self.n_parameters)]
         parts = {
             name: np.stack([np.imag(getattr(one, name)) / STEP for one in moved], axis=-1)
             for name in ("A", "B", "C", "D", "K", "constant")

@@ -61,6 +61,22 @@ def test_gradients_are_those_of_the_loss(orders: AbstractPolynomial, truth: list
     np.testing.assert_allclose(errors.linearise(theta).gradient, numeric, rtol=1e-3, atol=1e-3 * np.abs(numeric).max())
 
 
+AT_ONCE = BJ(nb=(2, 1), nc=1, nd=1, nf=(2, 1), nk=(0, 1))
+
+
+@pytest.mark.parametrize("orders", [*(orders for orders, _ in CASES.values()), AT_ONCE], ids=[*CASES, "at once"])
+def test_directions_are_those_of_small_steps_wherever_they_are_asked(orders: AbstractPolynomial) -> None:
+    """They are worked out once where no input acts at once; where one does, they depend on where."""
+    chart, rng = PolynomialChart(orders=orders), np.random.default_rng(2)
+    for theta in rng.normal(size=(2, chart.n_parameters)):
+        found = chart.directions(theta)
+        for i, step in enumerate(1e-4 * np.eye(chart.n_parameters)):
+            ahead, behind = chart.system(theta + step), chart.system(theta - step)
+            for name in ("A", "B", "C", "D", "K", "constant"):
+                slope = (getattr(ahead, name) - getattr(behind, name)) / 2e-4
+                np.testing.assert_allclose(getattr(found, name)[..., i], slope, atol=1e-9)
+
+
 def test_arma_needs_no_input() -> None:
     e = np.random.default_rng(0).normal(size=3000)
     series = trace_of(np.zeros((3000, 0)), 5.0 + lfilter([1.0, 0.6], [1.0, -0.8], e))
