@@ -30,9 +30,8 @@ def check_feedback(record: Record) -> Iterator[Finding]:
         yield Finding(topic=Topic.FEEDBACK, code="feedback.unknown", verdict=Verdict.UNKNOWN, reason=found)
         return
     if found.found:
-        exchanged = list(_exchanged(record))
-        yield from exchanged
-        if exchanged:
+        if turned := list(exchanged(record)):
+            yield from turned
             return
         code, verdict = "feedback.found", Verdict.LOOK
     elif record.runs_away:
@@ -44,8 +43,15 @@ def check_feedback(record: Record) -> Iterator[Finding]:
     yield Finding(topic=Topic.FEEDBACK, code=code, verdict=verdict, subject=record.moving, figures=asdict(found))
 
 
-def _exchanged(record: Record) -> Iterator[Finding]:
-    """Inputs that a linear response to the output explains well, where the other way round it does not."""
+def exchanged(record: Record) -> Iterator[Finding]:
+    """Inputs that a linear response to the output explains well, where the other way round it does not.
+
+    Args:
+        record: The record.
+
+    Yields:
+        A finding for each.
+    """
     forward = record.impulse
     if isinstance(forward, str):
         return

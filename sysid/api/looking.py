@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import warnings
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from sysid.api.notebook import html_of
 from sysid.api.per_output import PerOutput, framed
 from sysid.errors import ConfigError
 from sysid.excitation import AbstractExcitation, excitation
+from sysid.ingest.inspecting.undescribed import GuessedWarning
 from sysid.ingest.tables.durations import length_of_time
 from sysid.ingest.writers import write_trace
 from sysid.models import Mapping
@@ -137,7 +139,8 @@ def advise(traces: TracesLike, mapping: Given | None = None) -> Advice | SystemA
 
     Args:
         traces: The data set; its estimation and selection traces are looked at, all where there are none.
-        mapping: Inputs and output; not needed for two channels, the second being the output, or for one.
+        mapping: Inputs and output; not needed for one channel, for two, or where all names tell (``u1``, ``y``); what
+            was guessed is told.
 
     Returns:
         The findings: printed, they are sentences. Of several outputs, those of each.
@@ -165,7 +168,7 @@ def _advice(found: room.Advice) -> Advice:
 
 
 def mapping_of(traces: TraceSet, mapping: Given | None, *, option: str = "mapping=") -> Mapping:
-    """A mapping as it was given, or the only one that a data set of one or two channels has.
+    """A mapping as it was given, or what the names of the channels say, or how two of them move.
 
     Args:
         traces: The data set.
@@ -176,21 +179,27 @@ def mapping_of(traces: TraceSet, mapping: Given | None, *, option: str = "mappin
         The mapping.
 
     Raises:
-        ConfigError: If it was not given, and there are more channels.
+        ConfigError: If it was not given, and nothing tells inputs and outputs apart.
+
+    Warns:
+        GuessedWarning: If it is not the order of the channels that was taken, the last one being the output.
     """
-    names = [channel.name for channel in traces.channels]
     if mapping is not None:
         return Mapping.of(mapping)
-    if len(names) <= 2:
-        return Mapping(inputs=tuple(names[:-1]), outputs=(names[-1],))
-    example = Mapping(inputs=tuple(names[:-1]), outputs=(names[-1],))
-    raise ConfigError(
-        "nothing tells inputs and output apart",
-        where=f"data set {traces.name}",
-        expected="a mapping of its channels",
-        got=", ".join(names),
-        remedy=f'write for example {option}"{example}"',
-    )
+    names = tuple(channel.name for channel in traces.channels)
+    plain = Mapping(inputs=names[:-1], outputs=names[-1:])
+    if (found := room.guessed(traces)) is None:
+        raise ConfigError(
+            "nothing tells inputs and output apart",
+            where=f"data set {traces.name}",
+            expected="a mapping of its channels",
+            got=", ".join(names),
+            remedy=f'write for example {option}"{plain}"',
+        )
+    if found.reason:
+        told = f'guessed: {found.mapping}: {found.reason}; {option}"{found.mapping}" says so, {option}"{plain}" not'
+        warnings.warn(f"{traces.name}: {told}", GuessedWarning, stacklevel=3)
+    return found.mapping
 
 
 def excite(
