@@ -16,12 +16,9 @@ from sysid.models import Mapping
 from sysid.traces import Role, Trace, TraceSet
 
 INPUTS: Final = frozenset(
-    ["u", "in", "inp", "input", "inputs", "command", "cmd", "stimulus", "excitation", "pwm", "duty", "setpoint"]
-    + ["eingang", "entrada", "entree", "ingresso"]
+    ["u", "in", "input", "inputs", "command", "cmd", "excitation", "pwm", "duty", "setpoint", "eingang", "entrada"]
 )
-OUTPUTS: Final = frozenset(
-    ["y", "out", "output", "outputs", "response", "measured", "ausgang", "saida", "salida", "sortie", "uscita"]
-)
+OUTPUTS: Final = frozenset(["y", "out", "output", "outputs", "response", "measured", "ausgang", "saida", "salida"])
 """What an engineer calls them; a word of a name, without its digits."""
 
 SELDOM: Final = 0.5
