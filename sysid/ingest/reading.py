@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.errors import UnitError
+from sysid.errors import TraceError, UnitError
 from sysid.ingest.assembling.assemble import Wanted, assemble
 from sysid.ingest.assembling.in_units import stamps_in_seconds
 from sysid.ingest.assembling.masks import check_masks
@@ -24,17 +24,23 @@ from sysid.traces import Channel, Trace
 from sysid.units import Reference
 from sysid.written_units import plain_unit
 
+DESCRIPTIONS = (".yaml", ".yml")
+"""How the name of a file ends that describes a data set."""
+
 
 def is_file_of_traces(source: str | Path) -> bool:
-    """Whether a source is a file with traces, by its suffix, and not a data set.
+    """Whether a source is a file with traces, and not a data set: by its suffix, or as it is there and no YAML.
 
     Args:
         source: A name or a path.
 
     Returns:
-        Whether it is.
+        Whether it is; its reader says whether it can be read.
     """
-    return Path(source).suffix.lower() in {suffix for reader in READERS for suffix in reader.suffixes}
+    path = Path(source)
+    suffix = path.suffix.lower()
+    known = suffix in {suffix for reader in READERS for suffix in reader.suffixes}
+    return known or (suffix not in DESCRIPTIONS and path.is_file())
 
 
 def read_table(path: str | Path, *, files: FileOptions | None = None, repairs: RepairOptions | None = None) -> RawTable:
@@ -210,6 +216,14 @@ def _all_channels(table: RawTable, files: FileOptions) -> tuple[Channel, ...]:
                 reference=reference or column.reference or Reference.NONE,
                 description=column.description,
             )
+        )
+    if not channels:
+        raise TraceError(
+            "the file has no channel",
+            where=table.source,
+            expected="at least one column of numbers beside time",
+            got=", ".join(table.names),
+            remedy="choose another file, or read it with other options",
         )
     return tuple(channels)
 

@@ -157,3 +157,12 @@ def write_excel(path: Path) -> None:
     for row in np.column_stack([TIME, PIPE, VOLT]).tolist():
         book.active.append(row)
     book.save(path)
+
+
+def write_spice(path: Path) -> None:
+    """Waveforms as ngspice saves them, in float64."""
+    kinds = {"time": "time", "BP": "kPa gauge", "u": "voltage"}
+    variables = [f"\t{k}\t{name}\t{kind}" for k, (name, kind) in enumerate(kinds.items())]
+    said = ["Title: * rig", "Date: Tue Mar 12 08:15:00 2024", "Plotname: Transient Analysis", "Flags: real"]
+    head = [*said, "No. Variables: 3", f"No. Points: {len(TIME)}", "Variables:", *variables, "Binary:\n"]
+    path.write_bytes("\n".join(head).encode() + np.column_stack([TIME, PIPE, VOLT]).tobytes())

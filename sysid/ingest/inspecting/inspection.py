@@ -116,10 +116,10 @@ class _Clock:
             return found
         timing = survey(known)
         step, needs, tolerance = needs_of_time(known, timing)
-        longest = longest_of_solver(known, needs)
+        longest = longest_of_solver(known, needs, by_solver=table.by_solver)
         if longest is not None:
             timing, needs = survey(known, longest_step=longest), {**needs, "gaps": None}
-            step = round_step(timing.step)
+            step = round_step(float(np.ptp(known)) / (len(known) - 1) if table.by_solver else timing.step)
         if needs.get("duplicates") and are_events(stamps, [c for c in table.columns if c.name != time.column]):
             needs["duplicates"] = "last"
         finer = None if found.unstamped else finer_than_clock(known, timing)
@@ -254,6 +254,7 @@ def _of_records(whole: FileFinding, attempt: Attempt) -> FileFinding:
         samples=min(case.finding.samples for case in chosen),
         distinct=min(case.finding.distinct for case in chosen),
         needed=RepairOptions.model_validate(merged),
+        longest_step=max((case.finding.longest_step or 0.0 for case in chosen), default=0.0) or None,
         table=whole.table,
         notes=tuple(notes),
         cases=tuple(chosen),
@@ -273,7 +274,9 @@ def _signature(case: CaseFinding) -> object:
     found = case.finding
     units = tuple((column.name, None if column.unit_guessed else column.unit) for column in found.channels)
     own_time = "time" in case.options
-    return units, found.sample_time, None if own_time else found.time.column, found.time.unit, own_time
+    # A solver's steps come onto any grid.
+    step = None if found.table is not None and found.table.by_solver else found.sample_time
+    return units, step, None if own_time else found.time.column, found.time.unit, own_time
 
 
 def _by_name(found: FileFinding, name: str) -> ColumnFinding:

@@ -144,12 +144,15 @@ def _rising(columns: Sequence[RawColumn]) -> str | None:
     return None
 
 
-def longest_of_solver(known: NDArray[np.float64], needs: Mapping[str, object]) -> float | None:
+def longest_of_solver(
+    known: NDArray[np.float64], needs: Mapping[str, object], *, by_solver: bool = False
+) -> float | None:
     """The longest step of stamps that are uneven by nature, as a solver's are: none of their steps is a gap.
 
     Args:
         known: Time stamps in seconds, all finite.
         needs: The repairs of time that they seem to need.
+        by_solver: Whether the file says that a solver wrote it.
 
     Returns:
         Seconds, in three digits; ``None`` where steps are alike mostly, or some are far longer than all others.
@@ -160,7 +163,7 @@ def longest_of_solver(known: NDArray[np.float64], needs: Mapping[str, object]) -
     usual, longest = float(np.median(steps)), float(steps.max())
     alike = float(np.mean(np.abs(steps - usual) <= 0.1 * usual))
     often = float(np.mean(steps > 1.5 * usual))
-    if alike >= _MOSTLY_ALIKE or often < _OFTEN or longest > _MOST_UNEVEN * usual:
+    if not by_solver and (alike >= _MOSTLY_ALIKE or often < _OFTEN or longest > _MOST_UNEVEN * usual):
         return None
     return float(f"{1.005 * longest:.3g}")
 

@@ -4,7 +4,20 @@ Adding a reader is one file with a ``READER`` in it, one line here, and one row 
 of ``tests/ingest/readers/test_readers.py``.
 """
 
-from sysid.ingest.readers import arrow, codesys, csv_text, excel, hdf5, json_text, lvm, matlab, mdf4, numpy_arrays, tdms
+from sysid.ingest.readers import (
+    arrow,
+    codesys,
+    csv_text,
+    excel,
+    hdf5,
+    json_text,
+    lvm,
+    matlab,
+    mdf4,
+    numpy_arrays,
+    spice,
+    tdms,
+)
 from sysid.ingest.readers.reader import Reader, choose_reader, read_with
 
 READERS: tuple[Reader, ...] = (
@@ -20,6 +33,7 @@ READERS: tuple[Reader, ...] = (
     lvm.READER,
     codesys.READER,
     excel.READER,
+    spice.READER,
 )
 """Every reader; a file is read by the one that knows its first bytes, else by the one that claims its suffix."""
 

@@ -7,6 +7,7 @@ before the values of each column (``TraceName,CH1,CH2``), or words and numbers o
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.readers.csv_cells import BLANKS, DATA, Kind, Row, is_units, kind_of, trimmed
@@ -18,6 +19,8 @@ _LOOKED = 4
 _NAMES = re.compile(r"(?:trace|signal|channel)?[ _]?names?|traces?|sources?|signals?|channels?", re.IGNORECASE)
 NO_UNITS = frozenset({"TS", "RN", "Sequence"})
 """What stands in a line of units over a stamp or a number of rows."""
+_MARKS = "%!;/*"
+"""What stands before a line that is a comment, where ``#`` does not."""
 _UNITS = re.compile(r"(?:v|y|vertical|signal|channel)?[ _]?units?", re.IGNORECASE)
 
 
@@ -35,7 +38,7 @@ def names_last(above: list[Row], split: Split) -> tuple[list[Row], list[str]]:
     labelled = _labelled(above, split)
     if labelled:
         return labelled, [split.separator.join(row.cells) for row in above]
-    above, said = _without_pairs(above, split)
+    above, said = _without_pairs(_unmarked(above, split), split)
     if len(above) > 1 and _is_mark(above[-1], split) and _is_full(above[-2], split):
         return above[:-1], said
     for index in range(len(above) - 1, max(len(above) - 1 - _LOOKED, -1), -1):
@@ -48,6 +51,23 @@ def names_last(above: list[Row], split: Split) -> tuple[list[Row], list[str]]:
         if len(trimmed(row.cells, split.width)) != split.width or (index == len(above) - 1 and _is_full(row, split)):
             break
     return above, said
+
+
+def _unmarked(above: list[Row], split: Split) -> list[Row]:
+    """Without the mark of a comment before a line (``! t u y``).
+
+    Of such lines those of a word a column are a head, up to one that names a time.
+    """
+    if split.separator != BLANKS:
+        return above
+    found, timed = list[Row](), False
+    for row in above:
+        if len(row.cells) < 2 or not row.cells[0] or row.cells[0].strip(_MARKS):
+            found.append(row)
+        elif len(row.cells) == split.width + 1 and not timed:
+            found.append(replace(row, cells=row.cells[1:]))
+            timed = any(is_called_time(parse_header(cell).name) for cell in row.cells)
+    return found
 
 
 def _with_labelled_units(above: list[Row], split: Split) -> list[Row]:

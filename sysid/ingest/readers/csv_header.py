@@ -71,7 +71,7 @@ def header_of(split: Split, first: int, comments: list[tuple[int, str]], options
         found.units = _to_width(above.pop(), split)
     if above and _take_names(found, above, split):
         return found
-    _take_comment(found, comments[-2:], split)
+    _take_comment(found, comments[-4:], split)
     return found
 
 
@@ -102,13 +102,19 @@ def labelled_header(split: Split, first: int) -> Header | None:
 
 
 def _take_comment(found: Header, comments: list[tuple[int, str]], split: Split) -> None:
-    """Names from the last comment, or from the one before where the last says their units."""
+    """Names from the last comment, or from one before, where the last says their units, or that one names a time."""
     rows = list[tuple[int, list[str]]]()
     for line, text in comments:
         bare = text.split(split.separator) if split.separator != BLANKS else text.split()
         cells = _to_width(Row(line=line, cells=bare), split)
         rows += [] if cells is None else [(line, [cell.strip(_MARKS) for cell in cells])]
-    if not rows or rows[-1][0] != comments[-1][0] or (split.width == 1 and len(comments[-1][1].split()) > 1):
+    if split.width == 1 and comments and len(comments[-1][1].split()) > 1:
+        return
+    timed = [k for k, (_, cells) in enumerate(rows) if any(is_called_time(parse_header(cell).name) for cell in cells)]
+    if timed:
+        units = [row for row in rows[timed[-1] + 1 :][:1] if is_units(row[1])]
+        rows = [*rows[: timed[-1] + 1], *units]
+    elif not rows or rows[-1][0] != comments[-1][0]:
         return
     if len(rows) > 1 and is_units(rows[-1][1]) and len(set(rows[-1][1])) < len(set(rows[0][1])) == split.width:
         found.units = rows.pop()[1]

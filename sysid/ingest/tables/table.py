@@ -83,6 +83,7 @@ class RawTable:
         settings: Reader options as they were recognised (``separator``, ``decimal`` ...), so that a
             data-set description can write them down.
         origin: Where the numbers come from, as a sentence, where ``source`` is no file.
+        by_solver: Whether its time stamps are the steps of a solver, so that none of them is a gap.
     """
 
     source: Path
@@ -97,6 +98,7 @@ class RawTable:
     metadata: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, object] = field(default_factory=dict)
     origin: str = ""
+    by_solver: bool = False
 
     def __post_init__(self) -> None:
         if not self.columns or len(self.columns[0].values) == 0:

@@ -18,7 +18,7 @@ from sysid.export.inputs import InputOptions, read_inputs
 from sysid.export.reading import read_bundle
 from sysid.export.simulation import Simulation, simulate_bundle
 from sysid.ingest import write_trace
-from sysid.ingest.reading import is_file_of_traces
+from sysid.ingest.reading import DESCRIPTIONS, is_file_of_traces
 from sysid.models import Start
 from sysid.names import distinct
 from sysid.traces import Trace
@@ -30,8 +30,6 @@ from sysid.workbench.runner.naming import meant
 
 PICTURES = (".png", ".svg", ".pdf")
 """What a picture may end in."""
-DESCRIPTIONS = (".yaml", ".yml")
-"""What the description of a data set ends in."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,15 +68,10 @@ class Wish:
         if self.out is not None:
             return self.out
         source = Path(str(self.inputs if self.command is None else self.command))
-        if self.command is None and not _is_record(source):
+        if self.command is None and not is_file_of_traces(source):
             named = source.parent if source.suffix in DESCRIPTIONS and source.parent.name else source
             return Path(f"{named.name}.simulated.csv")
         return source.with_name(f"{source.stem}.simulated.csv")
-
-
-def _is_record(source: Path) -> bool:
-    """Whether something is a file of samples, and no data set; ``--reader`` reads files of any ending."""
-    return is_file_of_traces(source) or (source.is_file() and source.suffix not in DESCRIPTIONS)
 
 
 def simulate_command(wish: Wish) -> None:
@@ -113,7 +106,7 @@ def simulate_command(wish: Wish) -> None:
 def _records(wish: Wish, read: Bundle, constants: dict[str, float]) -> list[tuple[Path, Trace]]:
     """The records to simulate, and the file to write of each: that of a file, or those of a data set."""
     source, out = Path(str(wish.inputs)), wish.written
-    if not _is_record(source):
+    if not is_file_of_traces(source):
         return _of_dataset(wish, source)
     with as_typed():
         options = InputOptions(constants=constants, **reading_options(wish.reading))

@@ -138,3 +138,27 @@ def test_what_is_the_matter_with_several_columns_is_told_once(tmp_path: Path) ->
     problems = inspect_file(path).problems
     assert "a, b: never changes" in problems
     assert sum("never changes" in one for one in problems) == 1
+
+
+@pytest.mark.parametrize("mark", ["#", "!", "%", "//", ";"])
+def test_a_head_among_comments_is_the_one_that_names_a_time(tmp_path: Path, mark: str) -> None:
+    said = [f"{mark} of the rig", f"{mark} t u y", f"{mark} recorded by me"]
+    rows = [f"{0.1 * k:.1f} {U[k]} {Y[k]}" for k in range(N)]
+    (tmp_path / "rig.txt").write_text("\n".join([*said, *rows]))
+    with pytest.warns(GuessedWarning, match="t in s"):
+        assert sysid.load(tmp_path / "rig.txt").traces[0].channel_names == ("u", "y")
+
+
+@pytest.mark.parametrize("name", ["rig.out", "rig.log", "rig.1", "rig"])
+def test_a_table_of_text_is_read_whatever_its_name_ends_in(tmp_path: Path, name: str) -> None:
+    rows = [f"{0.1 * k:.1f}\t{U[k]}\t{Y[k]}" for k in range(N)]
+    (tmp_path / name).write_text("\n".join(["Time\tGenTq\tGenSpeed", "(s)\t(kN-m)\t(rpm)", *rows]))
+    traces = sysid.load(tmp_path / name)
+    assert [channel.unit for channel in traces.channels] == ["kN*m", "rpm"]
+    np.testing.assert_array_equal(traces.traces[0]["GenTq"], U)
+
+
+def test_a_file_of_time_alone_is_refused_in_words(tmp_path: Path) -> None:
+    (tmp_path / "rig.csv").write_text("\n".join(["time [s]", *(f"{0.1 * k:.1f}" for k in range(N))]))
+    with pytest.raises(TraceError, match=r"the file has no channel"):
+        sysid.load(tmp_path / "rig.csv")

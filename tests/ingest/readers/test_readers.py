@@ -37,6 +37,7 @@ from tests.ingest.recordings import (
     write_npy,
     write_npz,
     write_parquet,
+    write_spice,
     write_tdms,
 )
 
@@ -58,6 +59,7 @@ CONTRACT = [
     pytest.param("json", "run.jsonl", write_json_lines, id="json: lines"),
     pytest.param("lvm", "run.lvm", write_lvm, id="lvm: decimal comma, no column of time"),
     pytest.param("codesys", "run.trace.csv", write_codesys, id="codesys: a variable after the other"),
+    pytest.param("spice", "run.raw", write_spice, id="spice: waveforms"),
     pytest.param("excel", "run.xlsx", write_excel, id="excel: title, units row"),
 ]
 
