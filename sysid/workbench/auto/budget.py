@@ -159,7 +159,7 @@ class Budget:
 
     def is_late(self) -> bool:
         """Whether trials have taken half of what was left to the last fit: no more is waited for."""
-        return self.wall_s is not None and self.clock() > self.ends_s - 0.5 * self.refit * self.wall_s
+        return self.wall_s is not None and self.clock() > (1.0 - 0.5 * self.refit) * self.ends_s
 
     def has_room(self, seconds: float) -> bool:
         """Whether trials that train for so long, all together, still end in time.
@@ -201,12 +201,15 @@ class Budget:
         return paid or self.wall_s is None or self.clock() + seconds <= self._until()
 
     def _before_the_last_fit(self) -> bool:
-        return self.wall_s is not None and self.clock() < self.ends_s - self.refit * self.wall_s
+        return self.wall_s is not None and self.clock() < (1.0 - self.refit) * self.ends_s
 
     def _until(self) -> float:
-        """Seconds by which a round of trials has to be over."""
-        wall_s = self.wall_s or 0.0
-        return min(self.most * (self.ends_s - self.refit * wall_s), self.ends_s - (self.refit + self.kept) * wall_s)
+        """Seconds by which a round of trials has to be over.
+
+        What is kept is a share of the time before scores, export and report: where these take half of a short search,
+        trials had none, and the last fit of what nobody had compared had all.
+        """
+        return min(self.most * (1.0 - self.refit), 1.0 - self.refit - self.kept) * self.ends_s
 
     def _seconds(self, point: Point) -> float:
         """How long a trial will take; of a kind that was not tried yet, a part of its limit, or at least something."""

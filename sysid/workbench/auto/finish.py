@@ -17,7 +17,7 @@ PAGE_S = 2.0
 DRAWING_S, DRAWN_FOR_IT, SLOWEST_PACE = 0.04, 4, 20.0
 """Processor seconds of a picture that is drawn to measure a machine by, how many are, and how much slower it may be at
 most."""
-PAGE_SHARE, FEWEST = 0.15, 1
+PAGE_SHARE, FEWEST = 0.06, 1
 """Share of the time of a search that pictures of single cases may take, and cases that are drawn in any case."""
 SPILL = 0.05
 """Share of the time by which scores, export and report may end after it."""
@@ -39,7 +39,7 @@ def drawn_in(wall_s: float | None, outputs: int) -> int:
 
     Example:
         >>> drawn_in(30.0, 1), drawn_in(30.0, 5), drawn_in(300.0, 5)
-        (11, 2, 12)
+        (4, 1, 9)
     """
     if wall_s is None:
         return DRAWN

@@ -13,7 +13,7 @@ from sysid.advice.dynamics import INTEGRATES
 from sysid.api.order_search import OrderSearch
 from sysid.api.orders import search_orders
 from sysid.errors import UserError
-from sysid.estimation.linear.state_space.orders import state_orders
+from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
 from sysid.estimation.records.output_ends import found_ends
 from sysid.estimation.resets import derived_from, found_resets, grey_box_of, switches
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind, VectorGreyBox
@@ -22,7 +22,7 @@ from sysid.reporting.advice.words import lines
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.auto.jumps import jumps_of
 from sysid.workbench.auto.mechanisms import mechanism_of
-from sysid.workbench.auto.parts import ends_held_out
+from sysid.workbench.auto.parts import FEW, ends_held_out
 from sysid.workbench.fits.data import Data
 
 NOISE = 0.02
@@ -33,6 +33,10 @@ ORDER_SEARCH = 0.2
 """Of what a look at an output takes, what a search for its orders does."""
 MOST_SHOWN = 12
 """States that are looked for in the canonical correlations."""
+LOOKED_AT = 3_000
+"""Samples of whole records without noise that tell as much of orders and dead times as all of them."""
+HALF = 0.5
+"""Share of the variance of what is to come that the past has to explain for a state to be a clear one."""
 MOVED = 0.01
 """Share of an output's range by which it may move while the inputs have yet to, and still be said to begin at rest."""
 
@@ -56,6 +60,9 @@ class Looked:
             remembers one sample, or learns where it begins, is tried first.
         states: Of the best linear state space, once linear models were tried; 0 before.
         shown: States that stand out of what the past says of the future; 0 where that cannot be told.
+        clear: Of these the ones of whose future the past says more than half.
+        exact: Whether who searches asks for a tolerance, as of a model's records, which have no noise: sizes of
+            networks are then tried before weights that hold noise down.
         resets: Where outputs jump and are linear between, the equations of that: then it is tried before all else.
         mechanism: Where friction holds an output, or play an input, equations of that, the likeliest first: they are
             tried next.
@@ -74,6 +81,8 @@ class Looked:
     integrators: int = 0
     states: int = 0
     shown: int = 0
+    clear: int = 0
+    exact: bool = False
     seen_from: int | None = None
     resets: VectorGreyBox | None = None
     mechanism: tuple[VectorGreyBox, ...] = ()
@@ -100,29 +109,33 @@ class Looked:
         return ordered if self.seen_from is None else min(ordered, self.seen_from)
 
 
-def look(data: Data, mapping: Mapping, start: Start) -> Looked:
+def look(data: Data, mapping: Mapping, start: Start, *, exact: bool = False) -> Looked:
     """Look at what is fitted and what chooses; at nothing else.
 
     Args:
         data: The traces of the pipeline.
         mapping: Inputs and outputs.
         start: How each free run begins.
+        exact: As for :class:`Looked`.
 
     Returns:
         What was found.
     """
-    known = _set(data, data.estimation, data.selection)
+    known = seen_of(data, exact=exact).traces
+    few = known.with_role(Role.ESTIMATION)
     advice = [advise(known, one, suggest=is_suggested(mapping)) for one in looked_at(mapping)]
     integrators = sum(any(finding.code == INTEGRATES for finding in one.findings) for one in advice)
     # A line that adds up would not explain a stop: what stands at its least was left there.
     ends = {} if integrators else at_ends(data.estimation, mapping)
-    at_rest = start.kind is StartKind.REST
+    at_rest, shown = start.kind is StartKind.REST, _shown(few, mapping)
     held = mechanism_of(data.estimation, mapping) if at_rest else None
     return Looked(
         n_inputs=len(mapping.inputs),
         n_outputs=len(mapping.outputs),
-        orders=_orders(data, mapping, start),
-        shown=_shown(data.estimation, mapping),
+        orders=_orders(data, known, mapping, start),
+        shown=0 if shown is None else shown.chosen,
+        clear=0 if shown is None else int((shown.correlations[: shown.most] ** 2 > HALF).sum()),
+        exact=exact,
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(suggestion.structure for one in advice for suggestion in one.suggestions),
         cautions=(*_cautions(advice), *_not_looked_at(mapping)),
@@ -137,6 +150,22 @@ def look(data: Data, mapping: Mapping, start: Start) -> Looked:
         resets=resets_of(data.estimation, mapping) if at_rest else None,
         mechanism=() if held is None else held.structures,
     )
+
+
+def seen_of(data: Data, *, exact: bool) -> Data:
+    """What has a look: what is fitted and what chooses, or some whole traces of what is fitted.
+
+    Args:
+        data: The traces of the pipeline.
+        exact: As for :class:`Looked`: a few without noise tell as much as all, and all took longer than the search.
+
+    Returns:
+        The data, whose trace set is what has a look.
+    """
+    if not exact:
+        return replace(data, traces=_set(data, data.estimation, data.selection))
+    chooses = whole_traces(data.selection, LOOKED_AT // FEW) if data.selection else ()
+    return replace(data, traces=_set(data, whole_traces(data.estimation, LOOKED_AT), chooses))
 
 
 def resets_of(traces: Sequence[Trace], mapping: Mapping) -> VectorGreyBox | None:
@@ -208,6 +237,22 @@ def at_ends(traces: Sequence[Trace], mapping: Mapping) -> dict[str, bool]:
     }
 
 
+def whole_traces(traces: Sequence[Trace], most: int) -> Sequence[Trace]:
+    """Some of many records, evenly spaced, of so many samples together or a few more.
+
+    Args:
+        traces: The records.
+        most: Samples.
+
+    Returns:
+        All of them where they have no more, and at least :data:`FEW` otherwise.
+    """
+    count = max(int(np.ceil(most * len(traces) / max(sum(map(len, traces)), 1))), FEW)
+    if count >= len(traces):
+        return traces
+    return [traces[k] for k in np.linspace(0, len(traces) - 1, count).round().astype(int)]
+
+
 def span_of(traces: Sequence[Trace], name: str) -> float:
     """How far a channel moves over all records, in its unit."""
     return float(max(one[name].max() for one in traces) - min(one[name].min() for one in traces))
@@ -225,9 +270,11 @@ def _set(data: Data, estimation: Sequence[Trace], selection: Sequence[Trace]) ->
     return TraceSet(name=data.traces.name, traces=(*estimation, *selection), roles=roles)
 
 
-def _orders(data: Data, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
+def _orders(data: Data, known: TraceSet, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
     """The best ARX structures in free run over what chooses; of several outputs, what each of them needs in one."""
-    fitted, chooses = (data.estimation, data.selection) if data.selection else ends_held_out(data.estimation)
+    fitted, chooses = known.with_role(Role.ESTIMATION), known.with_role(Role.SELECTION)
+    if not chooses:
+        fitted, chooses = ends_held_out(fitted)
     traces = _set(data, fitted, chooses)
     looked = looked_at(mapping, ORDER_SEARCH)
     found = [some for one in looked if (some := _orders_of(traces, one, start))]
@@ -239,14 +286,14 @@ def _orders(data: Data, mapping: Mapping, start: Start) -> tuple[ARX, ...]:
     return tuple(dict.fromkeys(together))
 
 
-def _shown(traces: Sequence[Trace], mapping: Mapping) -> int:
+def _shown(traces: Sequence[Trace], mapping: Mapping) -> StateOrders | None:
     """States by the canonical correlations of past and future, without a fit."""
     if not mapping.inputs:
-        return 0
+        return None
     try:
-        return state_orders(traces, mapping, most=MOST_SHOWN).chosen
+        return state_orders(traces, mapping, most=MOST_SHOWN)
     except (UserError, np.linalg.LinAlgError, ValueError):  # too short, or a channel that never moves
-        return 0
+        return None
 
 
 def _orders_of(traces: TraceSet, mapping: Mapping, start: Start) -> tuple[ARX, ...]:

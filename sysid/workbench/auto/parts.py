@@ -29,6 +29,9 @@ SEARCHED = 40_000
 A_SECOND, LEAST_SEARCHED = 200, 8_000
 """Where selection traces choose, so many for each second of the search, and in any case so many: in a short search a
 network would come to a few iterations on all of them, which tell nothing of it."""
+OF_EXACT = 1 / 3
+"""Share of these by which structures of records without noise are compared: there a few tell as much as all, and three
+times the iterations or structures more."""
 FEW = 4
 """Whole traces from which on trials see some of them, and not the beginning of all."""
 LITTLE_BEYOND = 0.1
@@ -95,7 +98,7 @@ class Parts:
         return SEARCH if self.trained_on else {**SEARCH, "choose_by": "evidence"}
 
 
-def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool = False) -> Parts:
+def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool = False, exact: bool = False) -> Parts:
     """Part the estimation traces into what is fitted and what chooses.
 
     Args:
@@ -104,6 +107,7 @@ def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool
         wall_s: Seconds of the search; ``None`` where iterations are counted.
         in_turn: Whether every part chooses however long the record is: what adds up its errors may be right over one
             part of a movement by chance.
+        exact: Whether the records have no noise.
 
     Returns:
         The parts.
@@ -128,7 +132,7 @@ def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool
             remedy="record for longer, or fit a structure of few parameters with sysid orders or sysid run",
         )
     sentences, total = [told], max(sum(map(len, fitted)) for fitted, _ in pairs)
-    most = searched_in(wall_s) if data.selection else SEARCHED
+    most = searched_in(wall_s, exact=exact) if data.selection else SEARCHED
     cut = total > most and bool(data.selection)
     if total > most:
         share, partial = most / total, True
@@ -138,11 +142,12 @@ def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool
     return Parts(folds=tuple(_fold(data, *pair) for pair in pairs), told=tuple(sentences), partial=partial, cut=cut)
 
 
-def searched_in(wall_s: float | None) -> int:
+def searched_in(wall_s: float | None, *, exact: bool = False) -> int:
     """How many samples trials fit where selection traces choose.
 
     Args:
         wall_s: Seconds of the search; ``None`` where iterations are counted.
+        exact: Whether the records have no noise.
 
     Returns:
         Samples of all traces together.
@@ -151,7 +156,8 @@ def searched_in(wall_s: float | None) -> int:
         >>> searched_in(None), searched_in(60.0), searched_in(10.0)
         (40000, 12000, 8000)
     """
-    return SEARCHED if wall_s is None else round(min(SEARCHED, max(LEAST_SEARCHED, A_SECOND * wall_s)))
+    most = SEARCHED if wall_s is None else min(SEARCHED, A_SECOND * wall_s)
+    return round(max(LEAST_SEARCHED, OF_EXACT * most if exact else most))
 
 
 def _seen(fitted: Sequence[Trace], share: float) -> tuple[list[Trace], str]:

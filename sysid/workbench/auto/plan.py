@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from sysid.estimation.estimators import estimator_of
-from sysid.models import ARX
+from sysid.models import ARX, NeuralStateSpace
 from sysid.workbench.auto.budget import LARGER, LINEAR, size_of
 from sysid.workbench.auto.families import Try, suggested
 from sysid.workbench.auto.ledger import Ledger
@@ -182,6 +182,10 @@ class Plan(Ledger):
         self.looked = replace(self.looked, states=self._linear_states())
         # On a slow machine linear models alone would have taken all. What trains side by side takes no longer than one.
         self.budget.unlimited = self.budget.side_by_side
+        if self.looked.exact:
+            # Blocks and polynomials take long, one model for each output, and seldom end stable.
+            hidden = [one for one in self._first(linear=False) if one.structure.kind == NeuralStateSpace.kind]
+            yield from self._rounds_of(hidden)
         yield from self._unasked(linear=False)
         yield from self._near_the_best()
 

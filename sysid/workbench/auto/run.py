@@ -16,7 +16,7 @@ from sysid.reporting.results import Results
 from sysid.reporting.sweep_record import SweepRecord, write_sweep
 from sysid.workbench.auto.config import AutoConfig
 from sysid.workbench.auto.found import FOUND, Found
-from sysid.workbench.auto.look import is_suggested
+from sysid.workbench.auto.look import is_suggested, seen_of
 from sysid.workbench.auto.parts import FURTHER, LAST
 from sysid.workbench.auto.race import trains_on
 from sysid.workbench.auto.refit import refitted
@@ -268,6 +268,7 @@ class _AutoSteps:
         work = FitSteps(
             pipeline=pipeline, given=given, chosen=choice, page=self.auto.page, before_page=self.auto.before_page,
             suggest=is_suggested(self.config.mapping),
+            seen=partial(seen_of, exact=True) if self.config.tolerance is not None else lambda data: data,
         )  # fmt: skip
         results = work.run(run, loaded)
         ready = events.SweepReady(

@@ -21,10 +21,10 @@ from sysid.workbench.auto.last_fit import LastFit, refit_share
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
 from sysid.workbench.auto.plan import AGAIN, Plan
-from sysid.workbench.auto.race import Race, trains_on
+from sysid.workbench.auto.race import Race, as_far, as_rival, trains_on
 from sysid.workbench.auto.ripe import Ripening, young_told
 from sysid.workbench.auto.trials import Trials
-from sysid.workbench.auto.words import Choice, choose, sentence
+from sysid.workbench.auto.words import Choice, Error, choose, sentence
 from sysid.workbench.auto.worth import Rank, error, ranked_by
 from sysid.workbench.fits import steps
 from sysid.workbench.fits.config import FitConfig
@@ -91,8 +91,9 @@ class Search:
         Raises:
             ConfigError: If the record is too short.
         """
-        looked = look(data, config.mapping, config.start)
-        parts = part(data, config.start, config.wall_s, in_turn=looked.integrators > 0)
+        exact = config.tolerance is not None
+        looked = look(data, config.mapping, config.start, exact=exact)
+        parts = part(data, config.start, config.wall_s, in_turn=looked.integrators > 0, exact=exact)
         structure = stand_in(config)
         pipeline = config.sweep(structure).pipeline([FitConfig(name=FOUND, structure=structure)])
         if config.wall_s is not None:
@@ -157,7 +158,7 @@ class Search:
         if self.parts.trained_on and self.config.tolerance is not None:
             training["within"] = self.config.tolerance
         plan = Plan(
-            looked=self.looked, budget=budget, error=error, training=training, seed=self.config.seed, again=again,
+            looked=self.looked, budget=budget, error=self._rival, training=training, seed=self.config.seed, again=again,
             tolerance=self.config.tolerance,
         )  # fmt: skip
         # What was held out of a fold is fitted in the end by another training: its trials are not trained on.
@@ -180,7 +181,8 @@ class Search:
         first, kept, raced = trials.drivers[0], refit_share(self.parts), 0
         if self.parts.trained_on:
             race = Race(
-                driver=first, points=plan.points, rank=self._rank, n_outputs=self._n_outputs, wall_s=self.config.wall_s,
+                driver=first, points=plan.points, rank=self._rank, n_outputs=self._n_outputs,
+                wall_s=None if self.config.wall_s is None else min(self.config.wall_s, plan.budget.ends_s),
                 iterations=self.config.iterations, workers=self.config.workers, clock=lambda: clock.total,
                 kept=kept - sum(RACE), ends_s=plan.budget.ends_s,
                 slowed=1.0 if self.config.wall_s is None else plan.budget.slowed,
@@ -191,7 +193,7 @@ class Search:
         checks = Checks(driver=first, bench=self.bench.fold(0), whole=whole)
         beyond = self._beyond(plan, trials)
         choice = choose(
-            plan.candidates, error, checks.first_stable, tolerance=self.config.tolerance, beyond=beyond.of,
+            plan.candidates, self._error, checks.first_stable, tolerance=self.config.tolerance, beyond=beyond.of,
             goes_on=lambda trial: self.parts.trained_on and trains_on(structure_from_dict(trial.structure)),
         )  # fmt: skip
         needs_s = told.needs_s(plan, clock.total)
@@ -235,7 +237,16 @@ class Search:
 
     @property
     def _rank(self) -> Rank:
-        return ranked_by(error, self.config.tolerance)
+        return ranked_by(self._rival, self.config.tolerance)
+
+    @property
+    def _error(self) -> Error:
+        """What chooses: of records without noise also of what is not stable yet, where its training goes on."""
+        return as_far if self.looked.exact and self.parts.trained_on else error
+
+    @property
+    def _rival(self) -> Error:
+        return as_rival if self.looked.exact and self.parts.trained_on else error
 
     @property
     def _finishing_s(self) -> float:
@@ -285,8 +296,8 @@ class Search:
         self, plan: Plan, choice: Choice, beyond: Beyond, wall_s: float, raced: int, *, united: bool
     ) -> SweepRecord:
         said = sentence(
-            choice, len(plan.trials), again=plan.n_again, raced=raced, unit=self._unit, ended=plan.ended, error=error,
-            beyond=beyond.away,
+            choice, len(plan.trials), again=plan.n_again, raced=raced, unit=self._unit, ended=plan.ended,
+            error=self._error, beyond=beyond.away,
         )  # fmt: skip
         said += told.last_fit(plan, choice.chosen) if united else ""
         young = young_told(plan.trials, self._rank, self._n_outputs, len(self.parts.folds))

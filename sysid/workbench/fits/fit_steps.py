@@ -77,6 +77,7 @@ class FitSteps:
         page: Whether a page is made of the results, and the traces are looked at for it.
         before_page: Writes what the page shows beside the results, once these and the bundle are there.
         suggest: Whether the page suggests structures.
+        seen: The traces that have a look for the page; all of them by default.
     """
 
     pipeline: Pipeline
@@ -85,6 +86,7 @@ class FitSteps:
     page: bool = True
     before_page: Callable[[], object] | None = None
     suggest: bool = True
+    seen: Callable[[Data], Data] = lambda data: data
 
     @property
     def config(self) -> PipelineConfig:
@@ -301,7 +303,7 @@ class FitSteps:
 
     def _look(self, run: Run, loaded: Done[Data]) -> Step[list[dict[str, Any]]]:
         """What is in the traces; after the fits, which nobody shall wait for longer than they take."""
-        file = run.store.path / "advice.json"
+        file, seen = run.store.path / "advice.json", self.seen(loaded.value)
 
         def write(found: list[dict[str, Any]]) -> list[Path]:
             write_json(file, found)
@@ -310,8 +312,8 @@ class FitSteps:
         return Step(
             name=LOOKING.name,
             title=LOOKING.title,
-            make=lambda _: steps.look(self.config, loaded.value, suggest=self.suggest),
-            key=lambda: steps.advice_key(self.config, loaded.value, suggest=self.suggest),
+            make=lambda _: steps.look(self.config, seen, suggest=self.suggest),
+            key=lambda: steps.advice_key(self.config, seen, suggest=self.suggest),
             write=write,
             read=lambda _: read_json(file),
             outcome=looked_told,

@@ -9,8 +9,10 @@ from math import inf
 from pathlib import Path
 
 from sysid.export.reading import read_bundle
+from sysid.reporting.results import read_results
 from sysid.workbench.experiments.run import Experiments
 from sysid.workbench.runner.events import Watcher
+from sysid.workbench.surrogates.limits import limits
 from sysid.workbench.surrogates.proof import Proof
 from sysid.workbench.surrogates.told import poor, short_of_time
 from sysid.workbench.surrogates.work import TIMES, Perform, Proving, Work, first_look
@@ -100,5 +102,6 @@ def make_surrogate(
     page, fmu = work.page(place), work.delivered(place)
     bundle = read_bundle(place / "bundle")
     notes += [*said, *work.learnt(bundle, found, shown), *poor(shown, minutes, needs_s)]
+    notes += limits(read_results(place), shown)
     notes += short_of_time(shown, plan, count, took=0.0 if iterations else time.monotonic() - began)
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes, pipeline=pipeline)

@@ -34,6 +34,8 @@ BUSY = 1.5
 """Seconds by the clock that a second of work takes from which on a busy machine is named as the reason."""
 TRIES = 3
 """Experiments that are run before any is asked for, at most: one, where that gives a record."""
+WARMED = 0.05
+"""Share of the time up to which a first run is made twice: what it had to load is no time of the others."""
 KNOWN = """\
 # A search finds smooth maps, and a model that jumps at events (a velocity that flips, a state that is reset) is none.
 # Where you know what happens, write it, and it is fitted in place of the search (docs/how/events.md):
@@ -153,13 +155,16 @@ def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, wo
         (one,) = runs.run(cases[:1])
         # Of one that fails nobody knows whether it always does; one that hangs is not waited for one after the other.
         more = runs.run(cases[1:]) if one.trace is None else []
+        # The first run of a process loads and compiles what the others find: eight of sixty were afforded for it.
+        warm = one.trace is not None and one.wall_s < WARMED * 60.0 * minutes
+        again = runs.again(cases[0]) if warm else one
     if one.trace is None and all(other.trace is None for other in more):
         raise ConfigError(
             f"the reference gave no record of {TRIES} experiments", where=reference.kind,
             expected="outputs of experiments within the ranges", got=reasons_of([one, *more]),
             remedy="run the reference by itself with such inputs first; nothing was written",
         )  # fmt: skip
-    one = next(one for one in (one, *more) if one.trace is not None)
+    one = next(one for one in (again, one, *more) if one.trace is not None)
     each = one.wall_s if np.isfinite(one.wall_s) else reference.time_limit
     seen = min(searched_in(60.0 * minutes) * reference.sample_time / design.duration, RECORDS * 60.0 * minutes)
     most = int(np.clip(seen, ENOUGH, MOST))

@@ -27,7 +27,8 @@ STRUCTURE = ARX(na=1, nb=(1,), nk=(1,))
 @pytest.mark.parametrize(
     ("given", "drawn"),
     [
-        ({"minutes": 0.5}, 2),
+        ({"minutes": 0.5}, 1),
+        ({"minutes": 1.5}, 2),
         ({"minutes": 0.1}, 1),
         ({"minutes": 10.0}, DRAWN),
         ({"iterations": 100}, DRAWN),

@@ -11,8 +11,9 @@ from sysid.advice import Advice
 from sysid.models import ARX, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.auto.families import FAMILIES
-from sysid.workbench.auto.look import MOST_SHOWN, Looked, at_ends, in_motion, look
+from sysid.workbench.auto.look import MOST_SHOWN, Looked, at_ends, in_motion, look, whole_traces
 from sysid.workbench.auto.mechanisms import mechanism_of
+from sysid.workbench.auto.parts import FEW
 from tests.workbench.auto.conftest import data, record
 
 MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
@@ -39,6 +40,35 @@ def test_orders_dead_time_and_lags_are_found(looked: Looked) -> None:
 def test_states_that_the_past_shows_are_believed_up_to_twice_those_of_a_free_run() -> None:
     one = Looked(n_inputs=1, n_outputs=1)
     assert [replace(one, states=n, shown=k).needed for n, k in ((2, 12), (4, 7), (5, 3))] == [4, 7, 5]
+
+
+def test_states_whose_future_the_past_explains_by_half_are_clear() -> None:
+    """A motor that turns fast and warms slowly: its linear models are no better for the third state."""
+    runs = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        u = np.repeat(rng.uniform(0.0, 1.0, 20), 20)
+        fast, slow, y = 0.0, 0.0, np.empty(400)
+        for k, level in enumerate(u):
+            fast += 0.4 * (level - fast)
+            slow += 0.02 * ((level - fast) ** 2 + 0.3 * fast - slow)
+            y[k] = fast + 2.0 * slow
+        runs.append(replace(record(f"r{seed}", 400), values=np.column_stack([u, y])))
+    found = look(data(*runs), MAPPING, Start(kind=StartKind.REST), exact=True)
+    assert found.clear == 2
+    assert found.exact
+    tried = [one.structure for one in FAMILIES[4].first(replace(found, states=1, clear=3))]
+    assert [(one.states, one.neurons) for one in tried] == [(3, 8), (3, 16), (4, 12)]  # type: ignore[attr-defined]
+    summed = [one.structure for one in FAMILIES[4].first(replace(found, states=1, clear=3, integrators=1))]
+    assert [one.integrators for one in summed] == [0, 1, 0, 0], "what looks like a sum is one among others"  # type: ignore[attr-defined]
+    assert not FAMILIES[4].adds_up(replace(found, integrators=1))
+
+
+def test_some_whole_records_are_looked_at_of_many() -> None:
+    traces = [record(f"r{k}", 1000) for k in range(30)]
+    assert [one.name for one in whole_traces(traces, 8_000)] == ["r0", "r4", "r8", "r12", "r17", "r21", "r25", "r29"]
+    assert len(whole_traces(traces, 100)) == FEW
+    assert whole_traces(traces, 30_000) is traces
 
 
 def test_outputs_that_move_before_any_input_does_are_known() -> None:

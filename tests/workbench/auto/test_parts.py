@@ -101,6 +101,16 @@ def test_a_short_search_looks_at_less_where_selection_traces_choose() -> None:
     assert sum(map(len, held_out.folds[0].fitted)) == 3 * 8_000
 
 
+def test_records_without_noise_are_searched_by_a_third_of_that() -> None:
+    """A few tell what a structure is worth, and leave time for more of them; the chosen one still sees all."""
+    declared = {Role.SELECTION: record("b", 100, seed=1)}
+    known = data(*(record(name, 4000) for name in "cdefghijkl"), others=declared)
+    for seconds, samples in ((10.0, 8_000), (180.0, 12_000), (None, SEARCHED // 3)):
+        found = part(known, STARTS[0], seconds, exact=True)
+        assert sum(map(len, found.folds[0].fitted)) == pytest.approx(samples, abs=10)
+        assert found.trained_on
+
+
 def test_too_short_a_record_says_what_to_do() -> None:
     with pytest.raises(ConfigError, match="too short for a search") as caught:
         part(data(record("a", 30)), STARTS[0])

@@ -10,7 +10,7 @@ import pytest
 
 from sysid.models import ARX, NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.race import FINALISTS, Race, behind
+from sysid.workbench.auto.race import AHEAD, FINALISTS, Race, as_far, as_rival, behind
 from sysid.workbench.auto.worth import error, ranked_by
 from sysid.workbench.sweep.search_space import Point
 from tests.workbench.auto.test_plan import trial
@@ -133,3 +133,17 @@ def test_where_trials_have_overrun_the_two_best_go_on_all_the_same() -> None:
     assert [numbers for numbers, _ in late.looks] == [[1, 2]]
     assert spent == pytest.approx(0.12)
     assert [one.selection_free_run_mse for one in found[:3]] == [0.1, 0.05, 3.0]
+
+
+def test_a_network_that_is_not_stable_yet_is_trained_on_where_it_is_far_ahead() -> None:
+    """Random sequences refuse what few iterations have left in it, and a linear model of four times its error came."""
+    young = tried(1, 1.0, "UNSTABLE").model_copy(update={"usable": False})
+    assert (error(young), as_far(young), as_rival(young)) == (math.inf, 1.0, AHEAD**2)
+    assert as_far(tried(2, 2.0)) == as_rival(tried(2, 2.0)) == 2.0
+    linear = Point(number=99, structure=ARX(na=1, nb=(1,), nk=(1,)), training={}, values={})
+    lost = trial(linear, 1.0).model_copy(update={"status": "UNSTABLE", "usable": False})
+    assert as_far(lost) == math.inf, "its training does not go on"
+    for stopped in ({"status": "NOT_IMPROVED"}, {"dropped_at": 1}, {"selection_free_run_mse": math.inf}):
+        assert as_far(young.model_copy(update=stopped)) == math.inf
+    order = sorted([tried(2, 3.0), young, tried(3, 5.0)], key=ranked_by(as_rival, None))
+    assert [one.number for one in order] == [2, 1, 3]

@@ -64,3 +64,17 @@ def test_no_more_experiments_are_asked_for_than_trials_fit_in_the_time(
     design = Design.model_validate({"duration": 250.0})
     found = affordable(config, design, minutes=minutes, workers=2)
     assert (found.estimation, found.selection, found.test) == (count, count // 4, count // 4)
+
+
+def test_what_a_first_run_has_to_load_is_no_time_of_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight experiments of sixty were afforded for a reference that is compiled as it is called first."""
+    monkeypatch.setenv("SYSID_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "loads.py").write_text(
+        "import time\n\nLOADED = []\n\n\ndef loads(t, u, p):\n"
+        "    if not LOADED:\n        LOADED.append(time.sleep(2.5))\n    return u\n",
+        encoding="utf-8",
+    )
+    fields = {**REFERENCE, "python": "loads:loads", "folder": str(tmp_path)}
+    design = Design.model_validate({"duration": 250.0})
+    found = affordable(ReferenceConfig.model_validate(fields), design, minutes=1.0, workers=1)
+    assert found.estimation == 24

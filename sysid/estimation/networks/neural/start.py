@@ -18,8 +18,10 @@ from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.regression import lagged
 from sysid.estimation.linear.state_space.search import search
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
+from sysid.estimation.networks.neural import recalled
 from sysid.estimation.networks.neural.integrators import summed
 from sysid.estimation.networks.neural.provider import NeuralProvider
+from sysid.estimation.records.experiment import Experiment
 from sysid.kernels import linear as linear_kernel
 from sysid.models import Lags, LinearStateSpace, NeuralForm
 from sysid.models.linear.linear_state_space import MOST_STATES
@@ -39,6 +41,9 @@ SIGN_ROUNDS = 10
 """Times that the signs of a rectified output are guessed anew from the model that the last guess gave."""
 
 LINEAR_ITERATIONS = 60
+
+TELLING, FEWEST = 4_000, 4
+"""Samples of whole records by which a linear model is found, where there are more, and records at least."""
 
 
 SETTLING = 1e-3
@@ -66,11 +71,15 @@ def linear_start(provider: NeuralProvider, *, until: float = math.inf) -> NDArra
     """
     whole = provider.template
     s = replace(whole.sizes, neurons=0, output_neurons=0)
+    told = recalled.of(provider, s)
+    if told is not None and told.theta is not None:
+        return _with_neurons(provider, told.theta)
     # Without bounds of the output: a start that lies beyond them throughout would have no gradient to come back by.
     template = NeuralForm(
         sizes=s, theta=np.zeros(s.count), scaling=whole.scaling, rectified=whole.rectified, bound=np.inf
     )
-    linear = replace(provider, template=template)
+    everything = replace(provider, template=template)
+    linear = replace(everything, experiments=some_of(provider))
     with one_blas_thread():  # more threads than one cost more than they give at these sizes
         began, fits = now(), list[NDArray[np.float64]]()
         for left, order in zip(range(len(ARX_ORDERS), 0, -1), ARX_ORDERS, strict=True):
@@ -78,11 +87,32 @@ def linear_start(provider: NeuralProvider, *, until: float = math.inf) -> NDArra
         # What it takes cannot be bounded closely: it is left out where the others took most of the time.
         if s.outputs > 1 and not whole.rectified and until - now() >= now() - began:
             fits += [_fitted(linear, one, until - now()) for one in _by_subspace(linear, until)]
-    theta = s.hold(_levelled(linear, _unit_states(linear, min(fits, key=linear.loss))))
-    base = np.zeros(provider.n_parameters)
-    for to, of in ((whole.sizes.linear, s.linear), (whole.sizes.output_linear, s.output), (whole.sizes.start, s.start)):
+    theta = s.hold(_levelled(everything, _unit_states(everything, min(fits, key=linear.loss))))
+    if told is not None:
+        told.keep(theta)
+    return _with_neurons(provider, theta)
+
+
+def some_of(provider: NeuralProvider) -> tuple[Experiment, ...]:
+    """The records by which a linear model is found: of many whole ones no more than tell it.
+
+    A start is not better for samples beyond :data:`TELLING`, and of two outputs took as long on all of them as the
+    training that follows. Where a record begins at a state of its own, all are taken.
+    """
+    experiments, total = provider.experiments, sum(len(one.output) for one in provider.experiments)
+    count = max(math.ceil(TELLING / max(total, 1) * len(experiments)), FEWEST)
+    if count >= len(experiments) or provider.n_parameters > provider.template.sizes.count:
+        return experiments
+    return tuple(experiments[k] for k in np.linspace(0, len(experiments) - 1, count).round().astype(int))
+
+
+def _with_neurons(provider: NeuralProvider, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A linear model in the parameters of a provider with neurons, which do nothing."""
+    sizes = provider.template.sizes
+    s, base = replace(sizes, neurons=0, output_neurons=0), np.zeros(provider.n_parameters)
+    for to, of in ((sizes.linear, s.linear), (sizes.output_linear, s.output), (sizes.start, s.start)):
         base[to] = theta[of]
-    base[whole.sizes.count :] = theta[s.count :]
+    base[sizes.count :] = theta[s.count :]
     return base
 
 
