@@ -190,7 +190,7 @@ class Search:
             plan.trials[:], spent = race.run(plan.trials)
             kept, raced = kept - spent, len(race.in_it)
         whole = () if self.data.selection else self.data.estimation
-        checks = Checks(driver=first, bench=self.bench.fold(0), whole=whole)
+        checks = Checks(driver=first, bench=self.bench.fold(0), whole=whole, tolerance=self.config.tolerance)
         beyond = self._beyond(plan, trials)
         choice = choose(
             plan.candidates, self._error, checks.first_stable, tolerance=self.config.tolerance, beyond=beyond.of,

@@ -40,11 +40,13 @@ class Checks:
         bench: Traces and conditions.
         whole: The estimation traces where trials have seen pieces of them alone: sequences that are made of pieces are
             too short for a run to lose its way on them.
+        tolerance: Share of an output's range: one that stays within it on fewer of what chooses is none of those alike.
     """
 
     driver: Driver
     bench: Bench
     whole: Sequence[Trace] = ()
+    tolerance: float | None = None
     found: dict[int, list[FitResult]] = field(default_factory=dict)
     """Fits that were checked, by the trial's number."""
 
@@ -71,7 +73,8 @@ class Checks:
         first = ranked[0]
         limit = (1.0 + NEAR) ** 2 * (first.selection_free_run_mse or 0.0)
         for trial in ranked:
-            if not (trial.selection_free_run_mse or math.inf) <= limit:
+            fewer = self.tolerance is not None and trial.within(self.tolerance) < first.within(self.tolerance)
+            if fewer or not (trial.selection_free_run_mse or math.inf) <= limit:
                 continue
             fits = self.checked(trial)
             if all(fit.status is not Status.UNSTABLE and not (fit.stability or {}).get("apart") for fit in fits):

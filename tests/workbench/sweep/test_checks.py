@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -49,6 +51,18 @@ def test_the_first_stable_one_and_of_those_alike_one_that_forgets(
     ranked: Any = [SimpleNamespace(number=n, selection_free_run_mse=mse) for n, mse in enumerate(errors)]
     winner, passed_over = checks(monkeypatch, found).first_stable(ranked)
     assert (winner.number, passed_over) == (chosen, refused)
+
+
+def test_one_that_stays_within_the_tolerance_less_often_is_not_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cell's charge is where it was left: a network that forgot was within 1 % nowhere, one before it on two thirds."""
+    ranked: Any = [
+        SimpleNamespace(number=n, selection_free_run_mse=mse, within=partial(lambda share, _: share, share))
+        for n, (mse, share) in enumerate([(0.25, 0.67), (0.19, 0.0), (0.2, 0.8)])
+    ]
+    one = checks(monkeypatch, [SWINGS, GOOD, GOOD])
+    assert one.first_stable(ranked)[0].number == 1
+    assert replace(one, tolerance=0.01).first_stable(ranked)[0].number == 2
+    assert replace(one, tolerance=0.01).first_stable(ranked[:2])[0].number == 0
 
 
 def test_a_trial_that_saw_pieces_is_checked_over_the_whole_record(
