@@ -54,7 +54,7 @@ def test_the_first_stable_one_and_of_those_alike_one_that_forgets(
 
 
 def test_one_that_stays_within_the_tolerance_less_often_is_not_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A cell's charge is where it was left: a network that forgot was within 1 % nowhere, one before it on two thirds."""
+    """A charge stays where it was left: a network that forgot was within 1 % nowhere, one before it on two thirds."""
     ranked: Any = [
         SimpleNamespace(number=n, selection_free_run_mse=mse, within=partial(lambda share, _: share, share))
         for n, (mse, share) in enumerate([(0.25, 0.67), (0.19, 0.0), (0.2, 0.8)])
