@@ -127,11 +127,11 @@ def _foretold(driver: NDArray[np.float64], driven: NDArray[np.float64]) -> bool:
         return False
     own, other, steps = own[known], other[known], driver[at][known]
     alone, both = _left(own, steps), _left(np.hstack([own, other]), steps)
-    return both < (1.0 - FORETOLD) * alone and alone > 1e-6 * float(np.var(steps))
+    return bool(both < (1.0 - FORETOLD) * alone and alone > 1e-6 * np.var(steps))
 
 
 def _left(regressors: NDArray[np.float64], values: NDArray[np.float64]) -> float:
     """Mean square that a linear regression leaves, for the samples it has free."""
     scaled = regressors / np.maximum(np.linalg.norm(regressors, axis=0), np.finfo(np.float64).tiny)
     left = values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0]
-    return float(left @ left) / max(len(values) - regressors.shape[1], 1)
+    return float(left @ left / max(len(values) - regressors.shape[1], 1))
