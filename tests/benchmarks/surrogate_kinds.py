@@ -1,4 +1,4 @@
-"""From plants of kinds that nothing was tuned to, to surrogates: what one command makes of each in some minutes.
+"""From plants of thirteen kinds to surrogates: what one command makes of each in some minutes.
 
 Run with ``python -m tests.benchmarks surrogate_kinds --minutes=2 --only=dcmotor,exchanger --proof=200 --seed=0``.
 References are those of ``tests/references/compiled_kinds.py``, by their ranges, sample time and duration alone, with

@@ -1,4 +1,4 @@
-"""Plants of thirteen kinds, on which no search was tuned: what ``sysid surrogate`` makes of what it has not seen.
+"""Plants of thirteen kinds for ``sysid surrogate``; searches of motor, exchanger and battery have led to changes of it.
 
 Each is a function of times, inputs and parameters, compiled, so that hundreds of its runs can be had. :data:`TABLE` has
 the ranges of its inputs, its outputs, the sample time in seconds, and how long an experiment lasts.
