@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sysid.api.abstract_fit import AbstractResponses
 from sysid.api.response_problem import ResponseProblem, Weighting
 from sysid.estimation import FitResult
+from sysid.estimation.remarks.measured_response_notes import measured_response_notes
 from sysid.models import Cascade
 from sysid.reporting.frequency import HERTZ, FrequencyUnit
 from sysid.traces import Channel, Role, Trace, TraceSet
@@ -161,4 +162,5 @@ def response_fit(problem: ResponseProblem, found: FitResult) -> ResponseFit:
     low, high = HERTZ.told(measured.frequency[[0, -1]])
     of = f"{len(measured)} points from {low:.4g} to {high:.4g} Hz, weighting {problem.weighting.value}"
     note = f"Fitted to a frequency response ({of}) of which the model has {percent(fit.fit_percent)} %; no record."
-    return replace(fit, notes=(note, *fit.notes))
+    open_ = measured_response_notes(measured, found, problem.weights)
+    return replace(fit, notes=(note, *fit.notes, *open_), warnings=(*fit.warnings, *open_))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sysid.api.estimates import FrequencyResponse
 from sysid.errors import ConfigError
 from sysid.estimation import FitResult, Spectrum, TransferFunctionTraining, fit_spectra
+from sysid.estimation.linear.frequency_response import LONGEST
 from sysid.estimation.linear.response_dead_time import with_dead_time
 from sysid.models import Domain, Mapping, TransferFunction, TransferFunctionModel
 from sysid.traces.measured_response import MeasuredResponse
@@ -154,10 +155,12 @@ class ResponseProblem:
             orders = structure if delay is None else replace(structure, delays=(delay,))
             return self.fit_at(orders, time, begin=begin)
 
-        found = fit_at(self._time_of(structure))
-        if self.sample_time is None and structure.delays is None:
-            found = with_dead_time(found, fit_at, n_residuals=2 * len(self.measured))
-        return found
+        first = fit_at(self._time_of(structure))
+        if self.sample_time is not None or structure.delays is not None:
+            return first
+        found = with_dead_time(first, fit_at, n_residuals=2 * len(self.measured))
+        lost = tuple(one for one in first.warnings if LONGEST in one and one not in found.warnings)
+        return replace(found, notes=(*found.notes, *lost), warnings=(*found.warnings, *lost))
 
     def fit_at(
         self,

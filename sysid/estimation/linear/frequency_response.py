@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.state import Iteration
+from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.integrators import all_at_one, with_integrators
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import scattered, sections_of, stabilised
@@ -100,6 +101,8 @@ FAR_BELOW = 0.2
 BEGUN = "the poles of another fit"
 FEW_STEPS = 6
 """Sanathanan-Koerner iterations by which dead times are told apart."""
+LONGEST = "is the longest that was tried"
+"""What is said of a dead time at the end of the search."""
 PERIODS, SCANNED = 50.0, 4
 """Of the highest frequency, up to which dead times are scanned; and scanned dead times in each of these, as many as
 tell a turn from none."""
@@ -246,6 +249,10 @@ class _Problem(AbstractProblem):
         """Far below every frequency; see the base class."""
         return float(np.exp(-FAR_BELOW * 2.0 * np.pi / self._span))
 
+    def held_back(self, radius: float, end: End) -> bool:  # noqa: ARG002 - its points are no samples over time
+        """As far as a period of the lowest frequency has it; see the base class."""
+        return slow_poles.undecided(radius, [round(self._span)])
+
     def free_starts(self, provider: SeparableProvider) -> list[PoleStart]:
         """Sanathanan-Koerner iterations whose poles stay where they come to; see the base class."""
         if self.begin is not None:
@@ -269,6 +276,16 @@ class _Problem(AbstractProblem):
         if self.training.max_delay is not None:
             return least, most
         return least, max(most, int(min(self._span / 2.0, PERIODS * self._shortest)))
+
+    def at_end(self, end: End) -> tuple[str, ...]:
+        """That a dead time is the longest that was tried, where one was searched; see the base class."""
+        most = self.delay_range()[1]
+        if self.orders.delays is not None or max(end.delays) < most:
+            return ()
+        return (
+            f"The dead time, {most * self.terms.sample_time:.4g} s, {LONGEST}, and may be longer, or stand for poles "
+            "that are lacking: allow more (max_delay), or give it.",
+        )
 
     def likely_delays(self, least: int, most: int) -> list[list[int]]:
         """Those with the least loss of a scan, one input after the other; see the base class."""

@@ -91,6 +91,17 @@ class AbstractProblem(ABC):
         """
         return ()
 
+    def at_end(self, end: End) -> tuple[str, ...]:  # noqa: ARG002 - of records told with their first samples
+        """That something stands at the end of what was tried.
+
+        Args:
+            end: The end.
+
+        Returns:
+            Sentences, which are warnings.
+        """
+        return ()
+
     def part(self) -> Self | None:
         """The same problem on some samples of long records; ``None`` where all are looked at throughout."""
         return None
@@ -140,6 +151,18 @@ class AbstractProblem(ABC):
             It. Where noise and wrong dynamics hide an integrator, that search ends a few of them within the edge.
         """
         return 1.0 - slow_poles.REACH / max(end.lengths)
+
+    def held_back(self, radius: float, end: End) -> bool:
+        """Whether a pole stands at its bound, so that nothing says where it is.
+
+        Args:
+            radius: Magnitude of the slowest pole in the z plane.
+            end: The minimum among stable poles.
+
+        Returns:
+            Whether it does.
+        """
+        return slow_poles.undecided(radius, end.lengths)
 
     def free_starts(self, provider: SeparableProvider) -> list[PoleStart]:  # noqa: ARG002 - see the base class
         """Starts whose poles need not be stable.

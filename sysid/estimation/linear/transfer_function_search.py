@@ -80,7 +80,7 @@ def solve(own: AbstractProblem, began: float, on_iteration: Callable[[Iteration]
         raise FitDivergedError("no start gives a finite free run", remedy="lower the number of poles")
     end, unit = reached.end, own.scaling.output_scale**2
     model, uncertainty = reached.problem.model(end)
-    fast, slow = of_speed(model), own.told(end)
+    fast, slow = (*of_speed(model), *own.at_end(end)), own.told(end)
     radius = slowness(end.sections, own.orders.domain, own.terms.sample_time)
     return FitResult(
         model=model,
@@ -261,7 +261,7 @@ def _free_poles(
     # chance, the gain must be one that as many parameters as there are, fitted to it, could not have.
     if not end.worse_than(found, free=sum(own.orders.poles) + provider.n_taps):
         found = free.at_one(found)
-        if not (slow_poles.undecided(slowest, end.lengths) and _is_clearly_better(found, end, own)):
+        if not (own.held_back(slowest, end) and _is_clearly_better(found, end, own)):
             return own, end
     # Free poles are fitted from a free state. What begins where a start says has to follow from there as well: a
     # pole that is off 1 by little has an equilibrium where no plant ever was.
