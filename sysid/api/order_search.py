@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, cast
 
-import numpy as np
-
+from sysid.api.finalist_table import criterion_of, lines_of, table_of
 from sysid.api.fits import Fit
 from sysid.api.per_output import PerOutput, framed
-from sysid.errors import ConfigError
+from sysid.api.vector_order_search import VectorOrderSearch
 from sysid.estimation import StabilityOptions, fitting
 from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
 from sysid.estimation.linear.state_space.orders import StateOrders
-from sysid.extras import need
 from sysid.models import ARX, Mapping, Start
-from sysid.reporting.numbers import pole
 from sysid.traces import Role, TraceSet
 from sysid.validation.metrics import percent
 from sysid.validation.order_finalists import Finalist, alike_with, smallest_first
@@ -25,6 +22,8 @@ from sysid.validation.structure_search import Found, score
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+    from sysid.reporting.figures.order_figure import OrderCurve
 
 BY_SELECTION = "sorted by the free run over the selection traces"
 CLOSED_LOOP = "The output acts on an input within the sample (closed loop): dead times are searched from 1 on."
@@ -71,16 +70,7 @@ class OrderSearch:
         """
         if criterion is None:
             return _orders(self.finalists[0])
-        known = {one.value.lower(): one for one in Criterion}
-        if criterion.lower() not in known:
-            raise ConfigError(
-                "unknown criterion",
-                where="criterion",
-                expected=", ".join(one.value for one in Criterion),
-                got=criterion,
-                remedy="write one of these, or leave it out for the best free run",
-            )
-        return self.losses.best(known[criterion.lower()])
+        return self.losses.best(criterion_of(criterion))
 
     @property
     def contenders(self) -> tuple[Finalist, ...]:
@@ -156,23 +146,7 @@ class OrderSearch:
             Columns ``structure``, ``parameters``, ``one_step_mse``, ``AIC``, ``AICc``, ``BIC``, ``fit`` (mean over the
             cases that chose, percent), ``largest_pole`` (magnitude) and ``stable``.
         """
-        need("pandas", "a frame")
-        import pandas as pd
-
-        criteria = (Criterion.AIC, Criterion.AICC, Criterion.BIC)
-        rows = [
-            {
-                "structure": one.fit.model.structure.label,
-                "parameters": one.fit.model.n_parameters,
-                "one_step_mse": one.one_step_mse,
-                **{criterion.value: self.score(one, criterion) for criterion in criteria},
-                "fit": one.mean_fit,
-                "largest_pole": one.pole_radius,
-                "stable": bool(np.isfinite(one.mean_fit)) and not one.pole_radius >= 1.0,
-            }
-            for one in self.contenders
-        ]
-        return pd.DataFrame(rows)
+        return table_of(self.contenders, self.score)
 
     def score(self, finalist: Finalist, criterion: Criterion) -> float:
         """A criterion of a structure; smaller is better.
@@ -186,15 +160,25 @@ class OrderSearch:
         """
         return score(finalist, self.losses, criterion)
 
+    @property
+    def curve(self) -> OrderCurve:
+        """What is drawn: all candidates by size."""
+        from sysid.reporting.figures.order_figure import OrderCurve
+
+        return OrderCurve.of(self.losses)
+
+    def __len__(self) -> int:
+        return len(self.losses)
+
     def plot(self) -> Figure:
         """Loss against number of parameters, with what each criterion chooses.
 
         Returns:
             A figure of matplotlib's.
         """
-        from sysid.reporting.figures.order_figure import OrderCurve, order_figure
+        from sysid.reporting.figures.order_figure import order_figure
 
-        return order_figure(OrderCurve.of(self.losses), unit=self.unit)
+        return order_figure(self.curve, unit=self.unit)
 
     @property
     def unit(self) -> str:
@@ -202,15 +186,8 @@ class OrderSearch:
         return self.traces[self.traces.names[0]].channel(self.mapping.output).unit
 
     def __str__(self) -> str:
-        head = f"{'structure':<24}{'parameters':>11}{'one-step mse':>14}{'BIC':>12}{'free run, fit %':>17}"
-        head += f"{'largest pole':>14}"
-        lines = [
-            f"{one.fit.model.structure.label:<24}{one.fit.model.n_parameters:>11}{one.one_step_mse:>14.4g}"
-            f"{self.score(one, Criterion.BIC):>12.1f}{percent(one.mean_fit):>17}"
-            f"  {pole(one.pole_radius):>12}"
-            for one in self.contenders[: 10 if self.others is None else None]
-        ]
-        return "\n".join([f"{len(self.losses):,} structures; {self.chosen_by}", head, *lines, *self.notes])
+        lines = lines_of(self.contenders[: 10 if self.others is None else None], self.score)
+        return "\n".join([f"{len(self.losses):,} structures; {self.chosen_by}", *lines, *self.notes])
 
     __repr__ = __str__
 
@@ -220,15 +197,28 @@ class OrderSearch:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class SystemOrderSearch(PerOutput[OrderSearch]):
-    """The searches of a record of several outputs, as an ARX model an output is fitted; see the base class."""
+    """The searches of a record of several outputs, as an ARX model an output is fitted; see the base class.
+
+    Args:
+        outputs: The searches, by output.
+        together: That of one model of all outputs, where it was asked for (``structures="VectorARX"``).
+    """
+
+    together: VectorOrderSearch | None = None
 
     def to_frame(self) -> pd.DataFrame:
         """The shortlists as a table, best first for each output.
 
         Returns:
-            ``output``, and the columns of :meth:`OrderSearch.to_frame`.
+            ``output``, and the columns of :meth:`OrderSearch.to_frame`; that of all outputs is named by all of them.
         """
-        return framed(self.outputs)
+        all_of = {} if self.together is None else {"+".join(self.outputs): self.together}
+        return framed({**self.outputs, **all_of})
+
+    def __str__(self) -> str:
+        return "\n\n".join(map(str, [*self.outputs.values(), *([] if self.together is None else [self.together])]))
+
+    __repr__ = __str__
 
 
 def _orders(finalist: Finalist) -> ARX:

@@ -11,6 +11,7 @@ import numpy as np
 
 from sysid.api.given import ESTIMATED, TracesLike, traces_of
 from sysid.api.order_search import BY_SELECTION, OrderSearch, SystemOrderSearch
+from sysid.api.vector_order_search import VectorOrderSearch
 from sysid.errors import ConfigError, shortened
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import order_search
@@ -22,13 +23,15 @@ from sysid.models import Mapping, Start, StartLike
 from sysid.models.orders.lags import whole
 from sysid.traces import Role, Trace, TraceSet
 from sysid.validation.order_finalists import run_finalists, smallest_first
-from sysid.validation.structure_search import ARX_KIND, MOST, check_kinds, run_structures, score
+from sysid.validation.structure_search import ARX_KIND, MOST, VECTOR_KIND, check_kinds, run_structures, score
+from sysid.validation.vector_orders import run_vector_structures, structures_of
 
 LARGEST = 400_000
 """Candidates that a search without orders of its own tries at most: some seconds."""
 
 LATE_SHARE, LATE_GAIN = 0.2, 1.2
 """Part of the output that a longer dead time than the usual ones must explain, and how much more than they do."""
+BY_BIC = "sorted by BIC, for want of selection traces"
 FINALISTS = 40
 """Candidates that are run freely."""
 
@@ -61,13 +64,15 @@ def search_orders(
         max_nk: Largest dead time, likewise; longer where one plainly explains more of the output. The smallest is 0,
             and 1 where an input is set from the output of its own sample (closed loop).
         start: How each free run begins.
-        structures: Kinds beside ARX: ``SS``, ``TF``, ``OE``, ``ARMAX``, ``BJ``.
+        structures: Kinds beside ARX: ``SS``, ``TF``, ``OE``, ``ARMAX``, ``BJ``; and of several outputs ``VectorARX``,
+            one model whose outputs read each other's past.
         most: Largest order of those.
         selection: Traces that choose, in place of those of the data set.
         workers: Threads.
 
     Returns:
-        The search: its best structure, its table, its picture. Of several outputs, that of each, ``found["y1"]``.
+        The search: its best structure, its table, its picture. Of several outputs, that of each, ``found["y1"]``, and
+        that of one model of all, ``found.together``, where it was asked for.
 
     Raises:
         ConfigError: If no trace is for estimation, or the grid has more candidates than memory.
@@ -90,7 +95,44 @@ def search_orders(
         one.output: _of_output(traces, one, asked, start, kinds=kinds, most=most, selection=selection, workers=workers)
         for one in chosen.each
     }
-    return SystemOrderSearch(outputs=found) if len(found) > 1 else next(iter(found.values()))
+    if VECTOR_KIND not in kinds:
+        return SystemOrderSearch(outputs=found) if len(found) > 1 else next(iter(found.values()))
+    together = _together(traces, chosen, asked, start, selection=selection, workers=workers)
+    return SystemOrderSearch(outputs=found, together=together)
+
+
+def _together(
+    traces: TraceSet,
+    chosen: Mapping,
+    asked: Dict[str, int | None],
+    start: Start,
+    *,
+    selection: tuple[Trace, ...],
+    workers: int,
+) -> VectorOrderSearch:
+    """The search of one ARX model of all outputs: equations output by output, then the free runs of whole models."""
+    if len(chosen.outputs) == 1:
+        raise ConfigError(
+            "VectorARX is a model of several outputs",
+            where="structures",
+            expected="a mapping as u -> y1+y2",
+            got=str(chosen),
+            remedy="name all outputs, or leave VectorARX out: of one output it is ARX",
+        )
+    losses, estimation = dict[str, OrderLosses](), traces.estimation
+    for one in chosen.each:
+        others = [name for name in chosen.outputs if name != one.output]
+        wider = Mapping(inputs=(*one.inputs, *others), output=one.output)
+        losses[one.output] = _searched(estimation, wider, asked, start, workers=workers, read=len(others))[1]
+    found = run_vector_structures(
+        structures_of(losses, len(chosen.inputs)), estimation, chosen, selection or estimation, start=start
+    )
+    search = VectorOrderSearch(
+        losses=losses, finalists=found, chosen_by=BY_BIC, mapping=chosen, traces=traces, start=start
+    )
+    if selection:
+        return replace(search, finalists=smallest_first(found), chosen_by=BY_SELECTION)
+    return replace(search, finalists=tuple(sorted(found, key=lambda one: search.score(one, Criterion.BIC))))
 
 
 def _of_output(
@@ -106,11 +148,11 @@ def _of_output(
 ) -> OrderSearch:
     """The search of one output."""
     estimation = traces.estimation
-    grid, losses = _searched(estimation, chosen, asked, start, workers)
+    grid, losses = _searched(estimation, chosen, asked, start, workers=workers)
     found = run_finalists(
         losses, estimation, chosen, selection or estimation, count=FINALISTS, start=start, workers=workers
     ).ranked
-    beside, others, states = [kind for kind in kinds if kind != ARX_KIND], None, None
+    beside, others, states = [kind for kind in kinds if kind not in {ARX_KIND, VECTOR_KIND}], None, None
     if beside:
         others = run_structures(
             beside, estimation, chosen, selection or estimation, dead_times=losses.best().nk, start=start, most=most
@@ -121,7 +163,7 @@ def _of_output(
         found, said = smallest_first(found), BY_SELECTION
     else:
         found = tuple(sorted(found, key=lambda one: score(one, losses, Criterion.BIC)))
-        said = "sorted by BIC, for want of selection traces"
+        said = BY_BIC
     return OrderSearch(
         losses=losses, finalists=found, chosen_by=said, grid=grid, mapping=chosen, traces=traces, start=start,
         others=others, states=states,
@@ -129,9 +171,18 @@ def _of_output(
 
 
 def _searched(
-    estimation: tuple[Trace, ...], mapping: Mapping, asked: Dict[str, int | None], start: Start, workers: int
+    estimation: tuple[Trace, ...],
+    mapping: Mapping,
+    asked: Dict[str, int | None],
+    start: Start,
+    *,
+    workers: int,
+    read: int = 0,
 ) -> tuple[OrderGrid, OrderLosses]:
-    """The losses over the orders that were asked for, and over longer dead times where one plainly explains more."""
+    """The losses over the orders that were asked for, and over longer dead times where one plainly explains more.
+
+    The last inputs of the mapping may be other outputs that are read; of those there is no dead time.
+    """
     for name, largest in asked.items():
         if largest is not None and not whole(largest):
             raise ConfigError(
@@ -142,12 +193,13 @@ def _searched(
                 remedy=f"write for example {name}=4",
             )
     max_na, max_nb, max_nk = asked.values()
-    feedback = feedback_of(estimation, mapping) if mapping.inputs and max_nk != 0 else ""
+    own = replace(mapping, inputs=mapping.inputs[: len(mapping.inputs) - read])
+    feedback = feedback_of(estimation, own) if own.inputs and max_nk != 0 else ""
     first = int(not isinstance(feedback, str) and feedback.at_once)
     samples = sum(len(trace) for trace in estimation), max(len(trace) for trace in estimation)
-    grid = _grid(samples, len(mapping.inputs), (max_na, max_nb, max_nk), first)
+    grid = _grid(samples, len(mapping.inputs), (max_na, max_nb, max_nk), first, read)
     losses = order_search.search_orders(estimation, mapping, grid, start=start, workers=workers)
-    late = _as_late(grid, estimation, mapping) if max_nk is None else grid
+    late = _as_late(grid, estimation, own) if max_nk is None else grid
     if late != grid:
         later = order_search.search_orders(estimation, mapping, late, start=start, workers=workers)
         if _least(later) < _least(losses):
@@ -157,17 +209,18 @@ def _searched(
 
 
 def _grid(
-    samples: tuple[int, int], inputs: int, asked: tuple[int | None, int | None, int | None], first: int
+    samples: tuple[int, int], inputs: int, asked: tuple[int | None, int | None, int | None], first: int, read: int = 0
 ) -> OrderGrid:
     """The orders that were asked for; those that were not, up to ten, as far as records and patience allow.
 
     Samples count all together, and those of the longest record: half of it is fitted with its past beside it.
     """
-    grid = OrderGrid(max_na=1, max_nb=1, max_nk=first, min_nk=first)
+    grid = OrderGrid(max_na=1, max_nb=1, max_nk=first, min_nk=first, read=read)
     for largest in range(1, 11):
         na, nb, nk = (largest if one is None else one for one in asked)
-        tried = OrderGrid(max_na=na, max_nb=nb, max_nk=nk, min_na=min(1, na), min_nb=min(1, nb), min_nk=first)
-        parameters = na + inputs * (nb + nk) + 1
+        low = {"min_na": min(1, na), "min_nb": min(1, nb), "min_nk": first}
+        tried = OrderGrid(max_na=na, max_nb=nb, max_nk=nk, read=read, **low)
+        parameters = na * (1 + read) + (inputs - read) * (nb + nk) + 1
         short = 4 * parameters > samples[0] or max(na, nb + nk) > samples[1] // 2
         if largest > 1 and (short or tried.size(inputs) > LARGEST):
             break
@@ -203,8 +256,10 @@ def _as_late(grid: OrderGrid, traces: Sequence[Trace], mapping: Mapping) -> Orde
         latest = max(latest, peak + 3) if late else latest
         lows.append(max(grid.min_nk, peak - grid.max_nk) if late else grid.min_nk)
     wider, n = replace(grid, min_nk=min(lows, default=grid.min_nk), max_nk=latest), len(mapping.inputs)
-    parameters = grid.max_na + n * (grid.max_nb + latest) + 1
-    fits = replace(wider, min_nk=grid.min_nk).size(n) <= LARGEST and 4 * parameters <= sum(len(t) for t in traces)
+    parameters = grid.max_na * (1 + grid.read) + n * (grid.max_nb + latest) + 1
+    fits = replace(wider, min_nk=grid.min_nk).size(n + grid.read) <= LARGEST and 4 * parameters <= sum(
+        len(t) for t in traces
+    )
     return wider if fits else grid
 
 

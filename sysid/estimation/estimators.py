@@ -87,6 +87,7 @@ ESTIMATORS: dict[str, Estimator] = {
             fit=fit_vector_arx,
             posterior=vector_arx_posterior,
             no_posterior=GROWING,
+            each=True,
         ),
         *(
             _trained(

@@ -77,21 +77,23 @@ def residual_square(W, target, rank):
 
 
 @njit(cache=True, nogil=True)
-def nested_losses(base, rank, input_columns, least, output_columns, target, tolerance, losses):
+def nested_losses(base, rank, input_columns, least, most, output_columns, target, tolerance, losses):
     """Residual sums of squares for all orders with given dead times.
 
     Args:
         base: Transposed triangle, shape ``(n_columns, n_rows)``, with the first ``rank`` rows used (the intercept).
         rank: Rows already used.
-        input_columns: For each input its columns from the dead time on, shape ``(n_inputs, most)``.
-        least: Smallest number of columns per input, shape ``(n_inputs,)``, at least 0; ``most`` is the largest.
+        input_columns: For each input its columns from the dead time on, shape ``(n_inputs, longest)``; of each input
+            as many are read as it has at most.
+        least: Smallest number of columns per input, shape ``(n_inputs,)``, at least 0.
+        most: Largest number of columns per input, likewise.
         output_columns: Columns of the past outputs, shape ``(n_outputs,)``.
         target: Column of the target.
         tolerance: As in :func:`reflect`, per column, shape ``(n_columns,)``.
         losses: Shape ``(n_leaves, n_outputs + 1)``; leaves in the order of an odometer over the numbers of columns,
             the last input fastest. Written.
     """
-    m, most = input_columns.shape
+    m = len(input_columns)
     n_out = len(output_columns)
     levels = np.empty((m, base.shape[0], base.shape[1]))
     leaf_table = np.empty_like(base)
@@ -107,18 +109,18 @@ def nested_losses(base, rank, input_columns, least, output_columns, target, tole
             ranks[level] = source_rank
             counts[level] = -1
         counts[level] += 1
-        if counts[level] > most:
+        if counts[level] > most[level]:
             level -= 1
             fresh = False
             continue
         if counts[level] > 0:
             pivot = input_columns[level, counts[level] - 1]
             n = 0
-            for c in range(counts[level], most):
+            for c in range(counts[level], most[level]):
                 following[n] = input_columns[level, c]
                 n += 1
             for i in range(level + 1, m):
-                for c in range(most):
+                for c in range(most[i]):
                     following[n] = input_columns[i, c]
                     n += 1
             for c in range(n_out):

@@ -26,7 +26,7 @@ class Finalist:
 
     Args:
         fit: The fitted model.
-        cases: Figures of the free run by name of the case.
+        cases: Figures of the free run by name of the case, and of the output where there are several.
         one_step_mse: Mean squared one-step error on the estimation traces.
         errors: Squared errors of the free run over the target's variance, by part of each case.
     """
@@ -146,18 +146,21 @@ def finalist_of(fit: FitResult, cases: Sequence[Trace], start: Start, one_step_m
         The candidate.
     """
     model, found, errors = fit.model, dict[str, Figures](), list[float]()
+    outputs, units = model.mapping.outputs, model.ends.output_units
     for case in cases:
-        inputs, target = case.columns(model.mapping.inputs), case.columns([model.mapping.output])[:, 0]
+        inputs, target = case.columns(model.mapping.inputs), model.measured(case)
         begun = beginning(model, inputs, target, start, case.usable_of(model.mapping.channels))
         scored = slice(begun.first, None)
-        output: NDArray[np.float64] = model.simulate(inputs[scored], begun.history)
-        counted = case.usable_of(model.mapping.channels)[scored]
-        target = target[scored]
-        found[case.name] = figures(target, output, model.output_unit, counted)
-        spread = float(np.std(target[counted])) if counted.any() else 0.0
-        with np.errstate(over="ignore", invalid="ignore"):  # of a run that has left
-            away = (target - output)[counted] / spread if spread > 0.0 else np.empty(0)
-        errors += parts_of(away)
+        run: NDArray[np.float64] = model.simulate(inputs[scored], begun.history)
+        counts = case.counted(model.mapping.inputs, outputs)[scored]
+        both = zip(target[scored].reshape(len(run), -1).T, run.reshape(len(run), -1).T, counts.T, strict=True)
+        for output, unit, (measured, simulated, counted) in zip(outputs, units, both, strict=True):
+            name = case.name if len(outputs) == 1 else f"{case.name}, {output}"
+            found[name] = figures(measured, simulated, unit, counted)
+            spread = float(np.std(measured[counted])) if counted.any() else 0.0
+            with np.errstate(over="ignore", invalid="ignore"):  # of a run that has left
+                away = (measured - simulated)[counted] / spread if spread > 0.0 else np.empty(0)
+            errors += parts_of(away)
     return Finalist(fit=fit, cases=found, one_step_mse=one_step_mse, errors=tuple(errors))
 
 

@@ -18,7 +18,7 @@ from sysid.models.contract import gaps
 from sysid.traces import Trace
 from sysid.validation.order_finalists import Finalist, finalist_of
 
-ARX_KIND = "ARX"
+ARX_KIND, VECTOR_KIND = "ARX", "VectorARX"
 Dead = tuple[int, ...]
 
 KINDS: dict[str, Callable[[int, Dead], AbstractStructure]] = {
@@ -62,7 +62,7 @@ def check_kinds(kinds: str | Sequence[str]) -> tuple[str, ...]:
     Raises:
         ConfigError: If one is not known.
     """
-    known = {name.lower(): name for name in (ARX_KIND, *KINDS)}
+    known = {name.lower(): name for name in (ARX_KIND, VECTOR_KIND, *KINDS)}
     kinds = [one.strip() for one in kinds.split(",")] if isinstance(kinds, str) else kinds
     for kind in kinds:
         if kind.lower() not in known:
@@ -89,7 +89,7 @@ def run_structures(
     """Fit each kind with orders from 1 on, and run each model freely over every case.
 
     Args:
-        kinds: Of :data:`KINDS`; ARX is searched elsewhere and left out here.
+        kinds: Of :data:`KINDS`; ARX and VectorARX are searched elsewhere and left out here.
         traces: Estimation traces.
         mapping: Which channels go in, which comes out.
         cases: What chooses.

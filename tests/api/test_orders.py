@@ -54,7 +54,7 @@ def test_the_selection_traces_choose_where_there_are_some(found: OrderSearch) ->
 
 
 def test_an_unstable_pole_stands_apart_from_the_free_run(found: OrderSearch, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sysid.api.order_search.pole", lambda _: "1.0005, unstable")
+    monkeypatch.setattr("sysid.api.finalist_table.pole", lambda _: "1.0005, unstable")
     assert "  1.0005, unstable" in str(found)
 
 
@@ -227,3 +227,51 @@ def test_linear_algebra_has_one_thread_while_orders_are_searched(monkeypatch: py
     with threadpool_limits(limits=2, user_api="blas"):
         sysid.search_orders(sysid.data((u, y), sample_time=1.0, split=0.6), "u -> y", max_na=2, max_nb=2, max_nk=2)
     assert set(seen) == {1}
+
+
+def coupled(n: int = 1000, seed: int = 6) -> tuple[np.ndarray, np.ndarray]:
+    """The second output drives the first; each has an input of its own, that of the second later."""
+    rng = np.random.default_rng(seed)
+    u, y = np.repeat(rng.uniform(-1, 1, (n // 5, 2)), 5, axis=0), np.zeros((n, 2))
+    for t in range(2, n):
+        drive = np.array([u[t - 1, 0], u[t - 2, 1]])
+        y[t] = [[0.8, 0.3], [0.0, 0.9]] @ y[t - 1] + 0.1 * drive + 0.01 * rng.normal(size=2)
+    return u, y
+
+
+def test_one_model_of_all_outputs_is_searched_equation_by_equation_and_run_as_a_whole() -> None:
+    traces = sysid.data(coupled(), sample_time=1.0, split=(0.6, 0.2, 0.2))
+    asked = {"max_na": 2, "max_nb": 1, "max_nk": 2}
+    found = sysid.search_orders(traces, "u1+u2 -> y1+y2", **asked, structures="VectorARX")
+    together = found.together
+    best = together.best("BIC")
+    assert best.na == ((1, 1), (0, 1))
+    assert best.nk[0][0] == 1 and best.nk[1][1] == 2
+    assert str(together).startswith(f"{len(together):,} equations of u1+u2 -> y1+y2; sorted by the free run")
+    assert together.fit.model.structure == together.best()
+    assert together.finalists[0].mean_fit > max(found[name].finalists[0].mean_fit for name in ("y1",))
+    assert together.plot().axes and set(found.to_frame()["output"]) == {"y1", "y2", "y1+y2"}
+    # Its losses are those of the fits.
+    for one in together.finalists[:5]:
+        orders, known = one.fit.model.structure, one.fit.uncertainty
+        for i, losses in enumerate(together.losses.values()):
+            row = [*orders.nb[i], *(n for j, n in enumerate(orders.na[i]) if j != i)]
+            at = (losses.na == orders.na[i][i]) & (losses.nb == row).all(axis=1)
+            at &= (losses.nk[:, :2] == orders.nk[i]).all(axis=1)
+            left = losses.n_samples - int(losses.n_parameters[at][0])
+            # The fit's rows begin at its own lags, those of the search at the longest: a few rows of 300.
+            assert losses.mse[at][0] * losses.n_samples / left == pytest.approx(known.noise_covariance[i, i], rel=0.03)
+
+
+def test_without_selection_traces_a_model_of_all_outputs_is_sorted_by_the_sum_of_its_equations() -> None:
+    u, y = coupled(300)
+    search = sysid.search_orders(
+        sysid.data((u, y), sample_time=1.0), "u1+u2 -> y1+y2", max_na=1, max_nb=1, max_nk=2, structures=["VectorARX"]
+    )
+    assert search.together.to_frame()["BIC"].is_monotonic_increasing
+    assert search.together.best().label == search.together.best("bic").label
+
+
+def test_a_model_of_several_outputs_is_not_searched_for_one() -> None:
+    with pytest.raises(ConfigError, match="VectorARX is a model of several outputs"):
+        sysid.search_orders(sysid.data(record(100), sample_time=1.0), "u -> y", structures="VectorARX")

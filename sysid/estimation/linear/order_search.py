@@ -81,6 +81,8 @@ class OrderGrid:
         min_nb: Smallest number of past values of each input.
         min_nk: Smallest dead time.
         intercept: Fit a constant beside the lags.
+        read: So many of the last inputs are outputs beside the one that is fitted (:class:`~sysid.models.VectorARX`):
+            of each, up to ``max_na`` past values are tried, from none on, and no dead time.
 
     Raises:
         ConfigError: If a range is empty or negative.
@@ -97,6 +99,7 @@ class OrderGrid:
     min_nb: int = 1
     min_nk: int = 0
     intercept: bool = True
+    read: int = 0
 
     def __post_init__(self) -> None:
         for name in ("na", "nb", "nk"):
@@ -118,19 +121,67 @@ class OrderGrid:
         Returns:
             The number.
         """
-        nb, nk = self.max_nb - self.min_nb + 1, self.max_nk - self.min_nk + 1
-        return int((self.max_na - self.min_na + 1) * (nb * nk) ** n_inputs)
+        nk = self.max_nk - self.min_nk + 1
+        return int((self.max_na - self.min_na + 1) * len(self.counts(n_inputs)) * nk ** (n_inputs - self.read))
 
-    def dead_times(self, n_inputs: int) -> list[tuple[int, ...]]:
-        """All combinations of dead times, the last input fastest.
+    def least(self, n_inputs: int) -> list[int]:
+        """Smallest number of past values of each input.
 
         Args:
-            n_inputs: Input channels.
+            n_inputs: Input channels, outputs that are read among them.
+
+        Returns:
+            One number an input.
+        """
+        return [self.min_nb] * (n_inputs - self.read) + [0] * self.read
+
+    def most(self, n_inputs: int) -> list[int]:
+        """Largest number of past values of each input.
+
+        Args:
+            n_inputs: Likewise.
+
+        Returns:
+            One number an input.
+        """
+        return [self.max_nb] * (n_inputs - self.read) + [self.max_na] * self.read
+
+    def counts(self, n_inputs: int) -> list[tuple[int, ...]]:
+        """All combinations of numbers of past values, the last input fastest.
+
+        Args:
+            n_inputs: Likewise.
 
         Returns:
             One tuple per combination.
         """
-        return list(itertools.product(range(self.min_nk, self.max_nk + 1), repeat=n_inputs))
+        ends = zip(self.least(n_inputs), self.most(n_inputs), strict=True)
+        return list(itertools.product(*(range(low, high + 1) for low, high in ends)))
+
+    def lags(self, n_inputs: int) -> Lags:
+        """All that any candidate looks at.
+
+        Args:
+            n_inputs: Likewise.
+
+        Returns:
+            The lags.
+        """
+        own = tuple(range(self.min_nk, self.max_nk + self.max_nb))
+        past = tuple(range(1, self.max_na + 1))
+        return Lags(inputs=(*(own,) * (n_inputs - self.read), *(past,) * self.read), output=past)
+
+    def dead_times(self, n_inputs: int) -> list[tuple[int, ...]]:
+        """All combinations of dead times, the last input fastest; that of an output that is read is 1.
+
+        Args:
+            n_inputs: Input channels, outputs that are read among them.
+
+        Returns:
+            One tuple per combination.
+        """
+        own = range(self.min_nk, self.max_nk + 1)
+        return list(itertools.product(*[own] * (n_inputs - self.read), *[(1,)] * self.read))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -286,9 +337,7 @@ def search_orders(
     m = len(mapping.inputs)
     rest = first_output(traces, mapping) if rest_output is None else rest_output
     given = experiments_of(traces, mapping, start or Start(), rest)
-    reach = grid.max_nk + grid.max_nb - grid.min_nk
-    input_lags = tuple(range(grid.min_nk, grid.max_nk + grid.max_nb))
-    lags = Lags(inputs=(input_lags,) * m, output=tuple(range(1, grid.max_na + 1)))
+    lags = grid.lags(m)
     # The rows are the same for every candidate: those on which the largest looks at no masked sample.
     experiments = [experiment.one_step(lags) for experiment in given]
     rows = sum(experiment.n_counted for experiment in experiments)
@@ -309,18 +358,23 @@ def search_orders(
     target, everything = table.shape[1] - 1, np.arange(table.shape[1])
     if grid.intercept:
         rank = kernel.reflect(factor, 0, everything[1:], target - 1, target, 0, tolerance[0])
-    outputs = everything[1 + m * reach : target]
+    starts = 1 + np.cumsum(
+        [0, *map(len, lags.inputs)]
+    )  # where the columns of each input begin, and those of the output
+    outputs = everything[starts[-1] : target]
     dead_times = grid.dead_times(m)
     per_block = grid.size(m) // len(dead_times)
-    n_leaves = (grid.max_nb - grid.min_nb + 1) ** m
+    n_leaves = len(grid.counts(m))
     # A time series is to the kernel a system of one input that has no columns.
-    inputs, least = ((m, grid.max_nb), np.full(m, grid.min_nb)) if m else ((1, 0), np.zeros(1, dtype=np.int64))
+    ends = (grid.least(m), grid.most(m)) if m else ([0], [0])
+    least, most = (np.array(one, dtype=np.int64) for one in ends)
 
     def block(dead: tuple[int, ...]) -> NDArray[np.float64]:
-        first = [1 + i * reach + nk - grid.min_nk for i, nk in enumerate(dead)]
-        columns = np.array([np.arange(at, at + grid.max_nb) for at in first], dtype=np.int64).reshape(inputs)
+        columns = np.zeros((len(most), int(most.max())), dtype=np.int64)
+        for i, nk in enumerate(dead):
+            columns[i, : most[i]] = starts[i] + nk - lags.inputs[i][0] + np.arange(most[i]) if most[i] else 0
         losses = np.empty((n_leaves, grid.max_na + 1))
-        kernel.nested_losses(factor, rank, columns, least, outputs, target, tolerance, losses)
+        kernel.nested_losses(factor, rank, columns, least, most, outputs, target, tolerance, losses)
         return losses[:, grid.min_na :]
 
     blocks = []
@@ -336,8 +390,7 @@ def _collected(
     mse: NDArray[np.float64], grid: OrderGrid, dead_times: list[tuple[int, ...]], n_samples: int
 ) -> OrderLosses:
     """Candidates side by side: dead times, then numbers of past inputs, then of past outputs, the last fastest."""
-    m = len(dead_times[0])
-    nb = np.array(list(itertools.product(range(grid.min_nb, grid.max_nb + 1), repeat=m)), dtype=np.int16)
+    nb = np.array(grid.counts(len(dead_times[0])), dtype=np.int16)
     na = np.arange(grid.min_na, grid.max_na + 1, dtype=np.int16)
     n_k, n_b, n_a = len(dead_times), len(nb), len(na)
     return OrderLosses(

@@ -194,7 +194,7 @@ class Experiment:
         Returns:
             The record with the weights of its rows.
         """
-        known = self._known_rows(lags.depth, {*lags.output, *(lag for of in lags.inputs for lag in of)})
+        known = self.known_rows(lags.depth, {*lags.output, *(lag for of in lags.inputs for lag in of)})
         if known.all():
             return self
         each = None if self.each is None else self.each * known[:, np.newaxis]
@@ -204,8 +204,16 @@ class Experiment:
         weights = np.ones(len(known)) if self.weights is None else self.weights
         return np.where(known, weights, 0.0)
 
-    def _known_rows(self, depth: int, lags: set[int]) -> NDArray[np.bool_]:
-        """Rows whose samples at some lags are measured, or declared to have stood there before the record."""
+    def known_rows(self, depth: int, lags: set[int]) -> NDArray[np.bool_]:
+        """Rows whose samples at some lags are measured, or declared to have stood there before the record.
+
+        Args:
+            depth: The longest lag of any row.
+            lags: In samples.
+
+        Returns:
+            Shape ``(n_samples,)``.
+        """
         n = len(self.output)
         usable = np.ones(n, dtype=np.bool_) if self.usable is None else self.usable
         past = np.ones(depth, dtype=np.bool_) if self.past is None else np.concatenate([np.zeros(depth), self.past])

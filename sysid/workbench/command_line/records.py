@@ -53,7 +53,7 @@ def orders(
     max_nb: Annotated[int | None, typer.Option(min=0, help="Largest number of past values of each input.")] = None,
     max_nk: Annotated[int | None, typer.Option(min=0, help="Largest dead time in samples.")] = None,
     structures: Annotated[
-        str, typer.Option(help="Structures beside ARX: some of SS,TF,OE,ARMAX,BJ, with commas, or all.")
+        str, typer.Option(help="Structures beside ARX: some of SS,TF,OE,ARMAX,BJ,VectorARX, with commas, or all.")
     ] = "",
     most: Annotated[int, typer.Option(min=1, max=20, help="Largest order of those.")] = 4,
 ) -> None:

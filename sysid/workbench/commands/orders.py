@@ -13,6 +13,7 @@ from sysid.api.fitting import load
 from sysid.api.looking import mapping_of
 from sysid.api.order_search import OrderSearch, SystemOrderSearch
 from sysid.api.orders import search_orders
+from sysid.api.vector_order_search import VectorOrderSearch
 from sysid.estimation.linear.order_search import Criterion
 from sysid.models import AbstractStructure
 from sysid.names import slug
@@ -21,7 +22,7 @@ from sysid.reporting.figures.svg import svg
 from sysid.reporting.numbers import number, pole
 from sysid.units import squared
 from sysid.validation.metrics import percent
-from sysid.validation.structure_search import KINDS, MOST
+from sysid.validation.structure_search import KINDS, MOST, VECTOR_KIND
 from sysid.workbench.commands.pictures import kept_picture
 from sysid.workbench.runner.console import console
 
@@ -35,17 +36,21 @@ def orders_command(
     """Show which orders a data set asks for: a table on the screen, a picture beside."""
     traces = load(source)
     chosen = mapping_of(traces, mapping, option="--mapping ")
-    kinds = (
-        list(KINDS) if structures.strip().lower() == "all" else [k.strip() for k in structures.split(",") if k.strip()]
-    )
+    kinds = [k.strip() for k in structures.split(",") if k.strip()]
+    if structures.strip().lower() == "all":
+        kinds = [*KINDS, *([VECTOR_KIND] if len(chosen.outputs) > 1 else [])]
     asked: dict[str, Any] = {**ranges, "structures": kinds, "most": most}
     found = search_orders(traces, chosen, **asked)
-    several = found.outputs.items() if isinstance(found, SystemOrderSearch) else [("", found)]
+    several: list[tuple[str, OrderSearch | VectorOrderSearch]] = (
+        [*found.outputs.items()] if isinstance(found, SystemOrderSearch) else [("", found)]
+    )
+    if isinstance(found, SystemOrderSearch) and found.together is not None:
+        several.append(("together", found.together))
     for name, one in several:
         _show(one, f"{slug(traces.name)}.{slug(name)}" if name else slug(traces.name), most)
 
 
-def _show(found: OrderSearch, stem: str, most: int) -> None:
+def _show(found: OrderSearch | VectorOrderSearch, stem: str, most: int) -> None:
     """The search of one output, its picture beside."""
     console().print(_table(found))
     for note in found.notes:
@@ -66,9 +71,10 @@ def _written(structure: AbstractStructure) -> str:
     return yaml.safe_dump(own, default_flow_style=True, sort_keys=False, allow_unicode=True, width=1_000).strip()
 
 
-def _table(found: OrderSearch) -> Table:
+def _table(found: OrderSearch | VectorOrderSearch) -> Table:
     others = "" if found.others is None else " and other structures"
-    title = f"{len(found.losses):,} ARX structures{others} of {found.mapping}, {found.chosen_by}"
+    tried = "equations" if isinstance(found, VectorOrderSearch) else "ARX structures"
+    title = f"{len(found):,} {tried}{others} of {found.mapping}, {found.chosen_by}"
     table = Table(title=title, title_justify="left")
     table.add_column("structure")
     for head in (

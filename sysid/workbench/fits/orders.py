@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, cast
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import BaseModel, Field
 
@@ -17,6 +17,7 @@ from sysid.workbench.runner.store import digest
 
 if TYPE_CHECKING:
     from sysid.api.order_search import OrderSearch
+    from sysid.api.vector_order_search import VectorOrderSearch
     from sysid.workbench.fits.config import PipelineConfig
     from sysid.workbench.fits.data import Data
 
@@ -35,7 +36,8 @@ class OrdersConfig(BaseModel):
         max_nk: Largest dead time, likewise.
         criterion: What names the best: the free run over the traces that choose, or one of ``AIC``, ``AICc``, ``BIC``
             and ``loss``, which choose among the ARX models.
-        structures: Kinds beside ARX that are fitted with orders from 1 on: ``SS``, ``TF``, ``OE``, ``ARMAX``, ``BJ``.
+        structures: Kinds beside ARX that are fitted with orders from 1 on: ``SS``, ``TF``, ``OE``, ``ARMAX``, ``BJ``;
+            and ``VectorARX``, one model of several outputs.
         most: Largest order of those.
     """
 
@@ -45,7 +47,7 @@ class OrdersConfig(BaseModel):
     max_nb: int | None = Field(default=None, ge=0)
     max_nk: int | None = Field(default=None, ge=0)
     criterion: Literal["free run", "AIC", "AICc", "BIC", "loss"] = FREE_RUN
-    structures: tuple[Literal["ARX", "SS", "TF", "OE", "ARMAX", "BJ"], ...] = ()
+    structures: tuple[Literal["ARX", "SS", "TF", "OE", "ARMAX", "BJ", "VectorARX"], ...] = ()
     most: int = Field(default=MOST, ge=1, le=20)
 
 
@@ -78,28 +80,24 @@ def search(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
         data: The traces.
 
     Returns:
-        For each output what results.json keeps of it, as JSON values.
+        For each output, and for one model of all where it was asked for, what results.json keeps of it, as JSON values.
     """
+    from sysid.api.order_search import SystemOrderSearch
     from sysid.api.orders import search_orders
 
     asked = config.orders or OrdersConfig()
     ranges = {name: getattr(asked, name) for name in ("max_na", "max_nb", "max_nk", "structures", "most")}
     criterion = None if asked.criterion == FREE_RUN else asked.criterion
-    return [
-        _record(
-            cast(
-                "OrderSearch",  # of one output
-                search_orders(data.traces, one, **ranges, start=config.start, selection=data.selection, workers=1),
-            ),
-            criterion,
-        )
-        for one in config.mapping.each
-    ]
+    found = search_orders(
+        data.traces, config.mapping, **ranges, start=config.start, selection=data.selection, workers=1
+    )
+    if isinstance(found, SystemOrderSearch):
+        each = [*found.outputs.values(), *([] if found.together is None else [found.together])]
+        return [_record(one, criterion) for one in each]
+    return [_record(found, criterion)]
 
 
-def _record(found: OrderSearch, criterion: str | None) -> dict[str, Any]:
-    from sysid.reporting.figures.order_figure import OrderCurve
-
+def _record(found: OrderSearch | VectorOrderSearch, criterion: str | None) -> dict[str, Any]:
     best = found.fit.model.structure if criterion is None else found.best(criterion)
     return {
         "mapping": str(found.mapping),
@@ -109,7 +107,7 @@ def _record(found: OrderSearch, criterion: str | None) -> dict[str, Any]:
         "chosen_by": found.chosen_by if criterion is None else f"least {criterion}",
         "notes": list(found.notes),
         "correlations": [] if found.states is None else found.states.correlations[: found.states.most + 3].tolist(),
-        "curve": dataclasses.asdict(OrderCurve.of(found.losses)),
+        "curve": dataclasses.asdict(found.curve),
         "rows": [
             {
                 "label": one.fit.model.structure.label,

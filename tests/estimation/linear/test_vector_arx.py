@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import sysid
+from sysid.errors import TraceError
 from sysid.estimation import fit_arx
 from sysid.estimation.linear.modes import modes
 from sysid.estimation.linear.vector_arx import fit_vector_arx
@@ -60,16 +61,23 @@ def test_it_is_least_squares_of_each_output_and_the_covariance_of_both(level: fl
     known = fit.uncertainty
     assert known is not None and known.noise_covariance is not None and fit.status is Status.EXACT
     found, maps, errors = [], [], []
-    for output in range(2):
-        X, target = rows(traces, COUPLED, output, 3)
+    own = np.concatenate([np.arange(2, len(one)) for one in traces]) > 2  # rows of the second output that both have
+    for output, depth in enumerate((3, 2)):
+        X, target = rows(traces, COUPLED, output, depth)
         middle = X - np.append(X[:, :-1].mean(axis=0), 0.0)  # of large levels: the same, with more digits
         maps.append(np.linalg.pinv(middle)[:-1])
         found.append(maps[-1] @ target)
         errors.append(target - target.mean() - (X[:, :-1] - X[:, :-1].mean(axis=0)) @ found[-1])
     assert_allclose(model_of(fit).coefficients, np.concatenate(found), rtol=1e-9 if level else 1e-12, atol=1e-9)
-    counts = len(errors[0]) - np.array([6, 6])
-    sigma = np.array([[a @ b for b in errors] for a in errors]) / np.sqrt(np.outer(counts, counts))
+    assert [len(one) for one in errors] == [494, 496]
+    both = errors[0], errors[1][own]
+    size = np.sqrt([one @ one / (len(one) - 6) for one in errors])
+    across = size.prod() * (both[0] @ both[1]) / np.sqrt((both[0] @ both[0]) * (both[1] @ both[1]))
+    sigma = np.array([[size[0] ** 2, across], [across, size[1] ** 2]])
     assert_allclose(known.noise_covariance, sigma, rtol=1e-8)
+    wide = np.zeros((len(maps[0]), len(errors[1])))
+    wide[:, own] = maps[0]
+    maps[0] = wide
     joint = np.block([[sigma[i, j] * P @ Q.T for j, Q in enumerate(maps)] for i, P in enumerate(maps)])
     assert_allclose(known.covariance[:10, :10], joint, rtol=1e-6, atol=1e-8 * np.abs(joint).max())
     assert known.names[2] == "b(y0, u1, 3)" and known.names[8] == "a(y1, y1, 1)"
@@ -113,35 +121,76 @@ def test_of_a_coupled_plant_the_free_run_is_right_where_that_of_each_output_alon
     assert max(score[1].min(), score[2].min()) < 0.4
 
 
-def test_masked_samples_and_what_stands_before_a_record_are_nobodys_regressor() -> None:
+def masked(trace: Trace, holes: list[tuple[slice, int]]) -> tuple[Any, Any]:
+    """The record with samples of some channels missing, and which are there."""
+    usable = np.ones(trace.values.shape, dtype=bool)
+    for where, channel in holes:
+        usable[where, channel] = False
+    values = np.where(usable, trace.values, np.nan)
+    columns = {name: values[:, at] for at, name in enumerate(MAPPING.channels)}
+    ends = {"inputs": list(MAPPING.inputs), "outputs": list(MAPPING.outputs)}
+    return sysid.data(columns, **ends, sample_time=0.1, repairs={"nan": "mask"}), usable
+
+
+def own_rows(usable: Any, output: int) -> list[int]:
+    """Samples at which an output, and all that it reads, is measured; those before the record are not."""
+    read = [(c, lag) for i, c, lag in COUPLED.terms if i == output] + [(len(MAPPING.inputs) + output, 0)]
+    depth = max(lag for _, lag in read)
+    return [t for t in range(depth, len(usable)) if all(usable[t - lag, c] for c, lag in read)]
+
+
+HOLES = [(slice(100, 103), 2), (slice(200, 260), 3), (slice(300, 301), 1), (slice(310, 320), 0)]
+
+
+def test_an_output_loses_the_rows_in_which_it_or_what_it_reads_is_masked_and_no_others() -> None:
     whole = plant(7, 400)
-    usable = np.ones((400, 4), dtype=bool)
-    usable[100:103, 2] = usable[250, 1] = False
-    values = np.where(usable, whole.values, np.nan)
-    broken = sysid.data(
-        {name: values[:, at] for at, name in enumerate(MAPPING.channels)}, inputs=list(MAPPING.inputs),
-        outputs=list(MAPPING.outputs), sample_time=0.1, repairs={"nan": "mask"},
-    )  # fmt: skip
+    broken, usable = masked(whole, HOLES)
     fit = sysid.fit(broken, "u0+u1 -> y0+y1", COUPLED, start=FREE)
-    kept = [t for t in range(3, 400) if usable[t - 3 : t + 1].all()]
-    for output in range(2):
-        X, target = rows([whole], COUPLED, output, 3)
-        at = np.array(kept) - 3
+    counts = []
+    for output, depth in enumerate((3, 2)):
+        X, target = rows([whole], COUPLED, output, depth)
+        at = np.array(own_rows(usable, output)) - depth
+        counts.append(len(at))
         true = np.linalg.lstsq(X[at], target[at], rcond=None)[0]
         own = [value for (i, *_), value in zip(COUPLED.terms, fit.model.coefficients, strict=True) if i == output]
         assert_allclose(own, true[:-1], rtol=1e-9)
+    assert counts[0] != counts[1]
+
+
+def test_intervals_hold_where_outputs_have_rows_of_their_own() -> None:
+    inside, regions, noise = [], [], []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        holes = [(slice(at, at + 4), int(rng.integers(2, 4))) for at in rng.integers(0, 236, size=12)]
+        traces, _ = masked(plant(3000 + seed, 240), [*holes, (slice(0, 60), 2)])
+        known = fit_vector_arx(traces.estimation, MAPPING, COUPLED, start=FREE).uncertainty
+        assert known is not None
+        low, high = known.interval(0.95)[:10].T
+        inside.append((low <= TRUTH) & (high >= TRUTH))
+        away = known.values[:10] - TRUTH
+        regions.append(away @ np.linalg.solve(known.covariance[:10, :10], away) <= 18.307)  # chi2, 10, 95 %
+        noise.append(known.noise_covariance)
+    assert 0.93 < np.mean(inside) < 0.97  # of 2,000
+    assert 0.90 < np.mean(regions) < 0.985  # of 200
+    assert_allclose(np.mean(noise, axis=0), NOISE @ NOISE.T, rtol=0.03)
+
+
+def test_an_output_without_a_row_is_refused() -> None:
+    traces, _ = masked(plant(7, 100), [(slice(1, 100, 2), 3)])
+    with pytest.raises(TraceError, match="no sample has its past beside it"):
+        fit_vector_arx(traces.estimation, MAPPING, COUPLED, start=FREE)
 
 
 def test_a_long_record_is_taken_block_by_block_and_weights_count() -> None:
     trace = plant(8, 9000)
     fit = fit_vector_arx([trace], MAPPING, COUPLED, start=FREE)
-    X, target = rows([trace], COUPLED, 1, 3)
+    X, target = rows([trace], COUPLED, 1, 2)
     assert_allclose(model_of(fit).coefficients[5:], np.linalg.lstsq(X, target, rcond=None)[0][:-1], rtol=1e-10)
 
 
 def test_95_percent_intervals_hold_95_percent() -> None:
     inside, regions = [], []
-    for seed in range(200):
+    for seed in range(400):
         fit = fit_vector_arx([plant(1000 + seed, 240)], MAPPING, COUPLED, start=FREE)
         known = fit.uncertainty
         assert known is not None
@@ -149,8 +198,8 @@ def test_95_percent_intervals_hold_95_percent() -> None:
         inside.append((low <= TRUTH) & (high >= TRUTH))
         away = known.values[:10] - TRUTH
         regions.append(away @ np.linalg.solve(known.covariance[:10, :10], away) <= 18.307)  # chi2, 10, 95 %
-    assert 0.93 < np.mean(inside) < 0.97  # of 2,000
-    assert 0.90 < np.mean(regions) < 0.985  # of 200
+    assert 0.93 < np.mean(inside) < 0.97  # of 4,000
+    assert 0.92 < np.mean(regions) < 0.975  # of 400
 
 
 def test_poles_and_frequency_responses_have_intervals_that_hold_the_truth() -> None:
