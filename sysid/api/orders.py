@@ -218,8 +218,9 @@ def _grid(
     grid = OrderGrid(max_na=1, max_nb=1, max_nk=first, min_nk=first, read=read)
     for largest in range(1, 11):
         na, nb, nk = (largest if one is None else one for one in asked)
-        low = {"min_na": min(1, na), "min_nb": min(1, nb), "min_nk": first}
-        tried = OrderGrid(max_na=na, max_nb=nb, max_nk=nk, read=read, **low)
+        tried = OrderGrid(
+            max_na=na, max_nb=nb, max_nk=nk, min_na=min(1, na), min_nb=min(1, nb), min_nk=first, read=read
+        )
         parameters = na * (1 + read) + (inputs - read) * (nb + nk) + 1
         short = 4 * parameters > samples[0] or max(na, nb + nk) > samples[1] // 2
         if largest > 1 and (short or tried.size(inputs) > LARGEST):

@@ -33,6 +33,8 @@ from sysid.api.system_fit import SystemFit
 
 Array = NDArray[np.float64]
 POINTS, POWER = 5.0, 1.1
+REST = 10
+"""Samples at rest that each record begins with, so that a run on it knows where it begins."""
 FREE = ("OE", "TF", "SS")
 """Structures without a model of the noise."""
 NOISES = ("white", "white", "armax", "drift")
@@ -69,6 +71,7 @@ def draw(seed: int) -> Draw:
     n, slow = int(10 ** rng.uniform(2.8, 3.6)), -1.0 / np.log(np.abs(np.linalg.eigvals(A)).max())
     n = max(n, int(min(15 * slow, 3000)))
     u, new_u = (_inputs(rng, kind, n, width, A) for _ in range(2))
+    u[:REST] = new_u[:REST] = 0.0
     clean, new_y = _run(A, B, C, u), _run(A, B, C, new_u)
     size = clean.std(axis=0)
     clean, new_y, C = clean / size, new_y / size, C / size[:, None]

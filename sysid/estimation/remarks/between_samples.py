@@ -6,6 +6,9 @@ lag less to say so. Whether the record asks for it is tried: models of output er
 model, with its lags, with one lag less, and with one more at the other end, which costs as many coefficients. The
 second has to leave clearly less than both others, and no more than a model with another pole: one with too few poles
 gains by these as well.
+
+The other way round, a model may have an input move that is held: :math:`n` coefficients from one lag more on, as behind
+a hold, then leave clearly less than its own run does, and as little as all lags together.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import AbstractModel, ProcessModel, TransferFunction
 from sysid.models.contract.ratio import Ratio
 from sysid.models.converting.orthonormal_basis import Domain
-from sysid.models.orders.intersample import MOVING
+from sysid.models.orders.intersample import HELD, MOVING
 
 Array = NDArray[np.float64]
 
@@ -198,6 +201,10 @@ def between_samples(model: AbstractModel, run: FreeRun, fed: Collection[int] = (
         if tried is None or not np.std((run.output - run.simulated)[window][usable, i]) > WORTH * spread:
             continue
         for place, j in enumerate(own):
+            if _moves(model, j):
+                held = _held(tried, place, spread, (run.output - run.simulated)[window][:, i])
+                told |= {} if held is None else {(i, j): _said_held(model, j, i, held)}
+                continue
             fits = _sooner(tried, place, spread, least=FED if i in fed else LESS)
             if fits is not None:
                 told[i, j] = _said(model, j, i, tried.lags[place][0], fits)
@@ -247,6 +254,48 @@ def _sooner(tried: _Tried, j: int, spread: float, *, least: float) -> tuple[floa
         return None
     fits = [100.0 * (1.0 - float(np.linalg.norm(e)) / (spread * np.sqrt(count))) for e in (own, sooner)]
     return fits[0], fits[1]
+
+
+def _held(tried: _Tried, j: int, spread: float, errors: Array) -> tuple[float, float] | None:
+    """Fits in percent of a model's own run and of one whose input is held, where that is clearly better.
+
+    Args:
+        tried: With the lags of an input that moves.
+        j: Its place among the inputs.
+        spread: Standard deviation of the output.
+        errors: Of the model's own run, shape ``(n_samples,)``.
+
+    Returns:
+        Both; ``None`` where the record does not say that it is held.
+    """
+    first, last = tried.lags[j]
+    if last - first < 1:
+        return None
+    # A run with other first states is the same model's.
+    begun = tried.linear()[tried.usable, sum(end - start + 1 for start, end in tried.lags) :]
+    own = errors[tried.usable]
+    own = own - begun @ np.linalg.lstsq(begun, own, rcond=1e-12)[0]
+    there, held = tried.with_lags(j, first + 1, last).best()
+    if not held @ held < LESS * (own @ own):
+        return None
+    both = tried.best_beside(there)
+    larger = tried.with_lags(j, first, last + 1).with_pole(j).best_beside(there.with_pole(j))
+    if held @ held > AS_GOOD * min(both @ both, larger @ larger):
+        return None
+    if not significantly_better([held[:, np.newaxis]], [own[:, np.newaxis]], parameters=0, scale=spread**2):
+        return None
+    fits = [100.0 * (1.0 - float(np.linalg.norm(e)) / (spread * np.sqrt(len(own)))) for e in (own, held)]
+    return fits[0], fits[1]
+
+
+def _said_held(model: AbstractModel, j: int, i: int, fits: tuple[float, float]) -> str:
+    name, target = model.mapping.inputs[j], model.mapping.outputs[i]
+    return (
+        f"{target} answers {name} as if it were held between samples, and this model takes it to move there "
+        f"(intersample: {MOVING}): held, a free run with as many coefficients has a fit of {fits[1]:.1f} %, and this "
+        f"one of {fits[0]:.1f} %. Where a converter or a controller sets {name}, write intersample: {HELD}, or leave "
+        "it out."
+    )
 
 
 def _said(model: AbstractModel, j: int, i: int, lag: int, fits: tuple[float, float]) -> str:

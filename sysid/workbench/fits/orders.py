@@ -92,8 +92,8 @@ def search(config: PipelineConfig, data: Data) -> list[dict[str, Any]]:
         data.traces, config.mapping, **ranges, start=config.start, selection=data.selection, workers=1
     )
     if isinstance(found, SystemOrderSearch):
-        each = [*found.outputs.values(), *([] if found.together is None else [found.together])]
-        return [_record(one, criterion) for one in each]
+        together = [] if found.together is None else [_record(found.together, criterion)]
+        return [*(_record(one, criterion) for one in found.outputs.values()), *together]
     return [_record(found, criterion)]
 
 

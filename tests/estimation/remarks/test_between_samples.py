@@ -116,3 +116,36 @@ def test_masked_samples_say_nothing() -> None:
     masked = Trace(name="masked", sample_time=T, channels=trace.channels, values=trace.values, usable=usable)
     fit = fitting.fit([masked], ONE, sysid.OE(nb=(1,), nf=(1,), nk=(1,)), start=ESTIMATED, stability=None)
     assert any(SOONER in told for told in fit.warnings)
+
+
+HELD_TOLD = "as if it were held between samples"
+
+
+def moving(poles: int) -> sysid.TransferFunction:
+    return sysid.TransferFunction(
+        poles=(poles,), zeros=(poles - 1,), delays=(0,), domain="continuous", intersample="foh"
+    )
+
+
+def said_held(u, y, poles: int) -> list[str]:
+    fit = fitting.fit([trace_of(u, y, sample_time=T)], ONE, moving(poles), start=ESTIMATED, stability=None)
+    return [told for told in fit.warnings if HELD_TOLD in told]
+
+
+@pytest.mark.parametrize("kind", ["held", "levels"])
+@pytest.mark.parametrize("poles", PLANTS)
+def test_an_input_that_is_held_is_told_where_the_model_has_it_move(poles: int, kind: str) -> None:
+    told = said_held(*record(poles, kind, noise=0.01), poles)
+    assert len(told) == 1 and "intersample: zoh" in told[0]
+
+
+@pytest.mark.parametrize("kind", ["sines", "ramps"])
+@pytest.mark.parametrize("poles", PLANTS)
+def test_an_input_that_does_move_is_not_said_to_be_held(poles: int, kind: str) -> None:
+    for seed in range(4):
+        assert not said_held(*record(poles, kind, noise=(0.01, 0.1)[seed % 2], seed=seed), poles)
+
+
+def test_a_model_with_too_few_poles_is_not_told_of_a_hold() -> None:
+    for seed in range(4):
+        assert not said_held(*record(2, "sines", noise=0.01, seed=seed), 1)

@@ -31,6 +31,7 @@ from sysid.estimation.linear.subspace.system import EDGE
 from sysid.estimation.linear.subspace.windows import Windows
 from sysid.estimation.linear.subspace.yardstick import Yardstick
 from sysid.models import LinearStateSpace
+from sysid.models.linear.innovations import Innovations
 from sysid.models.linear.polynomial_orders import AbstractPolynomial
 
 Array = NDArray[np.float64]
@@ -99,13 +100,20 @@ def _in_state_space(pieces: Sequence[Segment], orders: AbstractPolynomial) -> Lo
         The transfer functions over their common denominator, beside no noise model; ``None`` where there is none.
     """
     states = max(orders.denominators, default=0)
+    # Without D a state space has as many coefficients above as states, the first of them at a lag of one sample.
+    found = _state_space(pieces, orders, states, direct=min(orders.nk, default=1) == 0 or max(orders.nb) > states)
+    return None if found is None else LongARX(A=np.real(np.poly(found[0].A)), B=tuple(found[1]))
+
+
+def _state_space(
+    pieces: Sequence[Segment], orders: AbstractPolynomial, states: int, *, direct: bool, noise: bool = False
+) -> tuple[Innovations, list[Array]] | None:
+    """A state space behind the structure's dead times, and its numerators by lag; ``None`` where there is none."""
     if not states:
         return None
-    # Without D a state space has as many coefficients above as states, the first of them at a lag of one sample.
-    direct = min(orders.nk) == 0 or max(orders.nb) > states
     dead = [nk - (not direct) for nk in orders.nk]
     late = [replace(p, inputs=delayed_inputs(p.inputs, np.zeros(len(dead)), dead)) for p in pieces]
-    asked = LinearStateSpace(states=states, feedthrough=direct, noise=False)
+    asked = LinearStateSpace(states=states, feedthrough=direct, noise=noise)
     try:
         system = search(late, asked, StateSpaceTraining(max_iterations=STEPS)).system
     except (UserError, FitDivergedError, linalg.LinAlgError, ValueError):  # too short for it: the other starts do
@@ -117,7 +125,28 @@ def _in_state_space(pieces: Sequence[Segment], orders: AbstractPolynomial) -> Lo
         # C adj(zI - A) b + d det(zI - A): the determinant lemma.
         numerator = np.real(np.poly(system.A - b @ system.C)) + (d - 1.0) * A
         B.append(np.concatenate([np.zeros(k), numerator]))
-    return LongARX(A=A, B=tuple(B))
+    return system, B
+
+
+def _innovations_start(pieces: Sequence[Segment], orders: AbstractPolynomial) -> Array | None:
+    """Coefficients of an ARMAX model that are those of a state space with a model of the noise.
+
+    An ARMAX model whose polynomials are as long as each other is one, with ``C`` the poles of its predictor; of shorter
+    ones the coefficients that are left say nearly the same. White noise of a sensor, whose ``C`` is ``A``, is among
+    what a state space begins at.
+    """
+    na, nc, n_b = orders.order("na"), orders.order("nc"), max(orders.nb, default=0)
+    direct = min(orders.nk, default=1) == 0
+    found = _state_space(pieces, orders, max(na, nc, n_b - direct), direct=direct, noise=True)
+    if found is None:
+        return None
+    system, numerators = found
+    own = [np.concatenate([b, np.zeros(nk + nb)])[nk : nk + nb] for b, nk, nb in zip(
+        numerators, orders.nk, orders.nb, strict=True
+    )]  # fmt: skip
+    A, C = (np.real(np.poly(one))[1:] for one in (system.A, system.A - system.K @ system.C))
+    level = float(system.constant[0]) if orders.level else 0.0
+    return np.concatenate([*own, A[:na], inside(C[:nc]), [level] * orders.level])
 
 
 def _armax_start(pieces: Sequence[Segment], orders: AbstractPolynomial, long: LongARX) -> Array:
@@ -316,7 +345,10 @@ def starts_of(looked: Sequence[Segment], orders: AbstractPolynomial, longs: Sequ
 
 def of_state_space(looked: Sequence[Segment], orders: AbstractPolynomial) -> list[Array]:
     """Coefficients from a state space of the same order."""
-    same = None if has_common(orders) else _in_state_space(looked, orders)
+    if has_common(orders):
+        start = _innovations_start(looked, orders)
+        return [] if start is None else [start]
+    same = _in_state_space(looked, orders)
     if same is None:
         return []
     begun = [_box_jenkins_start(looked, orders, same, whitened=False)]

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from sysid.errors import TraceError
 from sysid.estimation import Status, fit_arx, fit_polynomial
 from sysid.estimation.linear.polynomial.chart import PolynomialChart
-from sysid.estimation.linear.polynomial.starts import inside
+from sysid.estimation.linear.polynomial.starts import inside, of_state_space
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.models import ARMAX, ARX, BJ, OE, Mapping, Start
@@ -163,3 +163,28 @@ def test_a_plant_that_integrates_is_found_to_the_noise(orders: AbstractPolynomia
     fitted = fit_polynomial([record], Mapping.parse("u1 -> y"), orders, start=FREE)
     assert fitted.model.pole_radius == pytest.approx(1.0, abs=2e-4)
     assert float(fitted.history["mse"][-1]) < 1.05 * noise**2 + 1e-5 * np.var(y)
+
+
+def test_armax_of_close_resonances_under_white_noise_of_a_sensor_ends_at_the_noise() -> None:
+    """From regressions on long ARX models alone it ended, CONVERGED, at 1.3 times the power of the noise."""
+    b = [0.0, -0.0075957337, 0.0364344048, -0.1207498403, 0.1625623018, -0.0720047037]
+    a = [1.0, -3.8177267807, 6.3870542304, -6.171380279, 3.4817448128, -0.8793092731]
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 100), rng.integers(2, 60, 100))[:2000]
+    u[:10] = 0.0
+    y = lfilter(b, a, u)
+    e = 0.03 * y.std() * rng.normal(size=len(u))
+    fit = fit_polynomial(
+        [trace_of(u, y + e)], Mapping.parse("u1 -> y"), ARMAX(na=5, nb=(5,), nc=5, nk=(1,)), start=FREE
+    )
+    assert fit.status is Status.CONVERGED
+    assert fit.history["mse"][-1] < 1.02 * np.mean(e**2)
+
+
+def test_an_armax_start_from_a_state_space_is_that_state_space() -> None:
+    """Noise through the plant's own poles and two dead times: its polynomials are those of the record."""
+    orders, truth = CASES["ARMAX"]
+    trace = record(orders, truth, seed=3, n=4000, noise=0.1)
+    u, y = trace.columns(TWO.inputs), trace.columns(TWO.outputs)
+    (start,) = of_state_space([Segment(inputs=u, outputs=y, root_weights=np.ones(len(y)))], orders)
+    assert np.abs(start[:-1] - truth).max() < 0.05
