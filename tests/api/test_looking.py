@@ -9,6 +9,7 @@ import pytest
 
 import sysid
 from sysid.errors import ConfigError
+from sysid.ingest.inspecting.undescribed import GuessedWarning
 from sysid.traces import TraceSet
 
 
@@ -29,11 +30,10 @@ def test_advice_prints_what_was_found_and_draws_it() -> None:
     assert len(found.plot().axes) == 3
 
 
-def test_two_channels_need_no_mapping_and_three_do() -> None:
+def test_channels_whose_names_tell_need_no_mapping() -> None:
     assert str(sysid.advise(traces()).mapping) == "u -> y"
-    with pytest.raises(ConfigError, match="nothing tells") as refused:
-        sysid.advise(traces(2))
-    assert refused.value.remedy == 'write for example mapping="u+y1 -> y2"'
+    with pytest.warns(GuessedWarning, match=r"guessed: u -> y1\+y2: by their names"):
+        assert list(sysid.advise(traces(2)).outputs) == ["y1", "y2"]
 
 
 def test_several_outputs_are_looked_at_one_by_one() -> None:
