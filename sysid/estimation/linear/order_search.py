@@ -358,9 +358,8 @@ def search_orders(
     target, everything = table.shape[1] - 1, np.arange(table.shape[1])
     if grid.intercept:
         rank = kernel.reflect(factor, 0, everything[1:], target - 1, target, 0, tolerance[0])
-    starts = 1 + np.cumsum(
-        [0, *map(len, lags.inputs)]
-    )  # where the columns of each input begin, and those of the output
+    # Where the columns of each input begin, and those of the output.
+    starts = 1 + np.cumsum([0, *map(len, lags.inputs)])
     outputs = everything[starts[-1] : target]
     dead_times = grid.dead_times(m)
     per_block = grid.size(m) // len(dead_times)
