@@ -166,3 +166,13 @@ def write_spice(path: Path) -> None:
     said = ["Title: * rig", "Date: Tue Mar 12 08:15:00 2024", "Plotname: Transient Analysis", "Flags: real"]
     head = [*said, "No. Variables: 3", f"No. Points: {len(TIME)}", "Variables:", *variables, "Binary:\n"]
     path.write_bytes("\n".join(head).encode() + np.column_stack([TIME, PIPE, VOLT]).tobytes())
+
+
+def write_comtrade(path: Path) -> None:
+    """A fault recorder's file of all parts, with samples as text."""
+    channels = ["1,BP,,,kPa gauge,1.0,0.0,0,-32767,32767,1,1,P", "2,u,,,mV,1000.0,0.0,0,-32767,32767,1,1,P"]
+    rates = ["50", "1", f"20,{len(TIME)}", "12/03/2024,08:15:00.000000", "12/03/2024,08:15:00.500000", "ASCII", "1"]
+    said = ["--- file type: CFG ---", "rig,recorder,2013", "2,2A,0D", *channels, *rates, "--- file type: DAT ASCII ---"]
+    cells = enumerate(zip(PIPE.tolist(), VOLT.tolist(), strict=True), 1)
+    rows = [f"{k},{50000 * (k - 1)},{p!r},{v!r}" for k, (p, v) in cells]
+    path.write_text("\r\n".join([*said, *rows, ""]), newline="")

@@ -7,6 +7,7 @@ of ``tests/ingest/readers/test_readers.py``.
 from sysid.ingest.readers import (
     arrow,
     codesys,
+    comtrade,
     csv_text,
     excel,
     hdf5,
@@ -34,6 +35,7 @@ READERS: tuple[Reader, ...] = (
     codesys.READER,
     excel.READER,
     spice.READER,
+    comtrade.READER,
 )
 """Every reader; a file is read by the one that knows its first bytes, else by the one that claims its suffix."""
 

@@ -33,6 +33,7 @@ class Reader:
         options: The fields of :class:`~sysid.ingest.tables.options.FileOptions` that mean something to it,
             besides those that mean something to all.
         is_mine: Whether a file is of this format, by its first 4,096 bytes; ``None`` where they do not tell.
+        is_of: Whether a file is of this format by another beside it; ``None`` where there is no such.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Reader:
     read: Callable[[Path, FileOptions, RepairOptions], RawTable]
     options: frozenset[str] = frozenset()
     is_mine: Callable[[bytes], bool] | None = None
+    is_of: Callable[[Path], bool] | None = None
 
 
 _PACKED = (b"\x1f\x8b", b"PK\x03\x04", b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf", b"\x28\xb5\x2f\xfd")
@@ -78,6 +80,8 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
                 return reader
         known = [reader.name for reader in readers]
         raise ConfigError.unknown(f"no reader named {name}", name, known, "correct reader", where=path)
+    if (beside := next((one for one in readers if one.is_of is not None and one.is_of(path)), None)) is not None:
+        return beside
     by_suffix = next((reader for reader in readers if path.suffix.lower() in reader.suffixes), None)
     head = _head(path)
     if by_suffix is not None and by_suffix.is_mine is not None and by_suffix.is_mine(head):

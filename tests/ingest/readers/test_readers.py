@@ -22,6 +22,7 @@ from tests.ingest.recordings import (
     TIME,
     VOLT,
     write_codesys,
+    write_comtrade,
     write_csv,
     write_csv_european,
     write_csv_tabs,
@@ -60,6 +61,7 @@ CONTRACT = [
     pytest.param("lvm", "run.lvm", write_lvm, id="lvm: decimal comma, no column of time"),
     pytest.param("codesys", "run.trace.csv", write_codesys, id="codesys: a variable after the other"),
     pytest.param("spice", "run.raw", write_spice, id="spice: waveforms"),
+    pytest.param("comtrade", "run.cff", write_comtrade, id="comtrade: all parts in one"),
     pytest.param("excel", "run.xlsx", write_excel, id="excel: title, units row"),
 ]
 
