@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -109,11 +109,23 @@ def _functions(file: Path) -> tuple[list[str], list[str]]:
             "the file of the function cannot be read", where=file, expected="a file of Python", got=error,
             remedy="check the path, and that Python runs it",
         ) from None  # fmt: skip
-    functions = [node.name for node in body if isinstance(node, ast.FunctionDef)]
-    others = [node.name for node in body if isinstance(node, ast.ClassDef)]
-    others += [alias.asname or alias.name for node in body if isinstance(node, ast.ImportFrom) for alias in node.names]
-    assigned = [node.targets for node in body if isinstance(node, ast.Assign)]
-    return functions, others + [one.id for targets in assigned for one in targets if isinstance(one, ast.Name)]
+    nodes = list(_at_top(body))
+    functions = [node.name for node in nodes if isinstance(node, ast.FunctionDef)]
+    others = [node.name for node in nodes if isinstance(node, ast.ClassDef)]
+    others += [alias.asname or alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names]
+    assigned = [target for node in nodes if isinstance(node, ast.Assign) for target in node.targets]
+    assigned += [node.target for node in nodes if isinstance(node, ast.AnnAssign)]
+    return functions, others + [one.id for target in assigned for one in ast.walk(target) if isinstance(one, ast.Name)]
+
+
+def _at_top(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
+    """The statements whose names are those of the file: also below ``if`` and ``try``, as where a library may lack."""
+    for node in body:
+        yield node
+        if isinstance(node, ast.If | ast.Try | ast.With):
+            handlers = node.handlers if isinstance(node, ast.Try) else []
+            for inner in (node.body, getattr(node, "orelse", []), *(one.body for one in handlers)):
+                yield from _at_top(inner)
 
 
 def _of_program(text: str, place: Path) -> Source:

@@ -118,3 +118,19 @@ def test_a_function_of_a_file_is_another_where_a_file_is_that_it_imports(
         for name in ("lag", "gain"):
             del sys.modules[name]
     assert digests[0] != digests[1]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["slow, other = map(wrap, (a, b))", "slow: Callable[..., object] = wrap(a)"]
+    + [
+        "try:\n    from fast import slow\nexcept ImportError:\n    slow = wrap(a)",
+        "if True:\n    def slow(t, u, p): ...",
+    ],
+    ids=["with others", "with its type", "of a library that may lack", "below a condition"],
+)
+def test_a_function_may_be_made_in_any_way_at_the_top_of_its_file(tmp_path: Path, text: str) -> None:
+    (tmp_path / "model.py").write_text(text + "\n\ndef inside():\n    hidden = 1\n")
+    assert source_of("model.py:slow", folder=tmp_path).name == "slow"
+    with pytest.raises(ConfigError, match="has no function hidden"):
+        source_of("model.py:hidden", folder=tmp_path)
