@@ -122,8 +122,9 @@ def test_a_function_of_a_file_is_another_where_a_file_is_that_it_imports(
 
 @pytest.mark.parametrize(
     "text",
-    ["slow, other = map(wrap, (a, b))", "slow: Callable[..., object] = wrap(a)"]
-    + [
+    [
+        "slow, other = map(wrap, (a, b))",
+        "slow: Callable[..., object] = wrap(a)",
         "try:\n    from fast import slow\nexcept ImportError:\n    slow = wrap(a)",
         "if True:\n    def slow(t, u, p): ...",
     ],
