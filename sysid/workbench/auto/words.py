@@ -213,7 +213,8 @@ def sentence(
     if choice.linear is not None and not ESTIMATORS[choice.chosen.structure["kind"]].linear:
         linear = math.sqrt(error(choice.linear))
         share = 1.0 - root / linear if linear else 0.0  # what is met exactly has no error to better
-        parts.append(f"{share:.0%} less than the best linear model, {choice.linear.label}")
+        gains = f"{share:.0%} less than" if round(share, 2) else "as much as"  # chosen for its size
+        parts.append(f"{gains} the best linear model, {choice.linear.label}")
     elif choice.linear is not None:
         parts.append(_beside_nonlinear(choice))
     said = f"{'; '.join(parts)}; {ended}."

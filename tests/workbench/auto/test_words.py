@@ -57,6 +57,15 @@ def test_a_linear_model_that_is_as_good_is_chosen() -> None:
     assert "and no nonlinear model does better" in sentence(found, 2, unit="V", ended="", error=error)
 
 
+def test_one_that_is_chosen_for_its_size_is_not_said_to_be_closer() -> None:
+    larger = arx(1, 1.001).model_copy(update={"operations": 80})
+    found = choose([larger, network(2, 1.0, 20)], error, stable)
+    assert found.chosen.number == 2
+    assert "; as much as the best linear model, ARX [1; 1; 1]" in sentence(found, 2, unit="V", ended="", error=error)
+    closer = choose([larger, network(2, 0.9, 20)], error, stable)
+    assert "; 10% less than the best linear model" in sentence(closer, 2, unit="V", ended="", error=error)
+
+
 def test_where_no_network_can_be_used_none_is_said_to_be_worse() -> None:
     lost = network(2, 1.0, 60).model_copy(update={"usable": False, "status": "UNSTABLE"})
     said = sentence(choose([arx(1, 1.0), lost], error, stable), 2, unit="V", ended="", error=error)
