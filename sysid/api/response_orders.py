@@ -144,8 +144,8 @@ class ResponseOrderSearch:
         first, *rest = self.ranked
         counts = sorted({one.poles for one in self.tried})
         text = (
-            f"Orders: {_named(first)}, of {len(self.tried)} structures of {counts[0]} to {counts[-1]} poles that with "
-            f"the least error at frequencies left out of the fit, each fifth in turn "
+            f"Orders: {_named(first)}, of {len(self.tried)} structures of {counts[0]} to {counts[-1]} poles the one "
+            f"with the least error at frequencies left out of the fit, each fifth in turn "
             f"({self.left_out_percent(first):.3g} % of the response), and BIC's price of a parameter"
         )
         return text + (f"; next is {_named(rest[0])} ({self.left_out_percent(rest[0]):.3g} %)." if rest else ".")

@@ -18,6 +18,7 @@ from sysid.ingest.readers import (
     numpy_arrays,
     spice,
     tdms,
+    touchstone,
 )
 from sysid.ingest.readers.reader import Reader, choose_reader, read_with
 
@@ -36,6 +37,7 @@ READERS: tuple[Reader, ...] = (
     excel.READER,
     spice.READER,
     comtrade.READER,
+    touchstone.READER,
 )
 """Every reader; a file is read by the one that knows its first bytes, else by the one that claims its suffix."""
 

@@ -93,8 +93,12 @@ def test_the_same_signal_in_any_format_is_the_same_trace(
     assert "BP: converted from kPa gauge to bar absolute" in trace.provenance
 
 
+OVER_FREQUENCY = {"touchstone"}
+"""Readers of files that can hold no record over time; each has a file of tests of its own."""
+
+
 def test_every_reader_stands_in_the_contract() -> None:
-    assert {row.values[0] for row in CONTRACT} == {reader.name for reader in READERS}
+    assert {row.values[0] for row in CONTRACT} | OVER_FREQUENCY == {reader.name for reader in READERS}
 
 
 def test_no_two_readers_claim_one_suffix() -> None:
