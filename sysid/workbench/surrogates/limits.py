@@ -18,18 +18,19 @@ CUT_SHORT = {Status.TIME_LIMIT.name, Status.MAX_ITERATIONS.name, Status.INTERRUP
 """How a training ends that still gained."""
 
 
-def limits(results: Results, shown: Proof) -> list[str]:
+def limits(results: Results, shown: Proof, *, needs_s: float = 0.0) -> list[str]:
     """What limits a surrogate, as its fit and its proof show beside each other, and what helps.
 
     Args:
         results: Of the fit that was exported.
         shown: How it does on new experiments.
+        needs_s: Seconds that a search takes at least, where there was no time for one: that limits it, and is told.
 
     Returns:
         A sentence; none where it is good enough, or where nobody knows.
     """
     fits = _exported(results, shown.outputs)
-    if shown.share >= WANTED or fits is None:
+    if shown.share >= WANTED or fits is None or needs_s:
         return []
     own, status = _fitted(fits, shown), {one.status for one in fits}
     if not np.isfinite(own):

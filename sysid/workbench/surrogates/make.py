@@ -102,6 +102,6 @@ def make_surrogate(
     page, fmu = work.page(place), work.delivered(place)
     bundle = read_bundle(place / "bundle")
     notes += [*said, *work.learnt(bundle, found, shown), *poor(shown, minutes, needs_s)]
-    notes += limits(read_results(place), shown)
+    notes += limits(read_results(place), shown, needs_s=needs_s)
     notes += short_of_time(shown, plan, count, took=0.0 if iterations else time.monotonic() - began)
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes, pipeline=pipeline)

@@ -56,3 +56,7 @@ def test_nothing_limits_what_is_good_enough_and_nothing_is_said_where_nobody_kno
     unknown = results("CONVERGED", 0.5)
     unknown.best = None
     assert limits(unknown, shown(0.5)) == []
+
+
+def test_where_there_was_no_time_for_a_search_its_structure_is_not_blamed() -> None:
+    assert limits(results("CONVERGED", 0.0), shown(0.0), needs_s=90.0) == []
