@@ -70,7 +70,7 @@ def read(path: Path, *, described: Path | None) -> RawTable:
         width = 2 + len(said.analogue) + len(said.states)
         check_claim(path, [("the samples", (_rows(parts["DAT"], said), width))])
         numbers, analogue, states = (_of_text if said.form == "ASCII" else _of_binary)(parts["DAT"], said)
-    except (ValueError, IndexError) as error:
+    except (ValueError, LookupError) as error:  # of a form that is not known, too
         raise _broken(path, "channels, rates and samples as IEEE C37.111 has them", str(error)) from error
     expected = said.rates[-1][1] if said.rates else 1
     if len(numbers) < max(expected, 1):
@@ -84,7 +84,7 @@ def read(path: Path, *, described: Path | None) -> RawTable:
     ]
     named, notes = distinct(columns)
     time = named[0].name if step is None else None
-    told = (f"recorded by {said.station}", *notes)
+    told = (*([f"recorded by {said.station}"] if said.station else []), *notes)
     return RawTable(source=path, reader="comtrade", columns=tuple(named), time=time, step=step, notes=told)
 
 

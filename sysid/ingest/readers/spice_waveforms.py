@@ -94,7 +94,8 @@ def _head_of(path: Path) -> _Head:
     with path.open("rb") as file:
         raw = file.read(_HEAD)
     wide = raw[1:2] == b"\0"
-    ends = {mark: mark.encode("utf-16-le" if wide else "ascii") for mark in ("Binary:\n", "Binary:\r\n", "Values:\n")}
+    marks = [f"{word}:{end}" for word in ("Binary", "Values") for end in ("\n", "\r\n")]
+    ends = {mark: mark.encode("utf-16-le" if wide else "ascii") for mark in marks}
     found = [(raw.find(end), mark, len(end)) for mark, end in ends.items() if end in raw]
     if not found:
         raise _broken(path, "Binary: or Values: below its variables", "none")

@@ -101,6 +101,13 @@ def test_samples_that_break_off_are_refused(tmp_path: Path) -> None:
         read_table(tmp_path / "rig.cfg")
 
 
+def test_samples_of_an_unknown_form_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "rig.cfg").write_text(described("BINARY64"), newline="")
+    (tmp_path / "rig.dat").write_bytes(binary("BINARY"))
+    with pytest.raises(ReaderError, match="BINARY64"):
+        read_table(tmp_path / "rig.cfg")
+
+
 def test_a_record_without_its_samples_says_which_file_is_missing(tmp_path: Path) -> None:
     (tmp_path / "rig.cfg").write_text(described("BINARY"), newline="")
     with pytest.raises(ReaderError, match=r"samples of the record are missing.*\n.*\n.*rig\.dat beside it"):

@@ -50,11 +50,13 @@ def test_a_variable_after_the_other(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table.find("V(in)").values, VOLTS.astype(np.float32))
 
 
-def test_numbers_as_text(tmp_path: Path) -> None:
+@pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["Unix", "Windows"])
+def test_numbers_as_text(tmp_path: Path, end: str) -> None:
     lines = [
         f" {k}\t{t!r}\n\t{v!r}\n\t1.5\n" for k, (t, v) in enumerate(zip(STAMPS.tolist(), VOLTS.tolist(), strict=True))
     ]
-    (tmp_path / "rig.raw").write_text(head("real", len(STAMPS), OVER_TIME, end="Values:") + "".join(lines))
+    text = head("real", len(STAMPS), OVER_TIME, end="Values:") + "".join(lines)
+    (tmp_path / "rig.raw").write_text(text.replace("\n", end), newline="")
     table = read_table(tmp_path / "rig.raw")
     np.testing.assert_array_equal(table.find("V(in)").values, VOLTS)
     np.testing.assert_array_equal(table.find("I(R1)").values, 1.5)
