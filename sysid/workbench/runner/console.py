@@ -59,12 +59,15 @@ class TextConsole(Console):
 def console() -> Console:
     """Where results are shown.
 
+    ``FORCE_COLOR``, which notebooks and services that build software set, asks for colours. It makes no terminal of a
+    pipe: nothing moves there, and lines are as long as in any other file.
+
     Returns:
         A console on standard output.
     """
+    watched = sys.stdout is not None and sys.stdout.isatty()
     fixed: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}
-    plain = TextConsole(**fixed)
-    return plain if plain.is_terminal else TextConsole(**fixed, width=PIPED_WIDTH)
+    return TextConsole(**fixed, force_interactive=None if watched else False, width=None if watched else PIPED_WIDTH)
 
 
 def say(text: str) -> None:

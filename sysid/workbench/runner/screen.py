@@ -80,7 +80,7 @@ class Screen:
 
     def _start(self, step: str) -> None:
         self.close()
-        if not self._console.is_terminal:
+        if not self._console.is_interactive:
             return
         self._progress = Progress(
             SpinnerColumn(),

@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 from rich.progress import Progress
 
+from sysid.workbench.runner.console import console
 from sysid.workbench.runner.events import Event, RunStarted, StepDone, StepProgress, StepStarted
-from sysid.workbench.runner.screen import SILENCE_S, Left, LogFile
+from sysid.workbench.runner.screen import SILENCE_S, Left, LogFile, Screen
 
 STEP = "Training end to end"
 
@@ -95,3 +96,16 @@ def test_of_a_step_of_unknown_length_no_time_is_said_to_be_left(clock: Clock) ->
         clock.now += 10.0
         bar.advance(task.id, 10.0)
     assert left(task).plain == "0:01:10 left"
+
+
+def test_who_asks_for_colours_in_a_pipe_gets_no_bar_that_moves(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as notebooks do, and services that build software
+    screen = Screen(console())
+    screen(StepStarted(step=STEP))
+    screen(progress(0.5))
+    screen(StepDone(step=STEP, stored=False, detail="55 s"))
+    shown = capsys.readouterr().out
+    assert shown.count(STEP) == 1
+    assert "\x1b[32mdone" in shown
