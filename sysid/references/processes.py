@@ -24,6 +24,7 @@ class ReferenceProcess:
 
     def __init__(self, config: ReferenceConfig) -> None:
         self.answers: queue.Queue[str] = queue.Queue()
+        self.ran = False  # the first run loads and compiles what the others find
         self.errors = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         # It is ended in the middle of what it does: what it unpacked and wrote is cleared away from here.
         self.place = tempfile.TemporaryDirectory(prefix="sysid-worker-", ignore_cleanup_errors=True)

@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,8 @@ from sysid.references.processes import ReferenceProcess
 from sysid.traces import Channel, Trace
 
 TOO_LONG = "it was not done after"
+BEGINNING = 0.1
+"""Share of an experiment that is run to see how long one takes, where the whole takes long."""
 FROM_OUTSIDE = ("by signal SIGTERM", "by signal SIGINT", "by signal SIGHUP")
 """How a run ends that a batch system, a container or a person has ended: that says nothing of the experiment."""
 Progress = Callable[[str, int, int], None]
@@ -67,6 +69,7 @@ class Outcome:
         cpu_s: Processor time of the run.
         wall_s: Its time by the clock.
         stored: Whether an earlier run's record was taken.
+        cold: Whether its process had run none before, so that its time is that of loading and compiling, too.
     """
 
     case: Case
@@ -76,6 +79,7 @@ class Outcome:
     cpu_s: float = float("nan")
     wall_s: float = float("nan")
     stored: bool = False
+    cold: bool = False
 
 
 @dataclass(kw_only=True, eq=False)
@@ -176,15 +180,21 @@ class ReferenceRuns:
         return sum(self._told(self.key(case)) is not None for case in cases)
 
     def seconds_each(self) -> tuple[float | None, str]:
-        """How long one run takes, and where that is known from."""
-        measured = TraceCache(folder=self.folder).mean_time(self._timed_as)
-        if measured is not None:
-            return measured, "the mean of the runs so far"
+        """How long one run takes, and where that is known from; first runs of a process if nothing else is."""
+        cache = TraceCache(folder=self.folder)
+        for cold in (False, True):
+            if (measured := cache.mean_time(self._timed_as(cold=cold))) is not None:
+                return measured, "the mean of the runs so far"
         return (None, "nothing has been run yet") if self.config.cost is None else (self.config.cost, "as declared")
 
-    @property
-    def _timed_as(self) -> str:
-        return f"reference-{self.digest[:16]}-{self.config.sample_time!r}"
+    def _timed_as(self, *, cold: bool) -> str:
+        return f"reference-{self.digest[:16]}-{self.config.sample_time!r}{'-cold' if cold else ''}"
+
+    def _note_times(self, made: Sequence[Outcome]) -> None:
+        """Those that gave no record too: a reference that hangs in one of ten takes as long as that."""
+        for cold in (False, True):
+            if seconds := [one.wall_s for one in made if one.cold is cold]:
+                TraceCache(folder=self.folder).note_time(self._timed_as(cold=cold), float(np.mean(seconds)))
 
     def run(
         self, cases: Sequence[Case], progress: Progress | None = None, *, until: float = inf, fewest: int = 0
@@ -222,10 +232,7 @@ class ReferenceRuns:
                 for process in list(self._at_work):
                     process.kill()
                 raise
-        # Those that gave no record too: a reference that hangs in one of ten takes as long as that.
-        made = [one for one in found.values() if not one.stored]
-        if made:
-            TraceCache(folder=self.folder).note_time(self._timed_as, float(np.mean([one.wall_s for one in made])))
+        self._note_times([one for one in found.values() if not one.stored])
         return [found[k] for k in sorted(found)]
 
     def again(self, case: Case) -> Outcome:
@@ -238,6 +245,27 @@ class ReferenceRuns:
             What came of it.
         """
         return self._made(case)
+
+    def seconds_warm(self, first: Outcome, *, most: float) -> float:
+        """How long a run takes whose process has loaded and compiled what it needs: one more tells.
+
+        Args:
+            first: What came of the first run.
+            most: Seconds that the same once more may take; of what takes longer, the beginning is run.
+
+        Returns:
+            Seconds, those of the first where that was as fast; kept for :meth:`seconds_each`.
+        """
+        if first.trace is None:
+            return first.wall_s
+        if first.stored:
+            return self.seconds_each()[0] or first.wall_s
+        n = len(first.case.inputs)
+        few = n if first.wall_s < most else max(2, round(BEGINNING * n))
+        again = self.again(replace(first.case, inputs=first.case.inputs[:few]))
+        seconds = first.wall_s if again.trace is None else min(first.wall_s, again.wall_s * n / few)
+        self._note_times([replace(first, wall_s=seconds, cold=False)])
+        return seconds
 
     def _one(self, case: Case, until: float) -> Outcome | None:
         if self._stopped.is_set() or time.monotonic() > until:
@@ -264,7 +292,7 @@ class ReferenceRuns:
             self._at_work.discard(process)
 
     def _answered(self, process: ReferenceProcess, case: Case) -> Outcome:
-        began = time.perf_counter()
+        began, cold, process.ran = time.perf_counter(), not process.ran, True
         with _exchange() as (given, made):
             np.save(given, case.inputs, allow_pickle=False)
             parameters = {**self.config.constants, **case.parameters}
@@ -273,10 +301,10 @@ class ReferenceRuns:
                 answer = process.receive(self.config.time_limit)
             except TimeoutError:
                 process.end()
-                answer = {"reason": self._too_long}
+                answer, cold = {"reason": self._too_long}, False
             else:
                 if answer is None:
-                    answer = {"reason": f"it ended its process {process.end()}"}
+                    answer, cold = {"reason": f"it ended its process {process.end()}"}, False
                 else:
                     self._idle.append(process)
             wall = time.perf_counter() - began
@@ -285,7 +313,7 @@ class ReferenceRuns:
         before = {} if values is None else dict(zip(self.config.outputs, values[0].tolist(), strict=True))
         return Outcome(
             case=case, trace=trace, before=before, reason=answer["reason"], cpu_s=answer.get("cpu_s", float("nan")),
-            wall_s=wall,
+            wall_s=wall, cold=cold,
         )  # fmt: skip
 
     def _worker(self) -> ReferenceProcess:

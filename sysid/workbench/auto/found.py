@@ -41,6 +41,7 @@ class Found:
         unit: Of errors.
         hurried: Of that, that there was no search, as the time was up before structures were compared; empty elsewhere.
         needs_s: Seconds that a search takes at least, where there was no time for one; 0 elsewhere.
+        spent: Whether it ended as its budget was spent, before it had tried all that it wanted.
         done_now: Trials that this session has done itself.
     """
 
@@ -57,6 +58,7 @@ class Found:
     unit: str
     hurried: str
     needs_s: float
+    spent: bool
     done_now: int
 
     @property

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError
-from sysid.models import Start, StartKind
-from sysid.models.contract.beginning import LONGEST_WINDOW, SHARE_OF_RECORD
+from sysid.models import Mapping, Start, StartKind
+from sysid.models.contract.beginning import window
 from sysid.traces import Role, Trace, TraceSet
 from sysid.workbench.fits.data import Data
 
@@ -98,11 +98,15 @@ class Parts:
         return SEARCH if self.trained_on else {**SEARCH, "choose_by": "evidence"}
 
 
-def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool = False, exact: bool = False) -> Parts:
+def part(
+    data: Data, mapping: Mapping, start: Start, wall_s: float | None = None, *, in_turn: bool = False,
+    exact: bool = False,
+) -> Parts:  # fmt: skip
     """Part the estimation traces into what is fitted and what chooses.
 
     Args:
         data: The traces of the pipeline.
+        mapping: What goes in, which says where a run's beginning ends.
         start: How each free run begins.
         wall_s: Seconds of the search; ``None`` where iterations are counted.
         in_turn: Whether every part chooses however long the record is: what adds up its errors may be right over one
@@ -120,7 +124,7 @@ def part(data: Data, start: Start, wall_s: float | None = None, *, in_turn: bool
         names = ", ".join(trace.name for trace in data.selection)
         pairs, partial, told = [(list(traces), list(data.selection))], False, f"The selection traces chose: {names}."
     else:
-        pairs, told = _held_out(traces, start, in_turn=in_turn)
+        pairs, told = _held_out(traces, mapping, start, in_turn=in_turn)
         partial = True
     least = min(sum(int(trace.usable_samples.sum()) for trace in chooses) for _, chooses in pairs)
     if least < FEWEST:
@@ -186,15 +190,16 @@ def ends_held_out(traces: Sequence[Trace]) -> tuple[tuple[Trace, ...], tuple[Tra
 Pairs = list[tuple[list[Trace], list[Trace]]]
 
 
-def _held_out(traces: Sequence[Trace], start: Start, *, in_turn: bool) -> tuple[Pairs, str]:
+def _held_out(traces: Sequence[Trace], mapping: Mapping, start: Start, *, in_turn: bool) -> tuple[Pairs, str]:
     """What is fitted and what chooses, fold by fold, and the rule."""
     if len(traces) >= FOLDS:
         groups = [list(traces[k::FOLDS]) for k in range(FOLDS)]
         pairs = [([one for one in traces if one not in group], group) for group in groups]
         what = f"every {FOLDS}th estimation trace"
     else:
-        blocks = {_blocks(trace, start) for trace in traces}
-        pairs = [masked(traces, k, start) for k in range(FOLDS)]
+        firsts = [_first(trace, mapping, start) for trace in traces]
+        blocks = {_blocks(len(trace), first) for trace, first in zip(traces, firsts, strict=True)}
+        pairs = [masked(traces, k, firsts) for k in range(FOLDS)]
         what = f"every {FOLDS}th of {max(blocks)} blocks of {'the' if len(traces) == 1 else 'each'} estimation trace"
     rule = f"No selection traces are declared, so that {what} chose"
     if in_turn or sum(map(len, traces)) <= SHORT:
@@ -213,7 +218,7 @@ def _beyond(pair: tuple[list[Trace], list[Trace]]) -> float:
     return float(over.max()) if over.max() > LITTLE_BEYOND else 0.0
 
 
-def masked(traces: Sequence[Trace], fold: int, start: Start) -> tuple[list[Trace], list[Trace]]:
+def masked(traces: Sequence[Trace], fold: int, firsts: Sequence[int]) -> tuple[list[Trace], list[Trace]]:
     """Traces whose every fourth block does not count, and the same of which nothing else does.
 
     Both run over the whole record from the same beginning, so that no block has an initial state of its own to guess.
@@ -221,16 +226,14 @@ def masked(traces: Sequence[Trace], fold: int, start: Start) -> tuple[list[Trace
     Args:
         traces: Estimation traces.
         fold: Which blocks are held out, from 0 to 3.
-        start: How each run begins; samples that are seen first are in both parts, and scored in neither.
+        firsts: Samples of each from which its run takes its initial state: in both parts, and scored in neither.
 
     Returns:
         What is fitted, and what chooses.
     """
     fitted, chooses = [], []
-    for trace in traces:
-        n, first = len(trace), _first(len(trace), start)
-        block = np.maximum(np.arange(n) - first, 0) * _blocks(trace, start) // max(n - first, 1)
-        held, begins = block % FOLDS == fold, np.arange(n) < first
+    for trace, first in zip(traces, firsts, strict=True):
+        held, begins = _held(len(trace), first, fold), np.arange(len(trace)) < first
         fitted.append(replace(trace, usable=_also(trace, ~held | begins)))
         chooses.append(replace(trace, name=f"{trace.name}, held out {fold + 1}", usable=_also(trace, held | begins)))
     return fitted, chooses
@@ -240,15 +243,30 @@ def _also(trace: Trace, counts: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return counts if trace.usable is None else (trace.usable.T & counts).T
 
 
-def _blocks(trace: Trace, start: Start) -> int:
-    return FOLDS * max(1, min(BLOCKS, (len(trace) - _first(len(trace), start)) // (FOLDS * LEAST)))
+def _held(n: int, first: int, fold: int) -> NDArray[np.bool_]:
+    """Samples of the blocks that a part holds out; the beginning is in the first block."""
+    return np.asarray(np.maximum(np.arange(n) - first, 0) * _blocks(n, first) // max(n - first, 1) % FOLDS == fold)
 
 
-def _first(n: int, start: Start) -> int:
-    """Samples from which a run takes its initial state; they are in both parts, and scored in neither."""
-    if start.kind is StartKind.ESTIMATED:
-        return start.n_measured or min(LONGEST_WINDOW, n // SHARE_OF_RECORD)
-    return min(start.n_measured, n - 1)
+def _blocks(n: int, first: int) -> int:
+    return FOLDS * max(1, min(BLOCKS, (n - first) // (FOLDS * LEAST)))
+
+
+def _first(trace: Trace, mapping: Mapping, start: Start) -> int:
+    """Samples from which a run takes its initial state; they are in both parts, and scored in neither.
+
+    A run is scored behind the window that the samples of a part show, and these are fewer than those of the record.
+    """
+    n = len(trace)
+    if start.kind is not StartKind.ESTIMATED:
+        return min(start.n_measured, n - 1)
+    inputs, known = trace.columns(mapping.inputs), trace.usable_samples
+    first, seen = n, window(1, known, inputs, asked=start.n_measured)
+    while seen < first:
+        first = seen
+        parts = [known & (_held(n, first, fold) | (np.arange(n) < first)) for fold in range(FOLDS)]
+        seen = min(window(1, part, inputs, asked=start.n_measured) for part in parts)
+    return first
 
 
 def _fold(data: Data, fitted: Sequence[Trace], chooses: Sequence[Trace]) -> Fold:

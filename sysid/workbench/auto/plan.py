@@ -31,6 +31,8 @@ owes something to luck, and the chosen one is trained from other starts too."""
 ENSEMBLES = 3
 """Of them those whose starts are united, too, where that can be."""
 
+SPENT = "the budget is spent"
+"""Why a search ends that would have tried more."""
 MET = "what is linear between its events stays within the tolerance on every trace that chooses"
 """Why a search ends that has found a model of events."""
 HELD = "equations of what holds an output stay within the tolerance on every trace that chooses"
@@ -72,7 +74,7 @@ class Plan(Ledger):
                 late = [point.structure for point in points if point not in taken]
                 self.left_out += [one.label for one in late if estimator_of(one).linear]
             elif len(taken) < len(points):
-                self.ended = "the budget is spent"
+                self.ended = SPENT
             self._points |= {point.number: point for point in taken}
             by_number = {point.number: one for point, one in zip(points, tries, strict=True)}
             self._tries += [by_number[point.number] for point in taken]

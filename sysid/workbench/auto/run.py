@@ -86,6 +86,7 @@ class Searched:
         told: What a reader has to know: what chose, and what is wrong with the record.
         hurried: Of that, that there was no search, as the time was up before structures were compared; empty elsewhere.
         needs_s: Seconds that a search takes at least, where there was no time for one; 0 elsewhere.
+        spent: Whether it ended as its budget was spent, before it had tried all that it wanted.
     """
 
     record: SweepRecord
@@ -93,6 +94,7 @@ class Searched:
     told: tuple[str, ...]
     hurried: str
     needs_s: float = 0.0
+    spent: bool = False
 
 
 def auto_of(config: AutoConfig, *, load: Callable[[], Data] | None = None, page: bool = True) -> Auto:
@@ -278,7 +280,8 @@ class _AutoSteps:
         run.then(lambda: run.tell(ready))
         told = list(dict.fromkeys(told))
         return Searched(
-            record=found.record, results=results, told=tuple(told), hurried=found.hurried, needs_s=found.needs_s
+            record=found.record, results=results, told=tuple(told), hurried=found.hurried, needs_s=found.needs_s,
+            spent=found.spent,
         )  # fmt: skip
 
     @property

@@ -20,7 +20,7 @@ from sysid.workbench.auto.found import FOUND, LINEAR, Found
 from sysid.workbench.auto.last_fit import LastFit, refit_share
 from sysid.workbench.auto.look import Looked, look
 from sysid.workbench.auto.parts import Parts, part
-from sysid.workbench.auto.plan import AGAIN, Plan
+from sysid.workbench.auto.plan import AGAIN, SPENT, Plan
 from sysid.workbench.auto.race import Race, as_far, as_rival, trains_on
 from sysid.workbench.auto.ripe import Ripening, young_told
 from sysid.workbench.auto.trials import Trials
@@ -93,7 +93,7 @@ class Search:
         """
         exact = config.tolerance is not None
         looked = look(data, config.mapping, config.start, exact=exact)
-        parts = part(data, config.start, config.wall_s, in_turn=looked.integrators > 0, exact=exact)
+        parts = part(data, config.mapping, config.start, config.wall_s, in_turn=looked.integrators > 0, exact=exact)
         structure = stand_in(config)
         pipeline = config.sweep(structure).pipeline([FitConfig(name=FOUND, structure=structure)])
         if config.wall_s is not None:
@@ -228,6 +228,7 @@ class Search:
             unit=self._unit,
             hurried=hurried,
             needs_s=needs_s,
+            spent=plan.ended == SPENT,
             done_now=trials.done_now,
         )
 

@@ -97,11 +97,11 @@ def make_surrogate(
         workers=work.config.workers, ends=inf if proof or iterations else began + plan.whole, whole_s=60.0 * minutes,
         watch=watch,
     )  # fmt: skip
-    place, said, needs_s = work.modelled(found, seconds_left / 60.0, proving, whole=minutes)
+    place, said, searched = work.modelled(found, seconds_left / 60.0, proving, whole=minutes)
     shown = proving.done.get(place) or proving(place)
     page, fmu = work.page(place), work.delivered(place)
     bundle = read_bundle(place / "bundle")
-    notes += [*said, *work.learnt(bundle, found, shown), *poor(shown, minutes, needs_s)]
-    notes += limits(read_results(place), shown, needs_s=needs_s)
+    notes += [*said, *work.learnt(bundle, found, shown), *poor(shown, minutes, searched.needs_s if searched else 0.0)]
+    notes += limits(read_results(place), shown, searched=searched, iterations=iterations)
     notes += short_of_time(shown, plan, count, took=0.0 if iterations else time.monotonic() - began)
     return Made(bundle=bundle.folder, fmu=fmu, report=page, proof=shown, notes=notes, pipeline=pipeline)

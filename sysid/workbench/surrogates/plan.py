@@ -21,7 +21,7 @@ from sysid.references.proposal import proposed
 from sysid.references.runs import ReferenceRuns
 from sysid.references.sources import Source
 from sysid.references.told import reasons_of
-from sysid.workbench.auto.finish import span
+from sysid.workbench.auto.finish import MOST_KEPT, span
 from sysid.workbench.auto.parts import searched_in
 from sysid.workbench.experiments.config import ExperimentConfig
 from sysid.yaml_files import read_yaml, yaml_text
@@ -35,7 +35,7 @@ BUSY = 1.5
 TRIES = 3
 """Experiments that are run before any is asked for, at most: one, where that gives a record."""
 WARMED = 0.05
-"""Share of the time up to which a first run is made twice: what it had to load is no time of the others."""
+"""Share of the time up to which a first run is made twice, all of it: what it had to load is no time of the others."""
 KNOWN = """\
 # A search finds smooth maps, and a model that jumps at events (a velocity that flips, a state that is reset) is none.
 # Where you know what happens, write it, and it is fitted in place of the search (docs/how/events.md):
@@ -156,16 +156,15 @@ def affordable(reference: ReferenceConfig, design: Design, *, minutes: float, wo
         # Of one that fails nobody knows whether it always does; one that hangs is not waited for one after the other.
         more = runs.run(cases[1:]) if one.trace is None else []
         # The first run of a process loads and compiles what the others find: eight of sixty were afforded for it.
-        warm = one.trace is not None and one.wall_s < WARMED * 60.0 * minutes
-        again = runs.again(cases[0]) if warm else one
+        warm = runs.seconds_warm(one, most=WARMED * 60.0 * minutes)
     if one.trace is None and all(other.trace is None for other in more):
         raise ConfigError(
             f"the reference gave no record of {TRIES} experiments", where=reference.kind,
             expected="outputs of experiments within the ranges", got=reasons_of([one, *more]),
             remedy="run the reference by itself with such inputs first; nothing was written",
         )  # fmt: skip
-    one = next(one for one in (again, one, *more) if one.trace is not None)
-    each = one.wall_s if np.isfinite(one.wall_s) else reference.time_limit
+    each = warm if one.trace is not None else next(other.wall_s for other in more if other.trace is not None)
+    each = each if np.isfinite(each) else reference.time_limit
     seen = min(searched_in(60.0 * minutes) * reference.sample_time / design.duration, RECORDS * 60.0 * minutes)
     most = int(np.clip(seen, ENOUGH, MOST))
     count = int(np.clip(RUNNING * 60.0 * minutes * workers / max(each, 1e-3) / 1.5, FEWEST, most))
@@ -198,9 +197,14 @@ class Times:
         return self.whole + (self.proof if self.apart else 0.0)
 
     @property
+    def shared(self) -> float:
+        """What search and finish have together: all that the rest does not take, and of that some in any case."""
+        return max(SEARCHING * self.whole, self.asked - self.spent - self.proof - self.finish) + self.finish
+
+    @property
     def search(self) -> float:
-        """What a model is looked for: all that the rest does not take, but a share of the whole in any case."""
-        return max(SEARCHING * self.whole, self.asked - self.spent - self.proof - self.finish)
+        """What a model is looked for: a search gives what follows it no more than a half of what both have."""
+        return max(self.shared - self.finish, (1.0 - MOST_KEPT) * self.shared)
 
     def sentence(self, experiments: int, most: int | None = None) -> str:
         """What is about to be done, for who waits for it.

@@ -47,7 +47,7 @@ from sysid.workbench.surrogates.grown import GROWN, Ground, grow
 from sysid.workbench.surrogates.grown import program_of as grown_program
 from sysid.workbench.surrogates.known import pipeline_of
 from sysid.workbench.surrogates.known import program_of as known_program
-from sysid.workbench.surrogates.plan import PROOF, RUNNING, SEARCHING, Times, times
+from sysid.workbench.surrogates.plan import PROOF, RUNNING, SEARCHING, WARMED, Times, times
 from sysid.workbench.surrogates.proof import FEWEST, Proof, fmu_of, prove
 from sysid.workbench.surrogates.told import beginning_of, elsewhere, failed, restless, unlike, without_effect
 from sysid.workbench.written import Written
@@ -168,23 +168,23 @@ class Work:
     def seconds_left(self, plan: Times) -> float:
         """The time of the search, or of the fits that are asked for."""
         # A search counts its scores, export and report in its minutes; fits that are asked for do not.
-        seconds = _kept(self.folder / TIMES, plan.search + (0.0 if self.config.fits else plan.finish))
+        seconds = _kept(self.folder / TIMES, plan.shared - (plan.finish if self.config.fits else 0.0))
         return seconds - (0.0 if self.growth is None else GROWING * plan.whole)
 
     def modelled(
         self, found: Experimented, minutes: float, proving: Proving, *, whole: float
-    ) -> tuple[Path, list[str], float]:
-        """The folder of the model, what is to be said of it, and how long a search takes where there was no time."""
+    ) -> tuple[Path, list[str], Searched | None]:
+        """The folder of the model, what is to be said of it, and what came of the search; ``None`` of given fits."""
         place = self.folder / "model"
         if self.config.fits:
             self.fitted(found, minutes)
-            return place, [], 0.0
+            return place, [], None
         searched = self.searched(found, minutes, partial(proving, place) if self.growth is None else None, whole=whole)
         said = [searched.hurried] if searched.hurried else []
         if self.growth is not None:
             place, brought = self.grown(found, searched, seconds=None if self.iterations else GROWING * 60.0 * whole)
             said.append(brought)
-        return place, said, searched.needs_s
+        return place, said, searched
 
     def grown(self, found: Experimented, searched: Searched, *, seconds: float | None) -> tuple[Path, str]:
         """The folder of the surrogate once its data have grown, and what that brought."""
@@ -315,7 +315,8 @@ def first_look(experiments: Experiments, *, minutes: float) -> str | None:
     if left and each is None:
         with ReferenceRuns(config=experiments.reference, workers=1) as runs:
             (one,) = runs.run(cases[:1])
-        left, each = left - (not one.stored), one.wall_s if np.isfinite(one.wall_s) else None
+            warm = runs.seconds_warm(one, most=WARMED * 60.0 * minutes)
+        left, each = left - (not one.stored), warm if np.isfinite(warm) else None
         failed = "" if one.reason is None else f"; it gave no record: {one.reason}"
     each = each or 0.0
     seconds = left * each / config.workers

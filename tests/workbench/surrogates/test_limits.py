@@ -18,6 +18,10 @@ def shown(share: float, count: int = 200) -> Any:
     )
 
 
+def searched(hurried: str = "", *, spent: bool = False) -> Any:
+    return SimpleNamespace(hurried=hurried, spent=spent, record=SimpleNamespace(trials=[None, None]))
+
+
 def results(status: str, fitted: float) -> Any:
     """Ten experiments that were fitted, so many within 1 % of the ranges 10 and 2, and one that chose."""
 
@@ -48,7 +52,7 @@ def results(status: str, fitted: float) -> Any:
 def test_what_limits_it_is_told_with_what_helps(status: str, fitted: float, share: float, limit: str) -> None:
     (said,) = limits(results(status, fitted), shown(share))
     assert said.startswith(f"what limits it is {limit}")
-    assert "help" in said or "try other" in said
+    assert "help" in said or "as an output too" in said
 
 
 def test_nothing_limits_what_is_good_enough_and_nothing_is_said_where_nobody_knows() -> None:
@@ -59,4 +63,22 @@ def test_nothing_limits_what_is_good_enough_and_nothing_is_said_where_nobody_kno
 
 
 def test_where_there_was_no_time_for_a_search_its_structure_is_not_blamed() -> None:
-    assert limits(results("CONVERGED", 0.0), shown(0.0), needs_s=90.0) == []
+    for iterations in (None, 50):
+        assert limits(results("CONVERGED", 0.0), shown(0.0), searched=searched("no time"), iterations=iterations) == []
+
+
+def test_nor_is_it_where_the_budget_ended_the_search() -> None:
+    (said,) = limits(results("CONVERGED", 0.0), shown(0.0), searched=searched(spent=True))
+    assert said.startswith("what limits it is the search, which ended after 2 trials as its budget was spent")
+    assert "More --minutes try other structures" in said
+    (said,) = limits(results("CONVERGED", 0.0), shown(0.0), searched=searched())
+    assert said.startswith("what limits it is structure")
+
+
+def test_a_budget_of_iterations_is_not_called_time() -> None:
+    (said,) = limits(results("MAX_ITERATIONS", 0.3), shown(0.3), searched=searched(), iterations=500)
+    assert said.startswith("what limits it is its iterations")
+    assert said.endswith("More than 500 iterations help")
+    (said,) = limits(results("CONVERGED", 0.3), shown(0.3), searched=searched(spent=True), iterations=500)
+    assert "More than 500 iterations try other structures" in said
+    assert "--minutes" not in said

@@ -42,6 +42,14 @@ def test_a_search_has_the_time_that_experiments_proof_and_report_leave_and_what_
     assert busy.sentence(20).endswith("The machine is busy: a second of work takes 12 s now.")
 
 
+def test_what_a_search_keeps_for_itself_where_scores_and_report_take_longer_is_in_what_is_told() -> None:
+    """24 s were told, and 46 s were taken: a search gives no more than half of its time to what follows it."""
+    plan = times(0.001, minutes=1.0, spent=23.0, experiments=20, workers=1, finish=69.0)
+    assert (plan.shared, plan.search) == (93.0, 46.5)
+    assert "46 s for a model, 69 s for scores" in plan.sentence(20)
+    assert "about 2.3 min in all" in plan.sentence(20)
+
+
 def test_a_proof_that_was_asked_for_takes_its_time_beside_the_minutes_and_is_told_before() -> None:
     given = {"minutes": 1.0, "spent": 5.0, "workers": 1, "finish": 15.0, "apart": True}
     plan = times(0.05, experiments=1000, **given)
