@@ -72,6 +72,7 @@ _INTERVAL = re.compile(
 )
 """An interval of ISO 8601: where it begins and where it ends."""
 _FEW = 32
+_HOUR = 3_600_000_000
 _ZERO = 48
 
 
@@ -107,7 +108,7 @@ def _taken_apart(text: str) -> _Stamp | None:
     if len(text) > _LONGEST or not (digit or " " in text):
         return None
     found = _in_parts(text) if digit else None
-    return _in_parts(usual_form(text)) if found is None and any(map(str.isalpha, text)) else found
+    return _in_parts(usual_form(text)) if found is None else found
 
 
 def _in_parts(text: str) -> _Stamp | None:
@@ -366,7 +367,9 @@ class Calendar:
 def _minutes_and_seconds(micros: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:
     """Two numbers are hours and minutes, but where the first is more than the hours of a day from the start."""
     if not len(micros) or micros[0] < DAY:
-        return micros, []
+        early = len(micros) and micros[0] < _HOUR  # 00:02: midnight, or the beginning of a stopwatch
+        other = "minutes and seconds would need time: {unit: datetime, format: '%M:%S'}"
+        return micros, [f"stamps are taken for hours and minutes, which is a guess: {other}"] if early else []
     return micros // 60, ["stamps are taken for minutes and seconds, which is a guess: no day has so many hours"]
 
 

@@ -73,13 +73,16 @@ class NumberFormat:
             cell: Its text.
 
         Returns:
-            The number, NaN for a missing value, or ``None`` if the cell is not a number.
+            The number, NaN for a missing value, or ``None`` if the cell is not a number. In brackets it is negative,
+            as accountants and spreadsheets write it.
 
         Example:
             >>> NumberFormat(decimal=".", thousands=".").parse("1.003.000")
             1003.0
             >>> NumberFormat(decimal=",", thousands=".").parse("1.5") is None
             True
+            >>> NumberFormat().parse("(12.3)")
+            -12.3
         """
         text = spaced(cell.strip()) if self.thousands in {" ", "'"} else cell.strip()
         if self.suffix:
@@ -88,6 +91,9 @@ class NumberFormat:
             return float("nan")
         if text in self.states:
             return self.states[text]
+        if text[:1] == "(" and text[-1:] == ")" and text[1:2].isdigit():
+            value = self.parse(text[1:-1])
+            return None if value is None else -value
         if not _pattern(self.decimal, self.thousands).fullmatch(text):
             return float(int(text, 16)) if HEXADECIMAL.fullmatch(text) else None
         if self.thousands == self.decimal:

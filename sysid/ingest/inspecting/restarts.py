@@ -14,6 +14,8 @@ from sysid.ingest.tables.table import RawTable, RecordChoice
 _MOST_RECORDS = 200
 _FEWEST_ROWS = 8
 _BACK, _EVEN, _IN_ORDER = 1.5, 0.25, 0.95  # steps that a clock is set back, and how even what is only out of order is
+_SHARED = 0.25
+"""Of the stamps, how many are those before them again where few digits are all that can be the reason."""
 _FEW_DIGITS = range(2, 8)
 _CLOSE = 0.02  # of the time that a record lasts: so near to the first start is the start of each record
 
@@ -122,15 +124,14 @@ def of_few_digits(known: NDArray[np.float64]) -> tuple[float, str] | None:
         unit = 10.0 ** (decade - digits + 1)
         if (np.abs(np.rint(known / unit) * unit - known) > 1e-9 * known).any():
             continue
-        half = 0.5 * np.where(known > 0.0, unit, 0.0) * (1.0 + 1e-6)
-        k = np.arange(1, n)
-        low = float(((known[1:] - half[1:] - known[0] - half[0]) / k).max())
-        high = float(((known[1:] + half[1:] - known[0] + half[0]) / k).min())
-        if not 0.0 < low <= high:
-            return None
-        step = roundest(low, high)
-        return (
-            step,
-            f"the clock is written in {digits} digits, and samples {step:g} s apart would have all of its stamps",
-        )
+        k, last = np.arange(1, n), np.where(known > 0.0, unit, 0.0) * (1.0 + 1e-6)
+        shared = np.mean(np.diff(known) == 0.0) >= _SHARED
+        for off in (0.5 * last, last)[: 1 + shared]:  # rounded once; or cut off, or rounded again in other units
+            low = float(((known[1:] - off[1:] - known[0] - off[0]) / k).max())
+            high = float(((known[1:] + off[1:] - known[0] + off[0]) / k).min())
+            if 0.0 < low <= high:
+                step = roundest(low, high)
+                told = f"samples {step:g} s apart would have all of its stamps"
+                return step, f"the clock is written in {digits} digits, and {told}"
+        return None
     return None

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import UnitError
+from sysid.ingest.cells.headers import is_unit
 from sysid.ingest.tables.clocks import since_1970
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.quality import is_quality
@@ -129,6 +130,8 @@ def _said(column: RawColumn, first: RawColumn | None, behind: str) -> str:
         numbered is not None and (numbered["of"] is None or numbered["of"].casefold() in behind.casefold())
     )
     timed = column.unit is not None and is_time_unit(column.unit)
+    if column.unit not in {None, "1"} and not timed and is_unit(str(column.unit)):
+        return ""  # T in kelvin rises as evenly as a clock where it is a ramp
     named = called or numbered is not None or _ENDS.fullmatch(column.name.strip()) is not None
     if not (named or timed or dated) or not _never_falls(column.values):
         return ""

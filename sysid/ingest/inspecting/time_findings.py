@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sysid.ingest.assembling.timing import Timing, even_step, round_step, rounded_step, survey
 from sysid.ingest.cells.headers import unit_in_name
+from sysid.ingest.inspecting.restarts import of_few_digits
 from sysid.ingest.inspecting.second_clocks import counts_rows
 from sysid.ingest.readers.leaves import step_in
 from sysid.ingest.tables.clocks import clock_of, since_1970
@@ -134,14 +135,21 @@ def _rising(columns: Sequence[RawColumn]) -> str | None:
             column is frequencies
             or column.problem is not None
             or not len(steps)
-            or np.mean(steps > 0.0) < _RISING_SHARE
+            or (np.mean(steps > 0.0) < _RISING_SHARE and not (column is columns[0] and _is_clock_of_few_digits(column)))
         ):
             continue
         usual = np.median(steps)
         named = _ENDS_IN_TIME.search(column.name) is not None and float(steps.min()) > 0.0
-        if named or since_1970(column.values) or np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE:
+        even = usual > 0.0 and np.mean(np.abs(steps - usual) <= 0.25 * usual) >= _EVEN_SHARE
+        if named or since_1970(column.values) or even or (column is columns[0] and _is_clock_of_few_digits(column)):
             return column.name
     return None
+
+
+def _is_clock_of_few_digits(column: RawColumn) -> bool:
+    """Whether a column is an even clock of which few digits were written: 606, 606, 606 of 605.7, 605.8, 606.0."""
+    known = column.values
+    return bool(np.isfinite(known).all()) and of_few_digits(known) is not None
 
 
 def longest_of_solver(
@@ -186,8 +194,13 @@ def needs_of_time(known: NDArray[np.float64], timing: Timing) -> tuple[float, di
         return 1.0, {"duplicates": "drop" if len(clean.duplicates) else None}, None
     rising = np.delete(known, clean.duplicates) if len(clean.duplicates) else known
     surveyed = clean if rising is known else survey(rising)
-    even = even_step(rising, surveyed, tolerance=GridOptions().tolerance)
+    strict = GridOptions().tolerance
+    even = even_step(rising, surveyed, tolerance=strict)
     rounded = rounded_step(rising, surveyed) if even is None else None
+    if even is None and rounded is None and surveyed.jitter <= strict * surveyed.step:
+        # The first stamp may be off itself: from there the others are up to twice as far off an even clock as it is.
+        nearly = even_step(rising, surveyed, tolerance=2.0 * strict)
+        rounded = None if nearly is None else (nearly, 2.0 * strict)
     usual = float(np.mean(np.abs(np.diff(rising) - clean.median_step) <= 0.01 * clean.median_step))
     # A stamp or two that are wrong say nothing of the others' distance.
     by_most = usual >= _EVEN_SHARE or _is_plain(rising, clean)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from sysid.errors import ReaderError, UnitError, UserError
@@ -51,8 +52,10 @@ def load_file(path: Path) -> TraceSet:
     Warns:
         GuessedWarning: If something was guessed or left out.
     """
+    marked, notes = set[str](), tuple[str, ...]()
     try:
         held = [read_table(path)]
+        marked, notes = {column.name for column in held[0].columns if column.strange}, held[0].notes
         if (swept := swept_beside(held[0].columns)) is not None:
             raise refuse_frequencies(over_frequency(swept), path)
         several = bool(held[0].records)
@@ -62,18 +65,23 @@ def load_file(path: Path) -> TraceSet:
         others += [f"{c.name} ({c.aside or c.problem.what})" for c in held[0].columns if c.problem is not None]
         trace = trace_of(held)
     except UserError as error:
-        return _as_proposed(path, error)
+        return _as_proposed(path, error, marked)
     if several:  # of which the trace is the first, or all of them side by side
         return _as_proposed(path)
     trace, clocks = without_clocks(trace)
+    if told := list(_guessed_in(notes)):
+        warnings.warn(f"{_told(path, told)}. {proposal_of(path)} writes this down", GuessedWarning, stacklevel=3)
     if left := [*clocks, *others]:
         more = f"; {proposal_of(path)} proposes numbers for states that are known" if words else ""
         warnings.warn(f"{path}: left out: {listed(left)}{more}", GuessedWarning, stacklevel=3)
     return TraceSet(name=bare_stem(path), traces=(trace,), roles={trace.name: Role.ESTIMATION}, source=str(path))
 
 
-def _as_proposed(path: Path, error: UserError | None = None) -> TraceSet:
-    """The traces of the description that would be proposed, but for its repairs; where that fails, the error."""
+def _as_proposed(path: Path, error: UserError | None = None, marked: Set[str] = frozenset()) -> TraceSet:
+    """The traces of the description that would be proposed, but for its repairs; where that fails, the error.
+
+    The columns with marks among their numbers are named, where they are known.
+    """
     try:
         found = inspect_file(path)
         # A channel that never changes is no fault of the samples: those that use it say what it is worth.
@@ -86,17 +94,22 @@ def _as_proposed(path: Path, error: UserError | None = None) -> TraceSet:
     if found.time.step is not None and found.time_guessed and (dated := _unread_dates(found)):
         raise typed_options(dated, path)
     with remedies_of_a_file(path):
-        return _described(path, found, proposed, error)
+        return _described(path, found, proposed, error, marked)
 
 
-def _described(path: Path, found: FileFinding, proposed: dict[str, Any], error: UserError | None) -> TraceSet:
+def _described(
+    path: Path, found: FileFinding, proposed: dict[str, Any], error: UserError | None, marked: Set[str]
+) -> TraceSet:
     """The traces of the description; where that fails, the error."""
     from sysid.ingest.datasets.dataset import load_described  # here: most files say what they hold
     from sysid.ingest.datasets.description import DatasetDescription
 
     # What was measured is not lost: a column in which words stand is said to be one, or to be left out, by a person.
-    lost = any(column.problem and not column.unit_guessed for column in found.columns)
-    if isinstance(error, ReaderError) and (lost or {"states", "missing"} & found.guessed):
+    # Where marks are all that stands in a column, there was nothing measured.
+    held = {c.name for c in found.table.columns if np.isfinite(c.values).any()} if found.table else marked
+    lost = any(c.problem and not c.unit_guessed and c.name not in marked - held for c in found.columns)
+    unsure = "states" in found.guessed or ("missing" in found.guessed and not (marked and marked.isdisjoint(held)))
+    if isinstance(error, ReaderError) and (lost or unsure):
         raise error
     guesses = list(_guesses(found))
     known = {"name": bare_stem(path), "provenance": str(path), "inferred": guesses}
@@ -152,6 +165,11 @@ def _told(path: Path, guesses: Sequence[str]) -> str:
     return f"{path}: guessed, as the file does not say it: {'; '.join(guesses)}"
 
 
+def _guessed_in(notes: Sequence[str]) -> Iterator[str]:
+    """What a reader guessed by itself; of what is an option of its own it is said elsewhere."""
+    yield from (note for note in notes if ", which is a guess" in note and "source.files" not in note)
+
+
 def _guesses(found: FileFinding) -> Iterator[str]:
     """What is taken to be so and what is left out, one phrase each."""
     if found.time_told:
@@ -166,6 +184,8 @@ def _guesses(found: FileFinding) -> Iterator[str]:
         yield ", ".join(named)
     yield from (f"{c.name} is {c.reference.value} pressure" for c in found.channels if c.reference_guessed)
     yield from found.guesses
+    if not found.cases:
+        yield from _guessed_in(found.notes)
     if found.cases:
         yield from found.notes
         yield "roles " + listed([f"{case.name}: {case.role}" for case in found.cases])

@@ -21,6 +21,8 @@ NO_UNITS = frozenset({"TS", "RN", "Sequence"})
 """What stands in a line of units over a stamp or a number of rows."""
 _MARKS = "%!;/*"
 """What stands before a line that is a comment, where ``#`` does not."""
+_SECTION = re.compile(r"\[[^\]]+\]")
+"""What begins a part of a file, ``[data]``."""
 _UNITS = re.compile(r"(?:v|y|vertical|signal|channel)?[ _]?units?", re.IGNORECASE)
 
 
@@ -97,7 +99,10 @@ def _is_of_units(row: Row) -> bool:
 
 
 def _is_mark(row: Row, split: Split) -> bool:
-    return split.width > 2 and split.separator != BLANKS and sum(bool(cell.strip()) for cell in row.cells) == 1
+    filled = [cell.strip() for cell in row.cells if cell.strip()]
+    if len(filled) != 1 or split.width < 2:
+        return False
+    return bool(_SECTION.fullmatch(filled[0])) or (split.width > 2 and split.separator != BLANKS)
 
 
 def _without_pairs(above: list[Row], split: Split) -> tuple[list[Row], list[str]]:
@@ -105,7 +110,7 @@ def _without_pairs(above: list[Row], split: Split) -> tuple[list[Row], list[str]
     if len(above) < 2 or split.separator == BLANKS:
         return above, []
     upper, lower = ([cell.strip() for cell in row.cells] for row in above[-2:])
-    width = split.width - (split.kinds[-1] is Kind.NOTHING)
+    width = 1 + max(index for index, kind in enumerate(split.kinds) if kind is not Kind.NOTHING)
     pairs = list(zip(upper[width:], lower[width:], strict=False))
     if not pairs or len(upper) < len(lower) or any(kind_of(word) is not Kind.WORD for word, _ in pairs):
         return above, []

@@ -63,10 +63,13 @@ class Numbers:
     numbers: NumberFormat
     strange: dict[str, int] = field(default_factory=dict)
     values: Growing = field(default_factory=lambda: Growing(np.float64))
+    bracketed: str = ""
 
     def add(self, cells: Sequence[str], lines: NDArray[np.int32]) -> None:
         """Take a block of cells."""
         values, strange = self.numbers.column_with_words(cells)
+        if not self.bracketed and "(" in ",".join(cells):
+            self.bracketed = next((cell.strip() for cell in cells if cell.strip()[:1] == "("), "")
         self.values.extend(values)
         for text, index in strange.items():
             self.strange.setdefault(text, int(lines[index]))

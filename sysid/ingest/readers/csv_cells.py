@@ -39,6 +39,8 @@ _NUMBER = re.compile(
     r"|[0-9]{1,3}(?:[.,'\u2019 \u00a0\u2009\u202f][0-9]{3})+(?:[.,][0-9]*)?)(?:[eEdD][+-]?[0-9]+)?"
     r"|[+-]?(?i:inf(?:inity)?)"
 )
+_BRACKETED = re.compile(r"\([0-9][0-9.,'\u2019 ]*[0-9](?:[eE][+-]?[0-9]+)?\)")
+"""A negative number, as accountants write it; ``(1)`` may be a unit."""
 _WITH_UNIT = re.compile(r"[+-]?[0-9]*[.,]?[0-9]+(?:[eE][+-]?[0-9]+)?\s?(?P<unit>[A-Za-z%°][A-Za-z/^0-9°]{0,5})")
 # Fortran's columns may touch where a number is negative: 1.0000E+00-2.0000E+00.
 TOUCHING = re.compile(r"(?<=[0-9])-(?=[0-9]*\.[0-9])")
@@ -101,7 +103,8 @@ def _kind(cell: str) -> Kind:
         return Kind.NOTHING
     if is_calendar(text):
         return Kind.TIME
-    return Kind.NUMBER if suffix_of(text) or HEXADECIMAL.fullmatch(text) else Kind.WORD
+    other = suffix_of(text) or HEXADECIMAL.fullmatch(text) or _BRACKETED.fullmatch(text)
+    return Kind.NUMBER if other else Kind.WORD
 
 
 _usual_kind = lru_cache(maxsize=16384)(_kind)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sysid.ingest.cells.calendar import is_calendar
-from sysid.ingest.cells.headers import parse_header
+from sysid.ingest.cells.headers import is_unit, parse_header, split_reference
 from sysid.ingest.cells.numbers import NumberFormat
 from sysid.ingest.tables.columns import RawColumn, array_column, distinct
 from sysid.ingest.tables.table import RawTable
@@ -19,6 +19,8 @@ _MOST, _LEAST = 64, 8
 """Channels at most, and samples at least."""
 _NAMELESS, _LONGER = 32, 4
 """Samples that lines of numbers alone have at least, and how many times as many as there are lines."""
+_MOST_LABELS = 6
+"""Cells before the samples of a channel at most."""
 _SEPARATORS = (("\t", "."), (";", ","), (";", "."), (",", "."), ("\t", ","), (None, "."), (None, ","))
 """What stands between cells, nothing for a run of blanks, and the decimal mark beside it."""
 
@@ -53,17 +55,19 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
             return None  # dates one below the other are the time, whatever numbers the head has
         if not (named or (bare and width >= max(_NAMELESS, _LONGER * len(cells)))):
             continue
-        stamps = None if bare else _stamps(cells[0][1:], path)
-        parsed = [numbers.column(row if bare else row[1:]) for row in cells[stamps is not None :]]
+        labels = 1 if bare else _labels(cells[0])
+        stamps = None if bare else _stamps(cells[0][labels:], path)
+        parsed = [numbers.column(row if bare else row[labels:]) for row in cells[stamps is not None :]]
         if any(isinstance(one, int) for one in parsed):
             continue
         heads = [parse_header("" if bare else name) for name in names]
+        units = [_unit(row[1:labels]) for row in cells]
         columns = [] if stamps is None else [replace(stamps, name=heads.pop(0).name or "time")]
         columns += [
             RawColumn(
                 name=head.name or f"column_{number + 1}",
                 values=np.asarray(values),
-                unit=head.unit,
+                unit=head.unit or units[number],
                 reference=head.reference,
             )
             for number, (head, values) in enumerate(zip(heads, parsed, strict=True), len(columns))
@@ -78,6 +82,19 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
             notes=(f"its {len(columns)} lines are taken as channels, of {len(columns[0].values)} samples", *renamed),
         )
     return None
+
+
+def _labels(first: Sequence[str]) -> int:
+    """How many cells of each line say what it is: name, unit and whatever else a historian has, before the dates."""
+    dated = [is_calendar(cell.strip().strip('"')) for cell in first[: _MOST_LABELS + 1]]
+    return next((k for k in range(1, len(dated)) if dated[k] and not any(dated[:k])), 1)
+
+
+def _unit(labels: Sequence[str]) -> str | None:
+    """The unit among what a line says of itself behind its name."""
+    return next(
+        (split_reference(text)[0] for cell in labels if (text := cell.strip().strip('"')) and is_unit(text)), None
+    )
 
 
 def _stamps(cells: Sequence[str], path: Path) -> RawColumn | None:

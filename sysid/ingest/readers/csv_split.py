@@ -22,6 +22,8 @@ MOST_COLUMNS = 4096
 _FEW = 50
 _MOST_LABELS, _FEWEST_BLANK = 64, 8
 """Rows with a label beside or above the numbers at most, and rows without one below them at least."""
+_SURELY_COUNTED = 6
+"""Cells of a first line that no sample of as many channels would have: 1, 2, 3, 4, 5, 6."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
@@ -103,6 +105,13 @@ def best_split(lines: list[str], given: str | None, options: FileOptions, path: 
         except ReaderError as error:
             problem = problem or error
             continue
+        if (
+            best is not None
+            and separator == BLANKS
+            and best.separator == "\t"
+            and sum(best.fitting) > sum(found.fitting)
+        ):
+            continue  # rows with an empty cell between tabs are rows of numbers, too
         if best is None or found.score > best.score + 1e-9:
             best = found
     if best is not None and _has_decimal_commas(best):
@@ -162,8 +171,8 @@ def first_row(split: Split, options: FileOptions) -> int:
 def numbers_columns(split: Split) -> bool:
     """Whether the first row is a head of numbers, as pandas writes it for columns that nobody named.
 
-    Its cells are 0, 1, 2 ... above numbers with decimals or a clock that begins anew, or whole numbers behind an empty
-    cell that stands over the index, or over dates.
+    Its cells are 0, 1, 2 ... or 1, 2, 3 ... above numbers with decimals or a clock that begins anew, or enough of them
+    that no sample would have them, or whole numbers behind an empty cell that stands over the index, or over dates.
 
     Args:
         split: The rows of a file without another head.
@@ -179,11 +188,15 @@ def numbers_columns(split: Split) -> bool:
         index = [row[0] for row in rows]
         dated = all(kind_of(cell) is Kind.TIME for cell in index)
         return all(map(_is_count, head[1:])) and (dated or index == [str(k) for k in range(len(rows))])
-    if head != [str(k) for k in range(len(head))]:
+    counts = [[str(k + begin) for k in range(len(head))] for begin in (0, 1)]
+    if head not in counts:
         return False
+    if len(head) >= _SURELY_COUNTED and not any(row in counts for row in rows):
+        return True
     anew = [row[0].replace(",", ".") for row in rows[:2]]
     begins = all(_NUMBER.fullmatch(cell) for cell in anew) and float(anew[0]) == 0.0 < float(anew[1])
-    return begins or not any(_is_count(cell) for row in rows for cell in row[1:])
+    by_decimals = len(head) > 2 or head == counts[0]
+    return begins or (by_decimals and not any(_is_count(cell) for row in rows for cell in row[1:]))
 
 
 def _is_count(cell: str) -> bool:
@@ -264,7 +277,9 @@ def _merged(run: Sequence[Kind], kinds: Sequence[Kind]) -> tuple[Kind, ...] | No
 
 def _is_spoilt(split: Split, index: int) -> bool:
     """Whether a row that does not fit is one of numbers with a bad cell."""
-    return 2 * _numbers_in(split, index) >= sum(kind in DATA for kind in split.kinds)
+    cells = trimmed(split.rows[index].cells, split.width)
+    own = [kind_of(cell) in DATA for cell, kind in zip(cells, split.kinds, strict=False) if kind in DATA]
+    return len(cells) == split.width and 2 * sum(own) >= len(own)
 
 
 def _is_second_head(split: Split, index: int) -> bool:

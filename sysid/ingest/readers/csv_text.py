@@ -257,6 +257,8 @@ def _finished(
             raw = RawColumn(name=header.name, values=blank, unit=header.unit, problem=problem, words=words)
         else:
             raw = _numbers(header, column, layout, path)
+            if isinstance(column, Numbers) and column.bracketed and raw.problem is None:
+                notes.append(f"{header.name}: {column.bracketed} is a negative number in brackets")
         if not header.name:
             if raw.words is None and raw.problem is None and not np.isfinite(raw.values).any():
                 nothing += [index + 1] if index + 1 < len(headers) else []
@@ -379,7 +381,7 @@ def _not_a_number(cell: str, header: Header, *, line: int, layout: Layout, path:
 
 
 def _remedy(cell: str) -> str:
-    if cell.count(".") > 1 or cell.count(",") > 1:
+    if (cell.count(".") > 1 or cell.count(",") > 1) and any(map(str.isdigit, cell)):
         mark = "." if cell.count(".") > 1 else ","
         return (
             f"say what the marks mean: thousands: '{mark}' if they all separate thousands, "

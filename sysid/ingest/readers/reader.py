@@ -18,6 +18,8 @@ from sysid.ingest.tables.table import RawTable
 
 _IS_TABLE = re.compile(rb"(?m)^[ \t]*[-+]?[0-9][-+0-9.,eE]*[ \t;,]+[-+]?[0-9][-+0-9.,eE]*[ \t;,\r\n]")
 """A line that begins with two numbers."""
+_FAR = 1 << 18
+"""Bytes among which such a line is looked for: instruments write all of their settings above it."""
 
 _COMMON = {"reader", "time", "columns", "units", "references", "rows", "states", "long"}
 
@@ -90,7 +92,9 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
     if by_content is None and (by_suffix is None or by_suffix.is_mine is not None):
         if by_suffix is not None:
             _check_no_markup(head, by_suffix, path)
-        if _IS_TABLE.search(_as_ascii(head)):  # programs give tables of text any name: "a.xls", "a.mat" of save -ascii
+        if _IS_TABLE.search(
+            _as_ascii(_head(path, _FAR))
+        ):  # programs give tables of text any name: "a.xls", "a.mat" of save -ascii
             by_content = next((reader for reader in readers if reader.name == "csv"), None)
     if by_content is not None or by_suffix is not None:
         return by_content or by_suffix  # type: ignore[return-value]  # one of them is there
@@ -131,10 +135,10 @@ def _check_no_markup(head: bytes, reader: Reader, path: Path) -> None:
     )
 
 
-def _head(path: Path) -> bytes:
+def _head(path: Path, size: int = 4096) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(4096)
+            return file.read(size)
     except OSError:
         return b""  # the reader says what is wrong
 

@@ -245,7 +245,7 @@ def _in_utf8(path: Path, encoding: str, size: int) -> Generator[bytes]:
         raise LookupError(f"{encoding} is no encoding of text")
     decoder = codecs.getincrementaldecoder(encoding)()
     plain = codecs.lookup(encoding).name in _ASCII_INSIDE
-    first, held = True, b""
+    held = b""
     with opened(path) as file:
         while True:
             chunk = file.read(size)
@@ -253,12 +253,10 @@ def _in_utf8(path: Path, encoding: str, size: int) -> Generator[bytes]:
             as_is = plain and chunk.isascii() and not decoder.getstate()[0]
             data = chunk if as_is and chunk else decoder.decode(chunk, final=not chunk).encode()
             if not as_is:
-                data = data.replace(_MINUS, b"-")
+                # Marks of the byte order stand before every line where a logger opens its file anew for each.
+                data = data.replace(_MINUS, b"-").replace(codecs.BOM_UTF8, b"")
             if b"\x00" in data:
                 raise ZeroBytesError("it holds zero bytes")
-            # An encoding that was asked for may leave the byte-order mark in the text.
-            if first and data:
-                data, first = data.removeprefix(codecs.BOM_UTF8), False
             data, held = held + data, b""
             if b"\r" in data:
                 if data.endswith(b"\r") and chunk:

@@ -35,17 +35,21 @@ def seconds_of_digits(values: NDArray[np.float64]) -> NDArray[np.float64] | None
         Shape ``(n,)``; ``None`` where a number is no time of day.
 
     Example:
+        >>> seconds_of_digits(np.array([135930.25])).tolist()
+        [50370.25]
         >>> seconds_of_digits(np.array([5.0, 1359.0, 2400.0])).tolist(), seconds_of_digits(np.array([1375.0]))
         ([300.0, 50340.0, 86400.0], None)
     """
-    if not len(values) or not np.isfinite(values).all() or values.min() < 0.0 or (values != np.rint(values)).any():
+    if not len(values) or not np.isfinite(values).all() or values.min() < 0.0:
         return None
     largest = float(values.max())
+    if largest <= 2400.0 and (values != np.rint(values)).any():
+        return None  # only seconds have parts
     if largest > 240_000.0 or largest < 100.0:
         return None
     seconds = values % 100.0 if largest > 2400.0 else np.zeros(len(values))
     minutes = values // 100.0 if largest > 2400.0 else values
-    if (seconds > 59.0).any() or (minutes % 100.0 > 59.0).any():
+    if (seconds >= 60.0).any() or (minutes % 100.0 > 59.0).any():
         return None
     found: NDArray[np.float64] = minutes // 100.0 * 3600.0 + minutes % 100.0 * 60.0 + seconds
     return found
