@@ -12,9 +12,9 @@ _MONTH_FIRST = re.compile(
 _DAYS = re.compile(r"(?P<days>[0-9]{1,5}) days?,? \+?(?P<h>[0-9]{1,2})(?P<rest>:[0-9]{2}:[0-9]{2}(?:[.,][0-9]+)?)")
 _DATED = r"[0-9]{4}(?P<by>[-_./])[0-9]{1,2}(?P=by)[0-9]{1,2}|[0-9]{1,2}(?P<to>[-./])[0-9]{1,2}(?P=to)[0-9]{4}"
 _MARKED = re.compile(
-    rf"(?P<date>{_DATED}|(?:19|20)[0-9]{{6}}(?=-))(?:[-_ T]|, )(?P<h>[0-9]{{1,2}})"
+    rf"(?P<date>{_DATED}|(?:19|20)[0-9]{{6}}(?=-))(?:--?|[_ T]|, )(?P<h>[0-9]{{1,2}})"
     r"(?:(?P<mark>[-_.:])(?P<m>[0-9]{2})(?:(?P=mark)(?P<s>[0-9]{2}))?|(?P<tm>[0-9]{2})(?P<ts>[0-9]{2}))"
-    r"(?P<f>[.,][0-9]{1,9})?(?P<half>\s?[ap]\.?m\.?)?",
+    r"(?:(?P<f>[.,:][0-9]{1,9})|[-_](?P<milli>[0-9]{1,3}))?(?P<half>\s?[ap]\.?m\.?)?",
     re.IGNORECASE,
 )
 _HALF = re.compile(r"(?P<h>[0-9]{1,2})\.(?P<m>[0-9]{2})(?:\.(?P<s>[0-9]{2}))?\s?(?P<half>[ap]\.?m\.?)", re.IGNORECASE)
@@ -57,7 +57,8 @@ def usual_form(text: str) -> str:
     found = _MARKED.fullmatch(text)
     if found is not None:
         date = found["date"].replace("_", "-") if found["by"] or found["to"] else _with_marks(found["date"])
-        clock = f"{found['h']}:{found['m'] or found['tm']}:{found['s'] or found['ts'] or '00'}{found['f'] or ''}"
+        beyond = f".{found['milli']:>03}" if found["milli"] else found["f"] or ""
+        clock = f"{found['h']}:{found['m'] or found['tm']}:{found['s'] or found['ts'] or '00'}{beyond}"
         return f"{date} {clock}{found['half'] or ''}"
     found = _HALF.fullmatch(text)
     if found is not None:

@@ -130,6 +130,8 @@ class Words:
         digits = all(sum(map(str.isdigit, text)) >= _DIGITS_OF_STAMPS for text in self.texts)
         stamps = [bool(_STAMP.search(text)) for text in self.texts]
         few = self.complete and len(self.texts) > 1
+        if all(map(_VECTOR.fullmatch, self.texts)):
+            return False
         return digits and (all(stamps) or (few and all(text[:1].isdigit() for text in self.texts)))
 
 
@@ -139,6 +141,8 @@ NOTHING = {"shut", "closed", *(word for pair in (TRUTH, *PAIRS) for word, number
 UNKNOWN_DATES = "the column holds dates or times in a form that is not known"
 
 _STAMP = re.compile(r"[0-9]{1,4}[-./:_ TthH]+[0-9]{1,2}")
+_VECTOR = re.compile(r"[+-]?[0-9]+\.[0-9]+(?:[ ,;|]+[+-]?[0-9]+\.[0-9]+)+")
+"""Several numbers with decimals in one cell, as loggers write what a sensor has several of."""
 _DIGITS_OF_STAMPS = 4
 """So many digits in every text are a date or a time, or none that states have."""
 
