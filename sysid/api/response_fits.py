@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Dict
+from contextlib import suppress
 from typing import Any
 
 from sysid.api.estimates import FrequencyResponse
 from sysid.api.response_fit import ResponseFit, response_fit
+from sysid.api.response_left_out import left_out_errors
 from sysid.api.response_orders import FEWEST, MOST, ResponseOrderSearch, search_orders_of
 from sysid.api.response_problem import ResponseProblem, Weighting
-from sysid.errors import ConfigError
+from sysid.errors import ConfigError, UserError
 from sysid.estimation import TransferFunctionTraining
 from sysid.models import Domain, Mapping, TransferFunction
 from sysid.traces.measured_response import MeasuredResponse
@@ -104,7 +106,26 @@ def fit_response(
             got=type(structure).__name__,
             remedy="give one; other structures are fitted to samples over time",
         )
-    return response_fit(problem, problem.fitted(structure))
+    return fitted_structure(problem, structure)
+
+
+def fitted_structure(problem: ResponseProblem, structure: TransferFunction) -> ResponseFit:
+    """The fit of a structure, and how far it is off at frequencies that are left out of it.
+
+    Args:
+        problem: The response, and what counts of its errors.
+        structure: Its orders.
+
+    Returns:
+        The fit.
+
+    Raises:
+        UserError: As :func:`fit_response` does.
+    """
+    found = problem.fitted(structure)
+    with suppress(UserError):  # points that are just enough for all of them to be fitted
+        return response_fit(problem, found, left_out_errors(problem, structure, found))
+    return response_fit(problem, found)
 
 
 def search_response_orders(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.api.response_fit import ResponseFit, response_fit
+from sysid.api.response_left_out import left_out_errors
 from sysid.api.response_problem import POINTS_A_PERIOD, ResponseProblem
 from sysid.errors import ConfigError, UserError
 from sysid.estimation import TransferFunctionTraining
@@ -24,8 +25,6 @@ from sysid.models import Domain, TransferFunction, TransferFunctionModel
 if TYPE_CHECKING:
     import pandas as pd
 
-FOLDS = 5
-"""Parts of the frequencies, of which one is left out."""
 PATIENCE = 2
 """Orders that are tried beyond the best: a mode more brings two poles."""
 FEWEST, MOST = 1, 6
@@ -310,8 +309,8 @@ class _Search:
             else:
                 fixed = replace(structure, delays=begin.model.delays)
                 found = problem.fit_at(fixed, begin.model.sample_time, begin=begin.model)
-            fit = response_fit(problem, found)
-            left_out = _left_out(problem, structure, fit)
+            left_out = left_out_errors(problem, structure, found)
+            fit = response_fit(problem, found, left_out)
         except UserError as error:  # no start that stays finite
             self.failed.append(f"{poles} poles and {zeros} zeros were not fitted: {error.what}.")
             return
@@ -327,22 +326,6 @@ class _Search:
         seconds = 2.0 * max(one.dead_time for one in self.tried) + period
         sample_time = self.problem.sample_time or period / POINTS_A_PERIOD
         return replace(self.problem, training=replace(training, max_delay=int(np.ceil(seconds / sample_time))))
-
-
-def _left_out(problem: ResponseProblem, structure: TransferFunction, fit: ResponseFit) -> NDArray[np.float64]:
-    """The weighted squared error of each point in a fit without it and others as far apart."""
-    model = fit.model
-    assert isinstance(model, TransferFunctionModel)  # noqa: S101 - as above
-    if not model.stable:  # within the stable region its poles would not be begun where they are
-        problem = replace(problem, training=replace(problem.training or TransferFunctionTraining(), stable=False))
-    w, fixed = problem.measured.frequency, replace(structure, delays=model.delays)
-    part, errors = np.arange(len(w)) % FOLDS, np.empty(len(w))
-    for fold in range(FOLDS):
-        out = part == fold
-        found = problem.fit_at(fixed, model.sample_time, begin=model, kept=~out).model
-        assert isinstance(found, TransferFunctionModel)  # noqa: S101 - as above
-        errors[out] = np.abs(found.response(0, w[out]) - problem.measured.values[out]) ** 2
-    return np.asarray(problem.weights * errors)
 
 
 def _named(one: Tried) -> str:

@@ -23,6 +23,8 @@ from sysid.reporting.parts import Document
 from sysid.reporting.published.comparison import with_published
 from sysid.reporting.published.tables import PublishedTable, read_published
 from sysid.reporting.records import RESULTS_FILE, RunResults, parse_record, read_document
+from sysid.reporting.responses.document import response_document
+from sysid.reporting.responses.results import ResponseResults
 from sysid.reporting.results import Results, parse_results
 from sysid.reporting.run_scores import assembly_scores, fit_scores, judgement_scores
 from sysid.reporting.scores import Score
@@ -86,6 +88,13 @@ KINDS: Final = (
         record=JudgementResults,
         document=lambda _, results, __: judgement_document(results),
         scores=lambda results, _: judgement_scores(results),
+    ),
+    ResultsKind(
+        what="fits of measured frequency responses",
+        known=lambda document: document.get("kind") == "response",
+        record=ResponseResults,
+        document=lambda folder, results, _: response_document(folder, results),
+        scores=lambda _, __: [],
     ),
     ResultsKind(
         what="fits and sweeps",

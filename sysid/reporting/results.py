@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import Field
 
+from sysid.errors import ConfigError
 from sysid.reporting.advice.record import AdviceRecord
 from sysid.reporting.fit_records import FitRecord
 from sysid.reporting.frequency import HERTZ, FrequencyUnit
@@ -29,6 +30,9 @@ from sysid.reporting.records import (
 )
 from sysid.reporting.sweep_record import SweepSummary
 from sysid.traces import Role
+
+KINDS = ("fits", "sweep")
+"""Of the runs whose results these are."""
 
 
 class DataCaseRecord(Record):
@@ -227,10 +231,17 @@ def read_results(folder: Path) -> Results:
         The results.
 
     Raises:
-        ConfigError: If there is no results.json, it is damaged, or it was written by a newer release.
+        ConfigError: If there is no results.json, it is of a run of another kind, it is damaged, or it was written by a
+            newer release.
     """
     path = Path(folder) / RESULTS_FILE
-    return parse_results(read_document(path), where=path)
+    document = read_document(path)
+    if (kind := document.get("kind", "fits")) not in KINDS:
+        raise ConfigError(
+            "the run fitted no records", where=path, expected=f"a run of kind {' or '.join(KINDS)}", got=f"kind {kind}",
+            remedy="name another run, or the bundle that this one exported",
+        )  # fmt: skip
+    return parse_results(document, where=path)
 
 
 def write_results(folder: Path, results: Results) -> Path:

@@ -20,7 +20,7 @@ from sysid.reporting.sweep_record import SweepRecord
 BEGIN: Final = "<!-- keys: made by python -m sysid.reporting.schema_page docs/results.md -->"
 END: Final = "<!-- end of the keys -->"
 
-FIRST: Final = ("Results", "SweepRecord", "AssemblyResults", "JudgementResults")
+FIRST: Final = ("Results", "SweepRecord", "AssemblyResults", "JudgementResults", "ResponseResults")
 """The records that a file begins with; each is followed by those that it names."""
 
 TYPES: Final = {

@@ -115,6 +115,9 @@ KINDS: dict[str, Kind] = {
         program="sysid.workbench.experiments.run:program",
         data="sysid.workbench.experiments.data:ExperimentData",
     ),
+    "response": Kind(
+        config="sysid.workbench.responses.config:ResponseConfig", program="sysid.workbench.responses.run:program"
+    ),
     "sweep": Kind(config="sysid.workbench.sweep.config:SweepConfig", program="sysid.workbench.sweep.run:program"),
 }
 """The kinds by name."""

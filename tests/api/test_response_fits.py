@@ -33,7 +33,7 @@ def test_a_response_is_fitted_told_drawn_and_tabled() -> None:
     assert "damping 0.200" in str(fit.poles())
     table = fit.to_frame()
     np.testing.assert_allclose(table["model_phase"], table["phase"], atol=1e-6)
-    assert [axes.get_ylabel() for axes in fit.plot().axes] == ["gain [rad/A]", "phase [degrees]"]
+    assert [axes.get_ylabel() for axes in fit.plot().axes] == ["gain [rad/A]", "phase [degrees]", "error [%]"]
 
 
 def test_a_fit_of_fewer_poles_says_how_far_it_is_off() -> None:

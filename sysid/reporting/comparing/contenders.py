@@ -100,8 +100,13 @@ def contenders(folder: Path, results: RunResults) -> list[Contender]:
         One for each output, or subject.
 
     Raises:
-        ConfigError: If its signals are missing or damaged, or its figures have no names.
+        ConfigError: If its signals are missing or damaged, its figures have no names, or it ran over no cases.
     """
+    if type(results) not in MAKERS:
+        raise ConfigError(
+            "the run has no cases to compare", where=folder, expected="a run that fitted or judged records",
+            got=f"kind {results.kind}", remedy="set the fits in per cent of its results.json beside each other",
+        )  # fmt: skip
     return MAKERS[type(results)](Path(folder), results)
 
 

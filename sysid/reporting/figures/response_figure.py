@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from sysid.estimation import FitResult
 from sysid.estimation.nonparametric.impulse_response import ImpulseResponse
@@ -17,7 +19,13 @@ from sysid.reporting.linear_views import linear_views
 from sysid.traces.measured_response import MeasuredResponse
 from sysid.units import per
 
+if TYPE_CHECKING:
+    from sysid.reporting.linear.responses import Bode
+
+Array = NDArray[np.float64]
 BAND_COLOUR = "#DDDDDD"
+POINTS: dict[str, Any] = {"color": TARGET, "linestyle": "none", "marker": ".", "markersize": 4}
+"""How what was measured is drawn."""
 
 
 def impulse_figure(found: ImpulseResponse) -> Figure:
@@ -77,38 +85,60 @@ def response_figure(found: FrequencyResponse, fits: Sequence[FitResult] = (), un
         return figure
 
 
-def measured_figure(found: MeasuredResponse, fit: FitResult, unit: FrequencyUnit = HERTZ) -> Figure:
-    """A measured response point by point, and a model over it.
+def measured_figure(found: MeasuredResponse, model: Bode, label: str, unit: FrequencyUnit = HERTZ) -> Figure:
+    """A measured response point by point, a model over it with its 95 % band, and how far they are apart.
 
     Args:
         found: The response.
-        fit: A linear model of one input.
+        model: A model of one input, at the measured frequencies above 0.
+        label: What it is called.
         unit: Of frequencies.
 
     Returns:
-        Gain above, phase below.
+        Gain, phase and error, one below the other; and the coherence, where it was measured.
     """
-    w = found.frequency[found.frequency > 0.0]
-    values = found.values[found.frequency > 0.0]
-    model = fit.model.response(0, w) if hasattr(fit.model, "response") else np.full(len(w), np.nan)
-    ends = fit.model.ends
+    seen = found.frequency > 0.0
+    w, values = found.frequency[seen], found.values[seen]
+    panels = 3 if found.coherence is None else 4
     with styled():
-        figure = new_figure(7.6, 5.0)
-        above, below = figure.subplots(2, 1, sharex=True)
-        look = {"color": PALETTE[0]}
-        points = {"color": TARGET, "linestyle": "none", "marker": ".", "markersize": 4}
-        above.loglog(unit.told(w), np.abs(values), label="measured", **points)
-        above.loglog(unit.told(w), np.abs(model), label=fit.model.label, **look)
-        measured, phase = (np.degrees(np.unwrap(np.angle(one))) for one in (values, model))
-        phase += 360.0 * np.round(np.median(measured - phase) / 360.0)
-        below.semilogx(unit.told(w), measured, **points)
-        below.semilogx(unit.told(w), phase, **look)
-        units = ends.units[ends.outputs[0]], ends.units[ends.inputs[0]]
-        above.set_ylabel(f"gain [{per(*units)}]")
-        below.set_ylabel("phase [degrees]")
-        below.set_xlabel(unit.label)
-        above.legend(loc="lower left")
+        figure = new_figure(7.6, 2.2 * panels)
+        ratios = [2.0, 1.6, 1.2, 1.0][:panels]
+        above, below, error, *last = figure.subplots(panels, 1, sharex=True, height_ratios=ratios)
+        at = unit.told(w)
+        _over_points(above, below, (at, values), model, label)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = 100.0 * np.abs(model.values[:, 0] / values - 1.0)
+        error.loglog(at, np.where(off > 0.0, off, np.nan), **POINTS)
+        error.set_ylabel("error [%]")
+        if found.coherence is not None:
+            (place,) = last
+            place.semilogx(at, found.coherence[seen], color=PALETTE[2])
+            place.set_ylim(0.0, 1.02)
+            place.set_ylabel("coherence")
+        (*_, lowest) = figure.axes
+        lowest.set_xlabel(unit.label)
         return figure
+
+
+def _over_points(
+    above: Axes, below: Axes, measured: tuple[Array, NDArray[np.complex128]], model: Bode, label: str
+) -> None:
+    """Gain and phase as measured, and a model's with its band over them."""
+    at, values = measured
+    phase = np.degrees(np.unwrap(np.angle(values)))
+    turns = 360.0 * np.round(np.median(phase - model.phase[:, 0]) / 360.0)
+    bands = (above, model.gain_low, model.gain_high, 0.0), (below, model.phase_low, model.phase_high, turns)
+    for axes, low, high, shift in bands:
+        if np.isfinite(low).any():
+            named = "95 % of the model" if axes is above else None
+            axes.fill_between(at, low[:, 0] + shift, high[:, 0] + shift, color=BAND_COLOUR, label=named)
+    above.loglog(at, np.abs(values), label="measured", **POINTS)
+    above.loglog(at, model.gain[:, 0], color=PALETTE[0], label=label)
+    below.semilogx(at, phase, **POINTS)
+    below.semilogx(at, model.phase[:, 0] + turns, color=PALETTE[0])
+    above.set_ylabel(f"gain [{per(*model.units[0])}]")
+    below.set_ylabel("phase [degrees]")
+    above.legend(loc="lower left")
 
 
 def _measured(above: Axes, below: Axes, found: FrequencyResponse, j: int, unit: FrequencyUnit) -> None:

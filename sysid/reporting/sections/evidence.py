@@ -158,31 +158,53 @@ def _residual_table(results: Results, residuals: dict[str, dict[str, GroupRecord
 
 
 def _responses(folder: Path, fit: FitRecord, unit: FrequencyUnit) -> list[Part]:
-    stored = _read_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
-    if stored is None or stored.model.pole_radius is None:
-        return []
-    model, uncertainty, name = stored.model, stored.uncertainty, identifier(fit.slug)
-    if not linear_views(model, None):  # no input moves it: there is no response to draw
-        return []
-    poles = modes_table(fit.name, stored)
-    band = "Grey: 95 % of what the covariance of the parameters allows." if uncertainty else "Uncertainty not known."
+    stored = read_stored_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
+    if stored is None or stored.model.pole_radius is None or not linear_views(stored.model, None):
+        return []  # where no input moves it, there is no response to draw
+    band = (
+        "Grey: 95 % of what the covariance of the parameters allows."
+        if stored.uncertainty
+        else "Uncertainty not known."
+    )
+    name = identifier(fit.slug)
     return [
         picture(
-            bode_figure(bode_of([(model, uncertainty)]), unit),
+            bode_figure(bode_of([(stored.model, stored.uncertainty)]), unit),
             f"Bode diagram of {fit.name}",
             f"{fit.name}, {fit.label}: frequency response up to the Nyquist frequency. {band}",
             f"bode-{name}",
         ),
+        *step_and_poles(fit.name, stored, name),
+    ]
+
+
+def step_and_poles(title: str, stored: FitResult, name: str) -> list[Part]:
+    """Step responses of a linear fit, and its poles and zeros, drawn and as a table.
+
+    Args:
+        title: What it is called.
+        stored: The fit.
+        name: Unique within the page; letters, digits and dashes.
+
+    Returns:
+        The parts; none of a model that no input moves.
+    """
+    model, uncertainty = stored.model, stored.uncertainty
+    if not linear_views(model, None):  # no input moves it: there is no response to draw
+        return []
+    poles = modes_table(title, stored)
+    band = "Grey: 95 % of what the covariance of the parameters allows." if uncertainty else "Uncertainty not known."
+    return [
         picture(
             step_figure(step_of([(model, uncertainty)])),
-            f"Step responses of {fit.name}",
-            f"{fit.name}: change of the output after a step of one unit in each input. {band}",
+            f"Step responses of {title}",
+            f"{title}: change of the output after a step of one unit in each input. {band}",
             f"step-{name}",
         ),
         picture(
             pole_zero_figure(linear_views(model, uncertainty)),
-            f"Poles and zeros of {fit.name}",
-            f"{fit.name}: poles (crosses) and zeros (circles) by input. Grey: poles of models drawn from the "
+            f"Poles and zeros of {title}",
+            f"{title}: poles (crosses) and zeros (circles) by input. Grey: poles of models drawn from the "
             "distribution of the parameters. What lies far outside the unit circle is counted in the legend.",
             f"poles-{name}",
         ),
@@ -194,7 +216,7 @@ def _parameters(folder: Path, fit: FitRecord) -> list[Table]:
     # Only names that somebody gave, or that the field has, mean something.
     if "equations" not in fit.structure and fit.structure.get("kind") != ProcessModel.kind:
         return []
-    stored = _read_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
+    stored = read_stored_fit(folder / "fits" / (fit.model_slug or fit.slug) / "fit.json")
     return [] if stored is None else parameter_tables(fit, stored)
 
 
@@ -209,7 +231,7 @@ def _curves(folder: Path, fit: FitRecord) -> list[Picture]:
     return [picture(curves_figure(curves), f"Static curves of {fit.name}", caption, f"curves-{identifier(fit.slug)}")]
 
 
-def _read_fit(path: Path) -> FitResult | None:
+def read_stored_fit(path: Path) -> FitResult | None:
     """The stored fit; ``None`` if the run stored none."""
     try:
         return FitResult.from_dict(read_json(path))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from sysid.reporting.fit_records import RunTimeRecord
+from collections.abc import Sequence
+
+from sysid.reporting.fit_records import ExportRecord, RunTimeRecord
 from sysid.reporting.numbers import number
 from sysid.reporting.results import Results
 from sysid.reporting.tables import Cell, Table
@@ -17,18 +19,29 @@ def exported_run_times(results: Results) -> Table | None:
     Returns:
         A row for each file and number of cars; ``None`` where none were measured.
     """
+    return run_times_of([(fit.name, export) for fit in results.fits for export in fit.exports])
+
+
+def run_times_of(exports: Sequence[tuple[str, ExportRecord]]) -> Table | None:
+    """The table of some files.
+
+    Args:
+        exports: Each with the name of its model.
+
+    Returns:
+        A row for each file and number of cars; ``None`` where none were measured.
+    """
     rows = [
         (
             Cell(text=export.format, header=True),
-            Cell(text=fit.name),
+            Cell(text=name),
             Cell(text=export.file),
             Cell(text=str(one.cars), value=float(one.cars)),
             Cell(text=number(1e3 * one.seconds, digits=3), value=one.seconds),
             _own(one),
             Cell(text=number(one.ratio, digits=3), value=one.ratio),
         )
-        for fit in results.fits
-        for export in fit.exports
+        for name, export in exports
         for one in export.run_times
     ]
     if not rows:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from sysid.workbench.commands.reader_options import META, ReaderCommand
+from sysid.workbench.commands.reader_options import META, TYPED, ReaderCommand
 
 commands = typer.Typer()
 
@@ -148,16 +148,26 @@ def fit_response(
         typer.Option(metavar="ROLE=UNIT", help="frequency=Hz, kHz or rad/s, gain=dB or 1, phase=deg or rad; repeated."),
     ] = None,
     frequency: Annotated[str, typer.Option(help="Unit of the frequencies that are drawn: Hz or rad/s.")] = "Hz",
-    out: Annotated[Path | None, typer.Option(help="Folder of the bundle to write: C, ONNX, model.json.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Do everything again, whatever is stored.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results; runs/response-<file> by default.")] = None,
+    no_tracking: Annotated[bool, typer.Option("--no-tracking", help="Leave MLflow out.")] = False,
 ) -> None:
-    """Fit a transfer function to a measured frequency response, as a sweep or an analyser saves it."""
-    from sysid.workbench.commands.fit_response import ResponseWish, fit_response_command
+    """Fit a transfer function to a measured frequency response, as a sweep or an analyser saves it.
 
-    fit_response_command(
-        ResponseWish(
-            source=source, poles=poles, zeros=zeros, dead_time=dead_time, sample_time=sample_time, discrete=discrete,
-            weighting=weighting, mapping=mapping, columns=column or [], units=unit or [], frequency=frequency, out=out,
-            reading=ctx.meta[META],
+    Exports it and reports how well it is known; a pipeline of kind response is the same as a file.
+    """
+    from sysid.workbench.commands.fit_response import fit_response_command
+
+    given = {
+        **{"poles": poles or None, "zeros": zeros, "dead_time": dead_time, "sample_time": sample_time},
+        **{"domain": "discrete" if discrete else None, "weighting": weighting, "mapping": mapping, "seed": seed},
+        "report": {"frequency": frequency},
+    }
+    raise typer.Exit(
+        fit_response_command(
+            source, given=given, columns=column or [], units=unit or [], reading=ctx.meta[META],
+            typed=ctx.meta[TYPED], fresh=fresh, out=out, tracking=not no_tracking,
         )
     )  # fmt: skip
 

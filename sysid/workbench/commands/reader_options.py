@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 META = "sysid.reader_options"
 """Where a command finds what was given, in the context's ``meta``."""
+TYPED = "sysid.typed"
+"""Where it finds every word that was typed behind its name."""
 
 _APART = frozenset({"columns", "units", "references"})
 """What the proposal itself says of each channel."""
@@ -68,7 +70,7 @@ class ReaderCommand(TyperCommand):
             word for word in args if word.startswith("--") and word.split("=", 1)[0] not in {*own, "--help", "--"}
         ]
         given, rest = take_options(args, whole=self.whole) if foreign else ({}, args)
-        ctx.meta[META] = given
+        ctx.meta[META], ctx.meta[TYPED] = given, tuple(args)
         return super().parse_args(ctx, rest)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:

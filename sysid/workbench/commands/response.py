@@ -17,7 +17,9 @@ from sysid.names import slug
 from sysid.reporting.figures.style import styled
 from sysid.reporting.figures.svg import as_file, svg
 from sysid.reporting.frequency import FrequencyUnit
+from sysid.reporting.kinds import read_run
 from sysid.reporting.linear.responses import Bode, StepResponse
+from sysid.reporting.responses.results import ResponseResults
 from sysid.reporting.results import read_results
 from sysid.workbench.fits.record import read_fit
 from sysid.workbench.runner.console import console
@@ -98,6 +100,15 @@ def parse_frequencies(words: str, unit: FrequencyUnit) -> NDArray[np.float64]:
 
 def _fits(folder: Path, name: str | None) -> list[FitResult]:
     """The models of a fit of a run, the best by default."""
+    run = read_run(folder)
+    if isinstance(run, ResponseResults):  # each of its fits is a pair of input and output
+        pairs = {fit.mapping: fit.slug for fit in run.fits}
+        asked = pairs if name is None else {name: pairs.get(name)}
+        if None in asked.values():
+            raise ConfigError.unknown(
+                f"there is no fit named {name}", str(name), pairs, "leave --fit out", where=folder
+            )
+        return [read_fit(RunFolder(path=folder).fit(str(place))) for place in asked.values()]
     results = read_results(folder)
     if name is None and results.best is None:
         raise ConfigError("no fit was chosen", where=folder, remedy="name one with --fit")

@@ -14,7 +14,24 @@ from sysid.workbench.old_words import STRICT
 from sysid.workbench.stability import StabilityConfig
 
 
-class ExportConfig(BaseModel):
+class FilesConfig(BaseModel):
+    """The files that a model leaves the workbench as.
+
+    Args:
+        formats: File formats; by default ONNX and C, as far as they can be written here.
+        tolerance: Largest difference allowed between a file and its model, in the output's unit; by default 1e-9 of the
+            largest value that each output has over the cases.
+        run_times: Whether every file is timed beside the model's own free run; some seconds a format.
+    """
+
+    model_config = STRICT
+
+    formats: tuple[FormatField, ...] | None = None
+    tolerance: float | None = Field(default=None, gt=0.0)
+    run_times: bool = False
+
+
+class ExportConfig(FilesConfig):
     """What leaves the workbench.
 
     Args:
@@ -30,12 +47,7 @@ class ExportConfig(BaseModel):
             sample.
     """
 
-    model_config = STRICT
-
     fit: str = "best"
-    formats: tuple[FormatField, ...] | None = None
-    tolerance: float | None = Field(default=None, gt=0.0)
-    run_times: bool = False
     case: str | None = None
     unstable: bool = True
     input_levels: dict[str, FiniteFloat] = Field(default_factory=dict)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid.estimation import FitResult
+from sysid.reporting.responses.results import ResponseResults
 from sysid.reporting.sweep_record import SweepRecord
 from sysid.traces import TraceSet
 from sysid.validation import Evaluation
@@ -195,6 +196,27 @@ class JudgementReady(Event):
     document: Path
     command: str
     chosen: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ResponseReady(Event):
+    """A fit to a measured frequency response, its files and its page are on disk.
+
+    Args:
+        results: The contents of ``results.json``.
+        key: Digest of everything that the fit depends on.
+        stored: Whether it comes from an earlier run.
+        page: The HTML file.
+        document: The results as JSON.
+        bundle: The exported files, where there are some.
+    """
+
+    results: ResponseResults
+    key: str
+    stored: bool
+    page: Path
+    document: Path
+    bundle: Path | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -32,7 +32,7 @@ class Entities:
     param: Callable[..., Any]
 
 
-def known_run(client: Any, experiment: str, ready: FitReady, *, key_tag: str) -> str | None:
+def known_run(client: Any, experiment: str, key: str, *, key_tag: str) -> str | None:
     """The run that tracks this very fit already; what a killed process left half logged is removed.
 
     A fit has one run. What is removed lies in the trash of MLflow until it is emptied there.
@@ -40,13 +40,13 @@ def known_run(client: Any, experiment: str, ready: FitReady, *, key_tag: str) ->
     Args:
         client: A client of the tracking store.
         experiment: Where the fit's mapping is tracked.
-        ready: The fit.
+        key: Digest of the fit.
         key_tag: Tag that holds a run's digest.
 
     Returns:
         The run's identifier; ``None`` if there is none that is whole.
     """
-    found = client.search_runs([experiment], filter_string=f"tags.`{key_tag}` = '{ready.key}'")
+    found = client.search_runs([experiment], filter_string=f"tags.`{key_tag}` = '{key}'")
     for run in found:
         if run.info.status in _HALF_LOGGED:
             client.delete_run(run.info.run_id)

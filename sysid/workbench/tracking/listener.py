@@ -25,6 +25,7 @@ from sysid.workbench.runner.events import (
     FitReady,
     JudgementReady,
     ReportReady,
+    ResponseReady,
     RunStarted,
     SweepReady,
 )
@@ -35,6 +36,7 @@ from sysid.workbench.tracking import mlflow_store as tracking
 from sysid.workbench.tracking import mlflow_views as views
 from sysid.workbench.tracking.judgement_run import log_judgement
 from sysid.workbench.tracking.moved_store import ARTIFACTS
+from sysid.workbench.tracking.response_run import log_files, new_run, run_name
 from sysid.workbench.tracking.served_table import SEQUENCE_FILE
 from sysid.workbench.tracking.sqlite_store import SQLITE
 from sysid.workbench.tracking.sweep_run import experiment_name, log_sweep
@@ -53,6 +55,19 @@ def _in_words(error: Exception) -> str:
     if known is None:
         return f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
     return f"{known.what}: {known.got}; {known.remedy}"
+
+
+def registered_as(ready: FitReady, whole: str) -> tuple[str, str]:
+    """Under which mapping a model is registered, and as which fit.
+
+    Args:
+        ready: The fit that was exported.
+        whole: What its files map, where that is more than the fit's own output; else empty.
+
+    Returns:
+        Both.
+    """
+    return whole or str(ready.pipeline.mapping), (ready.system if whole else None) or ready.config.name
 
 
 @dataclass(kw_only=True, eq=False)
@@ -115,6 +130,8 @@ class Tracker:
                 self._log_report(event)
             case JudgementReady():
                 self._log_judgement(event)
+            case ResponseReady():
+                self._log_response(event)
             case SweepReady():
                 self._log_sweep(event)
             case _:
@@ -124,7 +141,7 @@ class Tracker:
         if self.client is None or self.run is None or self.data is None:
             return
         experiment = tracking.experiment_of(self.client, str(ready.pipeline.mapping), self.artifacts, about=ABOUT_FITS)
-        known = tracked_fit.known_run(self.client, experiment, ready, key_tag=KEY_TAG)
+        known = tracked_fit.known_run(self.client, experiment, ready.key, key_tag=KEY_TAG)
         if known is not None and ready.stored:
             self.run_ids[ready.config.name] = known
             return
@@ -169,9 +186,12 @@ class Tracker:
             self.client.log_artifact(run_id, str(packed))
         sequence = next((entry for entry in ready.exports if Path(entry["file"]).name == SEQUENCE_FILE), None)
         if sequence is not None and self.data is not None and not ready.told:
+            mapping, fit = registered_as(ready.of, ready.mapping)
+            name = slug(tracked.run_name(ready.of))
             tracking.log_model(
-                self.client, ready.folder, ready.of, ready.mapping, uri=self.uri, run_id=run_id, traces=self.data.traces
-            )
+                self.client, ready.folder, mapping, name=name, fit=fit, uri=self.uri, run_id=run_id,
+                traces=self.data.traces,
+            )  # fmt: skip
         self._describe(self.client.get_run(run_id).info.experiment_id, run_id, ready.of, exported=True)
         self.client.set_tag(run_id, "exported", "yes")
 
@@ -181,6 +201,22 @@ class Tracker:
         experiment = tracking.experiment_of(self.client, ready.pipeline, self.artifacts, about=ABOUT_JUDGEMENTS)
         metric = tracking.entities().metric
         log_judgement(self.client, ready, key_tag=KEY_TAG, experiment=experiment, metric=metric)
+
+    def _log_response(self, ready: ResponseReady) -> None:
+        if self.client is None or self.run is None:
+            return
+        fit = ready.results.fits[0]
+        experiment = tracking.experiment_of(self.client, fit.mapping, self.artifacts, about=ABOUT_FITS)
+        run_id = tracked_fit.known_run(self.client, experiment, ready.key, key_tag=KEY_TAG)
+        if run_id is None or not ready.stored:
+            run_id = new_run(self.client, experiment, ready, self.run, tracking.entities(), key_tag=KEY_TAG)
+        new = log_files(self.client, run_id, ready)
+        views.show(self.client, experiment, [])
+        if new and ready.bundle is not None and (ready.bundle / SEQUENCE_FILE).is_file():
+            tracking.log_model(
+                self.client, ready.bundle, fit.mapping, name=slug(run_name(fit)), fit=self.run.pipeline, uri=self.uri,
+                run_id=run_id,
+            )  # fmt: skip
 
     def _log_sweep(self, ready: SweepReady) -> None:
         if self.client is None:

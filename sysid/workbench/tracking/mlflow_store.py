@@ -28,8 +28,6 @@ from sysid.export.manifest import MANIFEST
 from sysid.extras import need
 from sysid.names import markdown_inline, read_sides, slug, told_apart, tracking_text
 from sysid.traces import TraceSet
-from sysid.workbench.runner.events import FitReady
-from sysid.workbench.tracking import fit_values as tracked
 from sysid.workbench.tracking import mlflow_views as views
 from sysid.workbench.tracking.fit_run import Entities
 from sysid.workbench.tracking.landing import VARIABLE, App, leading_to
@@ -228,18 +226,27 @@ def log_data(client: Any, run_id: str, traces: TraceSet) -> None:
 
 
 def log_model(
-    client: Any, bundle: Path, ready: FitReady, mapping: str = "", *, uri: str, run_id: str, traces: TraceSet
+    client: Any,
+    bundle: Path,
+    mapping: str,
+    *,
+    name: str,
+    fit: str,
+    uri: str,
+    run_id: str,
+    traces: TraceSet | None = None,
 ) -> None:
     """Log the exported surrogate as a model that MLflow can load and serve, and as the newest in the registry.
 
     Args:
         client: An ``MlflowClient``.
         bundle: The folder that holds its ``sequence.onnx``.
-        ready: The fit that was exported.
-        mapping: What the bundle maps, where that is more than the fit's own output.
+        mapping: What it maps.
+        name: Of the logged model.
+        fit: Name of the fit that was exported.
         uri: The tracking URI.
         run_id: The fit's run.
-        traces: The data; an example of inputs is taken from it.
+        traces: The data, of which an example of inputs is taken; without any they stand still.
     """
     import mlflow
     from mlflow.models import Model
@@ -248,15 +255,14 @@ def log_model(
     mlflow.set_tracking_uri(uri)
     try:
         with mlflow.start_run(run_id=run_id):
-            name = slug(tracked.run_name(ready))
             logged = Model.log(None, name=name, flavor=_Flavor, bundle=bundle, traces=traces)
         register(
             client,
-            mapping or str(ready.pipeline.mapping),
+            mapping,
             source=logged.model_uri,
             run_id=run_id,
             model_id=logged.model_id,
-            fit=(ready.system if mapping else None) or ready.config.name,
+            fit=fit,
             description=markdown_inline(in_short(read_json(bundle / MANIFEST))),
         )
     finally:
@@ -271,7 +277,7 @@ class _Flavor:
     """How MLflow is to save a surrogate: tables in and out for ``mlflow.pyfunc``, the graph for ``mlflow.onnx``."""
 
     @staticmethod
-    def save_model(path: str, mlflow_model: Any, *, bundle: Path, traces: TraceSet) -> None:
+    def save_model(path: str, mlflow_model: Any, *, bundle: Path, traces: TraceSet | None) -> None:
         """What :meth:`Model.log` calls.
 
         Args:
@@ -322,15 +328,16 @@ class _Flavor:
         mlflow_model.save(str(Path(path) / "MLmodel"))
 
 
-def _example(about: dict[str, Any], traces: TraceSet) -> Any:
-    """A few samples of the first trace; where it lacks an input, that stands still."""
+def _example(about: dict[str, Any], traces: TraceSet | None) -> Any:
+    """A few samples of the first trace; an input that it lacks stands still."""
     import pandas as pd
 
-    trace, values = traces.traces[0], about["initialisation"]["values"]
+    trace, values = None if traces is None else traces.traces[0], about["initialisation"]["values"]
     columns = {}
     for channel in about["inputs"]:
         name = channel["name"]
-        columns[label(channel)] = trace[name][:8] if name in trace.channel_names else np.full(8, float(values[name]))
+        there = trace is not None and name in trace.channel_names
+        columns[label(channel)] = trace[name][:8] if trace is not None and there else np.full(8, float(values[name]))
     return pd.DataFrame(columns)
 
 
