@@ -9,12 +9,10 @@ from __future__ import annotations
 import os
 import stat
 import tempfile
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
 
-_told: list[Callable[[], None]] = []
+from sysid.compilation import listen
 
 
 def own_folder(name: str) -> Path:
@@ -49,34 +47,7 @@ def keep_kernels_where_it_is_allowed() -> None:
         numba.njit(cache=True)(_nothing)  # looks for its folder, and compiles nothing before it is called
     except RuntimeError:
         os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = str(own_folder("kernels"))
-    if _told:
-        _listen()
-
-
-def tell_of_compiling(tell: Callable[[], None]) -> None:
-    """Have somebody told, once, when something is compiled that was not kept yet.
-
-    Args:
-        tell: Called as the first compilation begins. Has to be given before what computes is imported.
-    """
-    _told.append(tell)
-
-
-def _listen() -> None:
-    from numba.core import event
-
-    class FirstCompilation(event.Listener):  # type: ignore[misc]  # Numba has no types
-        """Tells once."""
-
-        def on_start(self, _: Any) -> None:
-            """Something is compiled, and was not found among what is kept."""
-            while _told:
-                _told.pop()()
-
-        def on_end(self, _: Any) -> None:
-            """It is compiled."""
-
-    event.register("numba:compile", FirstCompilation())
+    listen()
 
 
 def _nothing() -> None:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numba
 import pytest
-from numba.core import event
 
 from sysid.ingest.datasets.cache import default_cache_folder
-from sysid.own_folders import keep_kernels_where_it_is_allowed, own_folder, tell_of_compiling
+from sysid.own_folders import keep_kernels_where_it_is_allowed, own_folder
 
 
 @pytest.fixture(autouse=True)
@@ -70,22 +68,3 @@ def test_who_has_no_home_has_a_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SYSID_CACHE", raising=False)
     monkeypatch.setattr(Path, "home", no_home)
     assert default_cache_folder() == own_folder("cache")
-
-
-def test_who_waits_for_the_first_compilation_is_told_once(monkeypatch: pytest.MonkeyPatch, temporary: Path) -> None:
-    """The first command after an installation had compiled for half a minute without a word."""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(temporary / "chosen"))
-    told: list[str] = []
-    listening: list[tuple[str, Any]] = []
-    monkeypatch.setattr(event, "register", lambda kind, one: listening.append((kind, one)))
-    keep_kernels_where_it_is_allowed.__wrapped__()
-    assert listening == []  # nobody asked
-    tell_of_compiling(lambda: told.append("compiling"))
-    keep_kernels_where_it_is_allowed.__wrapped__()
-    ((kind, one),) = listening
-    monkeypatch.undo()
-    with event.install_listener(kind, one):
-        assert told == []
-        numba.njit(lambda x: x + 1.0)(1.0)
-        numba.njit(lambda x: x + 2.0)(1.0)
-    assert told == ["compiling"]

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sysid.compilation import tell_of_compiling
 from sysid.errors import SysidError
-from sysid.own_folders import tell_of_compiling
 from sysid.workbench.command_line import models, pipelines, records, surrogates, workspaces
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,7 +14,7 @@ from sysid.errors import SysidError
 from sysid.traces import Trace
 from sysid.workbench.assembly.config import AssemblyConfig
 from sysid.workbench.fits.estimates import network_time
-from sysid.workbench.runner.dry_run import PATIENCE_S
+from sysid.workbench.runner.dry_run import PATIENCE_S, worked_s
 from sysid.workbench.runner.steps import NOT_KNOWN, Estimate
 
 
@@ -72,11 +71,11 @@ class RoundEstimates:
     def _found(self) -> dict[str, Estimate]:
         if not self.data:
             return {}
-        began, found = time.process_time(), dict[str, Estimate]()
+        began, found = worked_s(), dict[str, Estimate]()
         try:
             for name, timed in self._timed(self.data[0]):
                 found[name] = _estimate(timed)
-                if time.process_time() - began > PATIENCE_S:
+                if worked_s() - began > PATIENCE_S:
                     break
         except SysidError:  # a run says what is wrong, when it comes to it
             pass
