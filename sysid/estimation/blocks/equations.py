@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -17,8 +18,9 @@ from sysid.models.blocks.curves import NONE, Curve, Text, number, sizeable
 
 
 def hammerstein_wiener(
-    structure: HammersteinWiener, mapping: Mapping, begun: LinearStart, block: Block
-) -> tuple[GreyBox, frozenset[str]]:
+    structure: HammersteinWiener, mapping: Mapping, begun: LinearStart, block: Block,
+    bends: Dict[str, float] | None = None,
+) -> tuple[GreyBox, frozenset[str]]:  # fmt: skip
     """The equations of a Hammerstein-Wiener model.
 
     Args:
@@ -26,6 +28,7 @@ def hammerstein_wiener(
         mapping: Which channels go in, which comes out.
         begun: The linear model.
         block: The same as a block.
+        bends: Where parameters of the curve behind it begin; the identity by default.
 
     Returns:
         The grey box, and the names of the parameters of curves.
@@ -42,7 +45,7 @@ def hammerstein_wiener(
     if curve.given:
         right = text.curve(curve, text.define("unbent", f"{in_units}*{inside}"), tag)
     else:
-        right = f"{in_units}*({text.curve(curve, inside, tag)})"
+        right = f"{in_units}*({text.curve(curve, inside, tag, bends)})"
     text.lines.append(f"{written_name(mapping.output)} = {right}")
     return _grey(text), frozenset(text.curved)
 

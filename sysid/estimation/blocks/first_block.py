@@ -61,7 +61,7 @@ class _Rest:
 
 def searched(
     begun: Sequence[Block], second: int, signals: tuple[Array, Array], *, direct: Sequence[bool], slowest: float,
-    rng: np.random.Generator, until: float,
+    rng: np.random.Generator, until: float, moved: int = MOVED,
 ) -> list[tuple[float, Pair]]:  # fmt: skip
     """Pairs of blocks around a curve, what lies between scaled to -1 to 1, and the curve to what it is along a line.
 
@@ -73,6 +73,7 @@ def searched(
         slowest: The longest time constant that is drawn, in samples.
         rng: Source of randomness.
         until: When no more is tried, on the clock of ``sysid.estimation.clock.now``.
+        moved: How many are moved to where the error is least.
 
     Returns:
         Mean squared errors and the pairs that leave them, the best first.
@@ -85,7 +86,7 @@ def searched(
             break
         ranked.append((_size(_behind(block.filtered(w), y, second, rounds=RANKED)), at))
     found: list[tuple[float, Pair]] = []
-    for at in _apart(sorted(ranked))[:MOVED]:
+    for at in _apart(sorted(ranked))[:moved]:
         if found and now() > until:
             break
         block = _moved(tried[at], w, y, second, direct)

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from sysid.errors import TraceError
 from sysid.estimation.blocks.equations import hammerstein_wiener, wiener_hammerstein
+from sysid.estimation.blocks.first_block import searched
 from sysid.estimation.blocks.grown import grown
 from sysid.estimation.blocks.linear_start import LinearStart, integrating_start, linear_start, parted, shifted, whole
+from sysid.estimation.blocks.sections import Block
 from sysid.estimation.clock import now
 from sysid.estimation.grey_box.fit import fit_equations, raced_equations
 from sysid.estimation.grey_box.layout import Begun
@@ -28,6 +30,7 @@ from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import FitResult
 from sysid.models import BuiltModel, GreyBox, HammersteinWiener, Mapping, Start, WienerHammerstein
 from sysid.models.blocks.block_oriented import BlockStructure
+from sysid.models.blocks.curve_starts import TURNS, CurveStart, curve_start
 from sysid.models.blocks.curves import Text
 from sysid.traces import Trace
 
@@ -47,6 +50,12 @@ SLOWER = 2.0
 """How much slower than the slowest of the linear model the slowest pole is that is added."""
 
 Array = NDArray[np.float64]
+
+NETWORK, LINE = "network", 50
+"""Kind of a curve that has weights, and places along a straight line at which one is told that it is none."""
+
+TURNING = 3
+"""Blocks that are moved to where a curve behind them that may turn back leaves least."""
 
 UNSCALED = (0.0, 1.0, 1.0)
 """Norms of the network of a curve whose argument ranges from -1 to 1."""
@@ -119,6 +128,14 @@ class _Records:
         """The records without dead times."""
         return shifted(self.traces, self.mapping, structure.lags(len(self.mapping.inputs)))
 
+    def signals(self, structure: BlockStructure, begun: LinearStart) -> tuple[Array, Array]:
+        """Inputs and output of the longest record as the linear model has them."""
+        longest = max(self.late(structure), key=len)
+        return (
+            begun.scaling.scale_inputs(longest.columns(self.mapping.inputs)),
+            begun.scaling.scale_output(longest[self.mapping.output]),
+        )
+
     def template(self, structure: BlockStructure, grey: GreyBox) -> tuple[BuiltModel, tuple[Experiment, ...]]:
         """The model before its fit, and the records as they are fitted."""
         return built_template(
@@ -135,12 +152,14 @@ class _Ways:
         weights: Of their networks; empty for networks that do nothing.
         scattered: Names of the parameters around which further starts are drawn.
         slowest: The longest time constant of the linear model, in samples.
+        nets: Networks among the curves.
     """
 
     greys: Sequence[GreyBox]
     weights: Sequence[Array]
     scattered: frozenset[str]
     slowest: float
+    nets: int = 1
 
     @property
     def names(self) -> list[str]:
@@ -151,7 +170,7 @@ class _Ways:
     def begins(self) -> list[Begun]:
         """The same as starts."""
         return [
-            Begun(parameters=np.array([one.start for one in grey.free]), weights=weights, norms=UNSCALED)
+            Begun(parameters=np.array([one.start for one in grey.free]), weights=weights, norms=UNSCALED * self.nets)
             for grey, weights in zip(self.greys, self.weights, strict=True)
         ]
 
@@ -172,10 +191,37 @@ def _hammerstein_wiener_ways(
         ways.insert(0, stepping)
     direct = [lag == 0 for lag in structure.lags(len(mapping.inputs))]
     greys = [hammerstein_wiener(structure, mapping, one, whole(one, direct=direct)) for one in ways]
+    weights, curves = [np.zeros(0)] * len(greys), (*structure.curves(len(mapping.inputs)), structure.output)
+    line = np.linspace(-1.0, 1.0, LINE)
+    for block, level, like in _turning(records, structure, training, begun, direct):
+        greys.append(hammerstein_wiener(structure, mapping, level, block, like.bends))
+        straight = [one.weights(line, line) for one in curves[:-1]] if len(like.weights) else []
+        weights.append(np.concatenate([*straight, like.weights]))
     return _Ways(
-        greys=[grey for grey, _ in greys], weights=[np.zeros(0)] * len(greys), scattered=greys[0][1],
-        slowest=begun.slowest,
+        greys=[grey for grey, _ in greys], weights=weights, scattered=greys[0][1], slowest=begun.slowest,
+        nets=sum(one.kind == NETWORK for one in curves),
     )  # fmt: skip
+
+
+def _turning(
+    records: _Records, structure: HammersteinWiener, training: Training, begun: LinearStart, direct: Sequence[bool]
+) -> list[tuple[Block, LinearStart, CurveStart]]:
+    """Blocks that are sought with a curve behind them that may turn back: of a square no linear model knows."""
+    if begun.integrates or structure.output.kind not in TURNS or training.n_starts < 2:
+        return []
+    w, y = records.signals(structure, begun)
+    pairs = searched(
+        [whole(begun, direct=direct)], 0, (w, y), direct=direct, slowest=begun.slowest,
+        rng=np.random.default_rng(training.seed), until=now() + LINEAR * training.max_time_s, moved=TURNING,
+    )  # fmt: skip
+    found = []
+    for _, pair in pairs[: training.n_starts // 2]:
+        like = curve_start(structure.output, pair.x, y[: len(pair.x)])
+        if like is not None:
+            block = replace(pair.before, gains=like.scale * pair.before.gains, direct=like.scale * pair.before.direct)
+            stood = float(block.filtered(np.tile(w[0], (len(w), 1)))[-1])  # what was sought began at 0 there
+            found.append((block, replace(begun, level=like.level - stood), like))
+    return found
 
 
 def _wiener_hammerstein_ways(
@@ -184,11 +230,7 @@ def _wiener_hammerstein_ways(
     seconds, mapping = LINEAR * training.max_time_s, records.mapping
     begun = replace(records.linear(structure, structure.first + structure.second, seconds=seconds), settles=settles)
     direct = [lag == 0 for lag in structure.lags(len(mapping.inputs))]
-    longest = max(records.late(structure), key=len)
-    signals = (
-        begun.scaling.scale_inputs(longest.columns(mapping.inputs)),
-        begun.scaling.scale_output(longest[mapping.output]),
-    )
+    signals = records.signals(structure, begun)
     rng = np.random.default_rng(training.seed)
     pairs = parted(begun, structure.first, signals, direct=direct, rng=rng, seconds=seconds)[: training.n_starts]
     found = [wiener_hammerstein(structure, mapping, begun, pair) for pair in pairs]

@@ -131,8 +131,8 @@ def responses(sections: Sequence[tuple[float, ...]], n: int) -> Array:
         if last + 1 < size:
             A[last, last + 1] = 1.0
         at = last + 1
-    found, row = np.zeros((n, size)), np.eye(size)[0]
-    for k in range(1, n):
+    found, row = np.zeros((n, size)), np.eye(1, size)[0]
+    for k in range(1, n if size else 0):
         found[k] = row
         row = row @ A
     return found

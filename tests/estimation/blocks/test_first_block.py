@@ -6,7 +6,8 @@ from scipy.signal import lfilter
 
 from sysid.estimation.blocks.first_block import searched
 from sysid.estimation.blocks.sections import Block, Pair
-from sysid.models.blocks.curves import Curve
+from sysid.models.blocks.curve_starts import curve_start
+from sysid.models.blocks.curves import WIDTH, Curve
 
 BEFORE, BEHIND = [1.0, -1.2, 0.45], [1.0, -0.6, 0.0]
 
@@ -81,3 +82,43 @@ def test_a_learnt_curve_begins_like_some_values(written: str, y, wanted) -> None
 def test_a_curve_that_cannot_begin_like_them_begins_as_it_is(written: str, y) -> None:  # type: ignore[no-untyped-def]
     x = np.linspace(-1.0, 1.0, 50)
     assert Curve.parse(written, "curve").like(x, y(x)) is None
+
+
+def value(curve: Curve, x: np.ndarray, bends: dict[str, float], weights: np.ndarray) -> np.ndarray:
+    """What equations make of a curve."""
+    k = curve.size
+    if curve.kind == "network":
+        hidden = np.tanh(np.outer(x, weights[: 2 * k : 2]) + weights[1 : 2 * k : 2])
+        return np.asarray(x + hidden @ weights[2 * k : -2] + weights[-2] * x + weights[-1])
+    if curve.kind == "polynomial":
+        return np.asarray(x + sum(bends[f"c{n}"] * x**n for n in range(2, k + 1)))
+    ahead = [x - bends[f"at{n}"] for n in range(1, k + 1)]
+    pieces = [
+        np.maximum(one, 0.0) if curve.kind == "piecewise" else WIDTH * np.logaddexp(0, one / WIDTH) for one in ahead
+    ]
+    return np.asarray(x + sum(bends[f"slope{n}"] * one for n, one in enumerate(pieces, start=1)))
+
+
+@pytest.mark.parametrize(
+    ("written", "y", "off"),
+    [
+        ("polynomial 2", lambda x: 2.0 * x**2 - 1.0, 1e-9),
+        ("polynomial 3", lambda x: 3.0 * x**3 - x**2 - 1.0, 1e-9),
+        ("piecewise 2", lambda x: 2.0 * np.abs(x) - 1.0, 1e-9),
+        ("piecewise 4", lambda x: 0.3 - np.abs(x - 0.5), 1e-9),
+        ("rounded 8", lambda x: np.cos(3.0 * x), 0.05),
+        ("network 6", lambda x: 2.0 * x**2 - 1.0, 0.05),
+    ],
+)
+def test_a_curve_that_turns_back_begins_like_it(written: str, y, off: float) -> None:  # type: ignore[no-untyped-def]
+    x, curve = np.linspace(-1.0, 1.0, 200), Curve.parse(written, "curve")
+    start = curve_start(curve, x, y(x))
+    assert start is not None
+    found = value(curve, start.scale * x + start.level, start.bends, start.weights)
+    assert np.abs(found - y(x)).max() < off
+
+
+def test_a_curve_with_limits_and_a_polynomial_that_is_nowhere_0_have_no_such_start() -> None:
+    x = np.linspace(-1.0, 1.0, 50)
+    assert curve_start(Curve.parse("saturation", "curve"), x, np.abs(x)) is None
+    assert curve_start(Curve.parse("polynomial 2", "curve"), x, x**2 + 1.0) is None

@@ -52,7 +52,7 @@ def results(status: str, fitted: float) -> Any:
 def test_what_limits_it_is_told_with_what_helps(status: str, fitted: float, share: float, limit: str) -> None:
     (said,) = limits(results(status, fitted), shown(share))
     assert said.startswith(f"what limits it is {limit}")
-    assert "help" in said or "as an output too" in said
+    assert "help" in said or "write what you know as equations" in said
 
 
 def test_nothing_limits_what_is_good_enough_and_nothing_is_said_where_nobody_knows() -> None:
