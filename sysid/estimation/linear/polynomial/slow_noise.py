@@ -1,7 +1,7 @@
 """ARMAX and Box-Jenkins models with a pole as slow as the records: what the inputs do is the output error's.
 
 Small one-step errors say little of a slow pole: a noise that hangs together does as well, and the free run is then far
-off. The output error of the same orders has the pole that the free run asks for, at 1 where the plant integrates; the
+off. So does a noise whose own pole is at 1, beside a zero there that takes its drift off again. The output error of the same orders has the pole that the free run asks for, at 1 where the plant integrates; the
 noise is fitted to what it leaves, and from there all coefficients but the poles at 1. What one step ahead does
 significantly better is kept.
 """
@@ -147,8 +147,9 @@ def next_to_output_error(found: Found, orders: AbstractPolynomial, ways: Abstrac
         return found
     lengths, polynomials = [len(one) for one in errors.segments], orders.polynomials(solution.theta)
     poles = np.concatenate([np.roots(one) for one in (polynomials.A, *polynomials.F)])
-    radius = float(np.abs(poles).max(initial=0.0))
-    if not any(slow_poles.unseen(one, lengths) for one in (radius, suggested(errors.segments, alone))):
+    # A noise that drifts for ever, even if its zero takes that off again, leaves level and slow modes to chance.
+    radii = [float(np.abs(one).max(initial=0.0)) for one in (poles, np.roots(polynomials.D))]
+    if not any(slow_poles.unseen(one, lengths) for one in (*radii, suggested(errors.segments, alone))):
         return found
     try:
         model = ways.fitted(alone)

@@ -45,6 +45,19 @@ def test_with_noise_the_free_run_is_as_good_as_the_output_error(kind: str, plant
         assert radius == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(("n", "slow", "seed"), [(1500, 0.995, 3), (2500, 0.998, 4)])
+def test_a_pole_and_a_zero_at_1_of_the_noise_do_not_leave_the_level_to_chance(n: int, slow: float, seed: int) -> None:
+    """Of white noise a pair that cancels tells one step ahead as much as none: the free run was at -174 %."""
+    rng, poles = np.random.default_rng(seed), np.poly([slow, 0.6])
+    u = np.repeat(rng.uniform(-1.0, 1.0, n // 15 + 1), 15)[:n]
+    new = np.repeat(np.random.default_rng(90).uniform(-1.0, 1.0, 60), 15)
+    u[:10] = new[:10] = 0.0
+    y, truth = (lfilter([0.0, 0.4 * (1.0 - slow)], poles, one) for one in (u, new))
+    traces = sysid.data((u, y + 0.02 * np.std(y) * rng.standard_normal(n)), sample_time=1.0)
+    fit = sysid.fit(traces, "u -> y", sysid.BJ(nb=1, nc=1, nd=1, nf=2, nk=1), stability=QUIET)
+    assert np.linalg.norm(fit.simulate(new) - truth) < 0.02 * np.linalg.norm(truth - truth.mean())
+
+
 def test_a_plant_that_is_not_slow_is_fitted_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     u, y = record([0.8, 0.6], seed=0)
     fit = sysid.fit(sysid.data((u, y), sample_time=1.0), "u -> y", KINDS["BJ"], stability=QUIET)
