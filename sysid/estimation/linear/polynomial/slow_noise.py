@@ -1,9 +1,9 @@
 """ARMAX and Box-Jenkins models with a pole as slow as the records: what the inputs do is the output error's.
 
 Small one-step errors say little of a slow pole: a noise that hangs together does as well, and the free run is then far
-off. So does a noise whose own pole is at 1, beside a zero there that takes its drift off again. The output error of the same orders has the pole that the free run asks for, at 1 where the plant integrates; the
-noise is fitted to what it leaves, and from there all coefficients but the poles at 1. What one step ahead does
-significantly better is kept.
+off. So does a noise whose own pole is at 1, beside a zero there that takes its drift off again. The output error of
+the same orders has the pole that the free run asks for, at 1 where the plant integrates; the noise is fitted to what
+it leaves, and from there all coefficients but the poles at 1. What one step ahead does significantly better is kept.
 """
 
 from __future__ import annotations
