@@ -31,7 +31,8 @@ def response_data(
             which unit, ``"freq [Hz]"``, ``"mag [dB]"``, ``"phase [deg]"``, or real and imaginary parts, or complex
             numbers; and ``"coherence"``.
         columns: Which column holds what, where their names do not say it: ``{"frequency": "f", "gain": "A"}``.
-        units: Of ``frequency``, ``gain`` and ``phase``, where the columns do not say them.
+        units: Of ``frequency``, ``gain`` and ``phase``, where the columns do not say them; ``-deg`` and ``-rad`` of
+            lags that are positive.
         name: What it is called.
 
     Returns:

@@ -145,7 +145,7 @@ def fit_response(
     ] = None,
     unit: Annotated[
         list[str] | None,
-        typer.Option(metavar="ROLE=UNIT", help="frequency=Hz, kHz or rad/s, gain=dB or 1, phase=deg or rad; repeated."),
+        typer.Option(metavar="ROLE=UNIT", help="frequency=Hz, kHz, rad/s; gain=dB, 1; phase=deg, rad, -deg; repeated."),
     ] = None,
     frequency: Annotated[str, typer.Option(help="Unit of the frequencies that are drawn: Hz or rad/s.")] = "Hz",
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
