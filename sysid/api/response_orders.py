@@ -304,11 +304,7 @@ class _Search:
             return
         problem = self._near() if len({one.poles for one in self.tried}) >= FIRST else self.problem
         try:
-            if begin is None:
-                found = problem.fitted(structure)
-            else:
-                fixed = replace(structure, delays=begin.model.delays)
-                found = problem.fit_at(fixed, begin.model.sample_time, begin=begin.model)
+            found = problem.fitted(structure) if begin is None else problem.fitted_from(structure, begin.model)
             left_out = left_out_errors(problem, structure, found)
             fit = response_fit(problem, found, left_out)
         except UserError as error:  # no start that stays finite

@@ -150,17 +150,35 @@ class ResponseProblem:
         Raises:
             ConfigError: If the structure has no sample time.
         """
-
-        def fit_at(time: float, delay: int | None = None, begin: TransferFunctionModel | None = None) -> FitResult:
-            orders = structure if delay is None else replace(structure, delays=(delay,))
-            return self.fit_at(orders, time, begin=begin)
-
-        first = fit_at(self._time_of(structure))
-        if self.sample_time is not None or structure.delays is not None:
+        first = self.fit_at(structure, self._time_of(structure))
+        found = self._with_dead_time(structure, first)
+        if found is first:
             return first
-        found = with_dead_time(first, fit_at, n_residuals=2 * len(self.measured))
         lost = tuple(one for one in first.warnings if LONGEST in one and one not in found.warnings)
         return replace(found, notes=(*found.notes, *lost), warnings=(*found.warnings, *lost))
+
+    def fitted_from(self, structure: TransferFunction, begin: TransferFunctionModel) -> FitResult:
+        """The fit of a structure from the poles of a model, with a dead time near that of it.
+
+        Args:
+            structure: Its orders.
+            begin: The model.
+
+        Returns:
+            The fit.
+        """
+        fixed = replace(structure, delays=begin.delays)
+        return self._with_dead_time(structure, self.fit_at(fixed, begin.sample_time, begin=begin))
+
+    def _with_dead_time(self, structure: TransferFunction, first: FitResult) -> FitResult:
+        """A fit with the dead time in seconds that leaves least, where nobody said it or a sample time."""
+        if self.sample_time is not None or structure.delays is not None:
+            return first
+
+        def fit_at(time: float, delay: int, begin: TransferFunctionModel) -> FitResult:
+            return self.fit_at(replace(structure, delays=(delay,)), time, begin=begin)
+
+        return with_dead_time(first, fit_at, n_residuals=2 * len(self.measured))
 
     def fit_at(
         self,

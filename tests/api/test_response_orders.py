@@ -46,6 +46,14 @@ def test_the_orders_of_a_plant_are_found(plant: str) -> None:
     assert found.best.delays == (0,)
 
 
+def test_fewer_zeros_have_a_dead_time_of_their_own() -> None:
+    """A zero stands for what a dead time lacks: with that of more zeros, fewer had left too much."""
+    found = searched(mode(10.0, 0.2) * np.exp(-0.01 * S), poles=(2, 2), delays=None, sample_time=None)
+    fewest = next(one for one in found.tried if one.zeros == 0)
+    assert fewest.dead_time == pytest.approx(0.01, rel=0.02)
+    assert found.left_out_percent(fewest) < 1.1 * found.left_out_percent(found.ranked[0])
+
+
 def test_fits_without_noise_get_no_pole_for_rounding() -> None:
     assert searched(2.0 / (1.0 + 0.5 * S), noise=0.0).best.poles == (1,)
 

@@ -12,6 +12,7 @@ from sysid.errors import TraceError
 from sysid.estimation.clock import now
 from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.linear import slow_poles
+from sysid.estimation.linear.delay_scan import scan_losses
 from sysid.estimation.linear.integrators import all_at_one, with_integrators
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import scattered, sections_of, stabilised
@@ -290,6 +291,8 @@ class _Problem(AbstractProblem):
     def likely_delays(self, least: int, most: int) -> list[list[int]]:
         """Those with the least loss of a scan, one input after the other; see the base class."""
         m = len(self.orders.poles)
+        if m == len(self.spectra) == 1:
+            return self._scanned(least, most)
         best, losses = [least] * m, dict[tuple[int, ...], float]()
 
         def loss(j: int, delay: int) -> float:
@@ -308,6 +311,27 @@ class _Problem(AbstractProblem):
                 found = min(range(low, high + 1, step), key=lambda delay: loss(j, delay))
             best[j] = found
         return [[one, least] for one in best]
+
+    def _scanned(self, least: int, most: int) -> list[list[int]]:
+        """The same of one input and one response, all dead times of a step at once."""
+        (spectrum,), T = self.spectra, self.terms.sample_time
+        record, ((first,),) = self._record(spectrum, (0,)), self._scattered_poles(1)
+        real, imaginary = np.split(record.target, 2)
+
+        def best_of(delays: range) -> int:
+            turned = np.exp(-1j * T * np.outer(delays, spectrum.frequency))
+            losses = scan_losses(
+                turned * record.inputs[:, 0], real + 1j * imaginary, record.variable, first, self.orders.zeros[0],
+                domain=self.orders.domain, root_weights=np.split(record.root_weights, 2)[0], iterations=FEW_STEPS,
+            )  # fmt: skip
+            return delays[int(np.argmin(np.where(np.isfinite(losses), losses, np.inf)))]
+
+        step = max(1, round(self._shortest / SCANNED))
+        found = best_of(range(least, most + 1, step))
+        while step > 1:
+            low, high, step = max(least, found - step), min(most, found + step), max(1, step // SCANNED)
+            found = best_of(range(low, high + 1, step))
+        return [[found, least]]
 
     def _scattered_poles(self, count: int) -> list[tuple[NDArray[np.complex128], ...]]:
         """Random poles of every input, as often as asked."""

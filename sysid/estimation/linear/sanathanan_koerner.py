@@ -17,7 +17,7 @@ from scipy import linalg
 
 from sysid.estimation.linear.poles import sections_of, stabilised
 from sysid.models.converting.orthonormal_basis import Domain, basis_of, responses
-from sysid.models.converting.realisation import realise
+from sysid.models.converting.realisation import Realisation, realise
 
 MAX_ITERATIONS = 20
 """As in the estimators of the field (MATLAB's ``tfest``)."""
@@ -55,8 +55,8 @@ def sk_poles(
     poles = start
     for _ in range(iterations):
         sections = sections_of(stabilised(poles, domain), domain)
-        basis = basis_of(sections, len(start) - 1, domain)
-        states = _state_responses(sections, variable, domain)
+        system = realise(basis_of(sections, len(start) - 1, domain), domain)
+        states = _state_responses(system, variable, domain)
         blocks = [-states * output[:, np.newaxis]]
         for j, zeros in enumerate(n_zeros):
             blocks.append(responses(basis_of(sections, zeros, domain), variable) * inputs[:, j : j + 1])
@@ -65,7 +65,6 @@ def sk_poles(
         table, target = (np.concatenate([part.real, part.imag]) for part in (table, target))
         scale = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
         solution = linalg.lstsq(table / scale, target, cond=1e-12)[0] / scale
-        system = realise(basis, domain)
         following = linalg.eigvals(system.A - np.outer(system.B, solution[: len(start)]))
         moved = np.abs(np.sort_complex(following) - np.sort_complex(poles)).max()
         poles = following
@@ -75,14 +74,11 @@ def sk_poles(
     return stabilised(found, domain) if stable else found
 
 
-def _state_responses(
-    sections: tuple[NDArray[np.float64], ...], variable: NDArray[np.complex128], domain: Domain
-) -> NDArray[np.complex128]:
+def _state_responses(system: Realisation, variable: NDArray[np.complex128], domain: Domain) -> NDArray[np.complex128]:
     """The state of a basis as functions of frequency: all strictly proper functions with its poles.
 
     The variable is ``1/z`` or ``s``; shape ``(n_points, n_poles)``.
     """
-    system = realise(basis_of(sections, sum(len(d) - 1 for d in sections) - 1, domain), domain)
     n = len(system.A)
     if domain is Domain.DISCRETE:
         matrices = np.eye(n) - variable[:, np.newaxis, np.newaxis] * system.A
