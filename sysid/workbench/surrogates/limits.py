@@ -16,8 +16,8 @@ WANTED = 0.99
 CLEARLY = 2.0
 """Standard errors of the proof's share by which that of what was fitted has to be above it to be clearly more."""
 KNOWLEDGE = (
-    "where something switches, sticks or stops, write what you know as equations, or let the reference give all of its "
-    "state as outputs, at a sample time that is no longer than 20 of its own steps (docs/how/events.md)"
+    "where something switches, sticks or stops, smooth maps come near it and no nearer: write what you know as "
+    "equations, sampled as finely as its events ask (docs/how/events.md)"
 )
 """What helps where a structure cannot."""
 CUT_SHORT = {Status.TIME_LIMIT.name, Status.MAX_ITERATIONS.name, Status.INTERRUPTED.name}
