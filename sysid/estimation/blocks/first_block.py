@@ -78,19 +78,19 @@ def searched(
     Returns:
         Mean squared errors and the pairs that leave them, the best first.
     """
-    w, y = signals[0][:SEARCHED] - signals[0][0], signals[1][:SEARCHED]
+    w, y = signals[0][:SEARCHED], signals[1][:SEARCHED]
     tried = [*begun, *(_drawn(begun[0], direct, slowest, rng) for _ in range(DRAWN))]
     ranked: list[tuple[float, int]] = []
     for at, block in enumerate(tried):
         if ranked and now() > until:
             break
-        ranked.append((_size(_behind(block.filtered(w), y, second, rounds=RANKED)), at))
+        ranked.append((_size(_behind(block.from_rest(w), y, second, rounds=RANKED)), at))
     found: list[tuple[float, Pair]] = []
     for at in _apart(sorted(ranked))[:moved]:
         if found and now() > until:
             break
         block = _moved(tried[at], w, y, second, direct)
-        rest = _behind(block.filtered(w), y, second)
+        rest = _behind(block.from_rest(w), y, second)
         if rest is not None:
             found.append((_size(rest), _pair(block, rest, w)))
     return sorted(found, key=lambda one: one[0])
@@ -131,7 +131,7 @@ def _behind(z: Array, y: Array, second: int, *, rounds: int = ROUNDS) -> _Rest |
     if not np.isfinite(span) or span == 0.0:
         return None
     between = z / span
-    powers = [between**k for k in range(1, POWERS + 1)]
+    powers = [between**k - between[0] ** k for k in range(1, POWERS + 1)]
     first, n, A = round(SETTLED * len(y)), second, np.eye(1, second + 1)[0]
     for _ in range(rounds):
         filtered = scipy.signal.lfilter([1.0], A, [y, *powers, np.ones(len(y))])
@@ -190,7 +190,7 @@ def _moved(block: Block, w: Array, y: Array, second: int, direct: Sequence[bool]
         moved = of(values)
         if not all(_inside(one) for one in moved.sections):
             return np.full(length, FAR)
-        rest = _behind(moved.filtered(w), y, second)
+        rest = _behind(moved.from_rest(w), y, second)
         return np.full(length, FAR) if rest is None else rest.residual
 
     begun = np.concatenate([*map(np.array, block.sections), block.gains.ravel(), block.direct])
@@ -204,7 +204,7 @@ def _inside(section: tuple[float, ...]) -> bool:
 
 def _pair(before: Block, rest: _Rest, w: Array) -> Pair:
     """The two blocks and the curve: what the numerators have in common."""
-    span = float(np.abs(before.filtered(w)).max())
+    span = float(np.abs(before.from_rest(w)).max())
     left, values, right = np.linalg.svd(rest.numerators)
     x = rest.between
     y = x[:, None] ** np.arange(1, POWERS + 1) @ left[:, 0]

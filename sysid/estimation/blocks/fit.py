@@ -219,8 +219,7 @@ def _turning(
         like = curve_start(structure.output, pair.x, y[: len(pair.x)])
         if like is not None:
             block = replace(pair.before, gains=like.scale * pair.before.gains, direct=like.scale * pair.before.direct)
-            stood = float(block.filtered(np.tile(w[0], (len(w), 1)))[-1])  # what was sought began at 0 there
-            found.append((block, replace(begun, level=like.level - stood), like))
+            found.append((block, replace(begun, level=like.level), like))
     return found
 
 

@@ -275,7 +275,7 @@ def _factors(
 def _judged(before: Block, behind: Block, signals: tuple[Array, Array]) -> tuple[float, Pair]:
     """The squared error with the best curve between two blocks, and both, what lies between from -1 to 1."""
     w, y = signals[0][:COMPARED], signals[1][:COMPARED]
-    x = before.filtered(w - w[0])
+    x = before.from_rest(w)
     span = float(np.abs(x).max())
     if not np.isfinite(span) or span == 0.0:
         return np.inf, Pair(before=before, behind=behind, x=x, y=x)
@@ -285,7 +285,7 @@ def _judged(before: Block, behind: Block, signals: tuple[Array, Array]) -> tuple
     knots = np.linspace(x.min(), x.max(), KNOTS + 2)[1:-1]
     columns = [x, *(np.maximum(x - at, 0.0) for at in knots)]
     first = round(SETTLED * len(y))
-    design = np.column_stack([np.ones(len(y)), *(behind.filtered(column[:, None]) for column in columns)])[first:]
+    design = np.column_stack([np.ones(len(y)), *(behind.filtered(one[:, None] - one[0]) for one in columns)])[first:]
     found = np.linalg.lstsq(design, y[first:], rcond=None)[0]
     error = float(np.mean((y[first:] - design @ found) ** 2))
     pair = Pair(before=before, behind=behind, x=x, y=np.column_stack(columns) @ found[1:])

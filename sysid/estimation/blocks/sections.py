@@ -20,6 +20,8 @@ Poles = NDArray[np.complex128]
 
 LARGEST_POLE, INTEGRATOR = 0.9999, 1.0
 """Poles of a start lie inside this radius, but for that of an integrator, which is 1 exactly."""
+FARTHEST = 3.0
+"""How far from 0 a block may have stood, in what it moves over a record: a slow one may have stood anywhere."""
 RESPONSE = (50, 2_000)
 """Samples of an impulse response, at least and at most: five time constants of the slowest pole between."""
 
@@ -57,15 +59,33 @@ class Block:
         Returns:
             Shape ``(n_samples,)``.
         """
-        basis = responses(self.sections, self.states + 1)
-        denominator = np.array([1.0])
+        numerators, denominator = self._polynomials
+        y = w @ self.direct
+        for numerator, column in zip(numerators, w.T, strict=True):
+            y += scipy.signal.lfilter(numerator, denominator, column)
+        return np.asarray(y)
+
+    def from_rest(self, w: Array) -> Array:
+        """Its output over some inputs, from where it has settled at the first; from 0 where it all but integrates.
+
+        Args:
+            w: Shape ``(n_samples, n_inputs)``.
+
+        Returns:
+            Shape ``(n_samples,)``.
+        """
+        moved, (numerators, denominator) = self.filtered(w - w[0]), self._polynomials
+        still = float(denominator.sum())
+        stood = 0.0 if still <= 0.0 else float((self.direct + np.sum(numerators, axis=1) / still) @ w[0])
+        return moved + stood if abs(stood) <= FARTHEST * np.abs(moved).max(initial=0.0) else moved
+
+    @property
+    def _polynomials(self) -> tuple[list[Array], Array]:
+        """Numerators from each input, without what is direct, and the denominator."""
+        basis, denominator = responses(self.sections, self.states + 1), np.array([1.0])
         for one in self.sections:
             denominator = np.convolve(denominator, [1.0, -one[0]] if len(one) == 1 else [1.0, *one])
-        y = np.zeros(len(w))
-        for j, column in enumerate(w.T):
-            numerator = np.convolve(denominator, basis @ self.gains[:, j])[: self.states + 1]
-            y += scipy.signal.lfilter(numerator, denominator, column) + self.direct[j] * column
-        return y
+        return [np.convolve(denominator, basis @ gains)[: self.states + 1] for gains in self.gains.T], denominator
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

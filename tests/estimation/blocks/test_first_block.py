@@ -122,3 +122,15 @@ def test_a_curve_with_limits_and_a_polynomial_that_is_nowhere_0_have_no_such_sta
     x = np.linspace(-1.0, 1.0, 50)
     assert curve_start(Curve.parse("saturation", "curve"), x, np.abs(x)) is None
     assert curve_start(Curve.parse("polynomial 2", "curve"), x, x**2 + 1.0) is None
+
+
+def test_a_block_begins_where_it_has_settled_and_a_slow_one_at_0() -> None:
+    """Inputs from 0 to 1 that begin at 0 had a curve that began beside what it sees, and limits that nothing met."""
+    w = np.random.default_rng(0).standard_normal((60, 2)) + np.array([1.0, -2.0])
+    stood = np.array([*np.tile(w[0], (800, 1)), *w])
+    gains, direct = np.array([[0.3, -0.2], [0.1, 0.4]]), np.array([0.5, 0.0])
+    block = Block(sections=((-1.2, 0.45),), gains=gains, direct=direct)
+    assert block.from_rest(w) == pytest.approx(block.filtered(stood)[800:])
+    for pole in (1.0, 0.99999):
+        slow = Block(sections=((pole,),), gains=np.ones((1, 2)), direct=np.zeros(2))
+        assert slow.from_rest(w) == pytest.approx(slow.filtered(w - w[0]))
