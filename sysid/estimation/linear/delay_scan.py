@@ -77,7 +77,8 @@ def _losses(  # noqa: PLR0917 - as above
             [-free * target[:, np.newaxis], over[:, :, : zeros + 1] * dead[:, :, np.newaxis]], axis=2
         )
         known = over[:, :, 0] if discrete else over[:, :, n]
-        solution = _solved(table * root[:, np.newaxis], known * target * root)[0]
+        rows = np.asarray(table * root[:, np.newaxis], dtype=np.complex128)
+        solution = _solved(rows, np.asarray(known * target * root, dtype=np.complex128))[0]
         following = np.concatenate(
             [np.ones((len(dead), 1)), solution[:, :n]] if discrete else [solution[:, :n], np.ones((len(dead), 1))],
             axis=1,
@@ -85,7 +86,8 @@ def _losses(  # noqa: PLR0917 - as above
         poles = _roots(following, discrete=discrete)
     below = _polynomials(stabilised(poles, domain), discrete=discrete)
     over = powers[np.newaxis, :, : zeros + 1] / (below @ powers.T)[:, :, np.newaxis]
-    return _solved(over * (dead * root)[:, :, np.newaxis], np.broadcast_to(target * root, dead.shape))[1]
+    table = np.asarray(over * (dead * root)[:, :, np.newaxis], dtype=np.complex128)
+    return _solved(table, np.broadcast_to(target * root, dead.shape))[1]
 
 
 def _polynomials(poles: Complex, *, discrete: bool) -> Array:
