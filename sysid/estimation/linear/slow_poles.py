@@ -36,7 +36,8 @@ is one up to there: of two poles at 1 rounding makes 1.00000002, and no status c
 
 BOUND = (
     "it stands at its bound. The plant may integrate, or a drift of the output is taken for its response, and these "
-    "records cannot tell. The level of the free run is not to be trusted: measure longer, or with inputs that bring "
+    "records cannot tell; one that grows, held by a controller, is found by a TransferFunction. The "
+    "level of the free run is not to be trusted: measure longer, or with inputs that bring "
     "the output back; where it drifts by itself, take that off first (repairs: {drift: {y: line}})."
 )
 ONE = (
