@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from sysid.api.fitting import load as load
     from sysid.api.looking import advise as advise
     from sysid.api.looking import excite as excite
+    from sysid.api.measured_responses.fitting import fit_response as fit_response
+    from sysid.api.measured_responses.fitting import response_data as response_data
+    from sysid.api.measured_responses.fitting import search_response_orders as search_response_orders
     from sysid.api.order_search import OrderSearch as OrderSearch
     from sysid.api.orders import search_orders as search_orders
-    from sysid.api.response_fits import fit_response as fit_response
-    from sysid.api.response_fits import response_data as response_data
-    from sysid.api.response_fits import search_response_orders as search_response_orders
     from sysid.api.responses import bode as bode
     from sysid.api.responses import poles as poles
     from sysid.api.responses import step as step

@@ -6,8 +6,8 @@ from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
     from sysid.estimation.linear.arx import fit_arx as fit_arx
-    from sysid.estimation.linear.frequency_response import Spectrum as Spectrum
-    from sysid.estimation.linear.frequency_response import fit_spectra as fit_spectra
+    from sysid.estimation.linear.frequency_response.fit import Spectrum as Spectrum
+    from sysid.estimation.linear.frequency_response.fit import fit_spectra as fit_spectra
     from sysid.estimation.linear.instrumental import fit_iv4 as fit_iv4
     from sysid.estimation.linear.modes import Mode as Mode
     from sysid.estimation.linear.modes import modes as modes
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from sysid.estimation.linear.state_space.orders import StateOrders as StateOrders
     from sysid.estimation.linear.state_space.orders import state_orders as state_orders
     from sysid.estimation.linear.state_space.training import StateSpaceTraining as StateSpaceTraining
-    from sysid.estimation.linear.transfer_function import fit_transfer_function as fit_transfer_function
-    from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining as TransferFunctionTraining
+    from sysid.estimation.linear.transfer_function.fit import fit_transfer_function as fit_transfer_function
+    from sysid.estimation.linear.transfer_function.training import TransferFunctionTraining as TransferFunctionTraining
     from sysid.estimation.networks.narx import fit_narx as fit_narx
     from sysid.estimation.networks.neural.state_space import fit_neural_state_space as fit_neural_state_space
     from sysid.estimation.networks.posterior import Posterior as Posterior

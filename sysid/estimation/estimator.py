@@ -13,7 +13,7 @@ from sysid.errors import ConfigError
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear.polynomial.fit import PolynomialTraining
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
-from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function.training import TransferFunctionTraining
 from sysid.estimation.linear_posteriors import LinearPosterior, linear_posterior
 from sysid.estimation.networks.posterior import calibrate
 from sysid.estimation.networks.training import Training

@@ -23,8 +23,8 @@ from sysid.estimation.linear.polynomial.fit import PolynomialTraining, fit_polyn
 from sysid.estimation.linear.process.fit import fit_process
 from sysid.estimation.linear.state_space.fit import fit_state_space
 from sysid.estimation.linear.state_space.training import StateSpaceTraining
-from sysid.estimation.linear.transfer_function import fit_transfer_function
-from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function.fit import fit_transfer_function
+from sysid.estimation.linear.transfer_function.training import TransferFunctionTraining
 from sysid.estimation.linear.vector_arx import fit_vector_arx
 from sysid.estimation.linear_posteriors import (
     arx_posterior,

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from sysid.export.forms.layout import StateLayout as StateLayout
     from sysid.export.forms.stage import Port as Port
     from sysid.export.forms.stage import Stage as Stage
-    from sysid.export.jax_exporter import jax_run as jax_run
-    from sysid.export.jax_exporter import jax_step as jax_step
+    from sysid.export.languages.jax import jax_run as jax_run
+    from sysid.export.languages.jax import jax_step as jax_step
     from sysid.export.parity import Parity as Parity
     from sysid.export.parity import check_parity as check_parity
     from sysid.export.reading import read_bundle as read_bundle

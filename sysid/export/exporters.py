@@ -10,16 +10,16 @@ from sysid.errors import ConfigError
 from sysid.export.c.arduino_exporter import ArduinoExporter
 from sysid.export.c.cpp_exporter import CppExporter
 from sysid.export.c.exporter import CExporter
-from sysid.export.casadi_exporter import CasadiExporter
+from sysid.export.c.wasm_exporter import WasmExporter
 from sysid.export.exporter import AbstractExporter
 from sysid.export.fmi.exporter import FmuExporter
-from sysid.export.jax_exporter import JaxExporter
-from sysid.export.matlab_exporter import MatlabExporter
+from sysid.export.languages.casadi import CasadiExporter
+from sysid.export.languages.jax import JaxExporter
+from sysid.export.languages.matlab import MatlabExporter
+from sysid.export.languages.structured_text import StructuredTextExporter
 from sysid.export.onnx.exporter import OnnxExporter
-from sysid.export.st_exporter import StructuredTextExporter
 from sysid.export.torch.torch_export import TorchExportExporter
 from sysid.export.torch.torchscript import TorchScriptExporter
-from sysid.export.wasm_exporter import WasmExporter
 
 EXPORTERS: dict[str, AbstractExporter] = {
     exporter.name: exporter

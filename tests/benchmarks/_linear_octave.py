@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from sysid.errors import UserError
-from sysid.export.octave import octave
+from sysid.export.languages.octave import octave
 from tests.benchmarks._linear_systems import ORDERS, SAMPLES, fit_percent, systems
 
 SCRIPT = """% moesp of control 3.4.0 ends with an error of SLICOT's

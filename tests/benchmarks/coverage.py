@@ -26,7 +26,7 @@ from scipy import signal, stats
 
 from sysid.estimation import FitResult, fit_iv4, modes
 from sysid.estimation.fitting import fit
-from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function.training import TransferFunctionTraining
 from sysid.estimation.nonparametric.impulse import estimate_impulse_response
 from sysid.estimation.nonparametric.response import estimate_frequency_response
 from sysid.models import (

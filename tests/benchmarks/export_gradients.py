@@ -23,7 +23,7 @@ import numpy as np
 import torch
 
 from sysid.export import Surrogate, jax_run
-from sysid.export.casadi_exporter import step_function
+from sysid.export.languages.casadi import step_function
 from sysid.export.torch.module import SurrogateSequence
 from sysid.models import NARX
 from tests.benchmarks._findings import found

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from sysid.errors import UserError
 from sysid.estimation import StateSpaceTraining, fit_arx
 from sysid.estimation.fitting import fit
-from sysid.export import octave as octave_program
+from sysid.export.languages import octave as octave_program
 from sysid.models import ARX, Mapping, Start, VectorStateSpace
 from sysid.models.conversions import c2d, d2c, d2d, reduced, transfer_function
 from sysid.traces import Channel, Trace

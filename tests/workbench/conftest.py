@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sysid.ingest.readers.csv_layout import Layout, recognise
+from sysid.ingest.readers.csv.layout import Layout, recognise
 from sysid.ingest.tables.options import FileOptions
 from sysid.reporting.charts import Chart, chart_figure
 from sysid.reporting.figures.svg import svg
@@ -97,7 +97,7 @@ def layouts_told_once() -> Iterator[None]:
         return found[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sysid.ingest.readers.csv_text.recognise", told)
+        patch.setattr("sysid.ingest.readers.csv.text.recognise", told)
         yield
 
 

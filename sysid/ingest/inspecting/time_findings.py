@@ -13,7 +13,7 @@ from sysid.ingest.assembling.timing import Timing, even_step, round_step, rounde
 from sysid.ingest.cells.headers import unit_in_name
 from sysid.ingest.inspecting.restarts import of_few_digits
 from sysid.ingest.inspecting.second_clocks import counts_rows
-from sysid.ingest.readers.leaves import step_in
+from sysid.ingest.readers.trees.leaves import step_in
 from sysid.ingest.tables.clocks import clock_of, since_1970
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, GridOptions, TimeOptions

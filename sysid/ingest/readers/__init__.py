@@ -8,7 +8,6 @@ from sysid.ingest.readers import (
     arrow,
     codesys,
     comtrade,
-    csv_text,
     excel,
     hdf5,
     json_text,
@@ -20,6 +19,7 @@ from sysid.ingest.readers import (
     tdms,
     touchstone,
 )
+from sysid.ingest.readers.csv import text as csv_text
 from sysid.ingest.readers.reader import Reader, choose_reader, read_with
 
 READERS: tuple[Reader, ...] = (

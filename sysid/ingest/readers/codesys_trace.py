@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
-from sysid.ingest.readers.joining import joined_signals
 from sysid.ingest.readers.late import table_of
 from sysid.ingest.readers.reader import damaged
+from sysid.ingest.readers.trees.joining import joined_signals
 from sysid.ingest.tables.joining import Signal
 from sysid.ingest.tables.options import FileOptions
 from sysid.ingest.tables.table import RawTable

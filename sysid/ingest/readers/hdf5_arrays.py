@@ -19,9 +19,9 @@ from sysid.errors import ReaderError
 from sysid.extras import need
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.late import table_of
-from sysid.ingest.readers.leaves import Leaf, step_in
 from sysid.ingest.readers.marks import NETCDF_3
 from sysid.ingest.readers.reader import damaged
+from sysid.ingest.readers.trees.leaves import Leaf, step_in
 from sysid.ingest.tables.options import FileOptions
 from sysid.ingest.tables.table import RawTable
 from sysid.units import Reference

@@ -16,8 +16,8 @@ from sysid.errors import ReaderError
 from sysid.ingest.cells.calendar import is_calendar
 from sysid.ingest.readers.bounds import too_large
 from sysid.ingest.readers.late import table_of
-from sysid.ingest.readers.leaves import Leaf, number_of, step_in
 from sysid.ingest.readers.reader import Reader, damaged
+from sysid.ingest.readers.trees.leaves import Leaf, number_of, step_in
 from sysid.ingest.tables.options import FileOptions, RepairOptions
 from sysid.ingest.tables.table import RawTable
 

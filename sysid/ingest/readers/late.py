@@ -8,12 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sysid.ingest.readers.tree import table_of
+    from sysid.ingest.readers.trees.tree import table_of
 else:
 
     def table_of(tree: Any, **how: Any) -> Any:
-        """The columns in a tree; see :func:`sysid.ingest.readers.tree.table_of`."""
-        from sysid.ingest.readers import tree as trees
+        """The columns in a tree; see :func:`sysid.ingest.readers.trees.tree.table_of`."""
+        from sysid.ingest.readers.trees import tree as trees
 
         return trees.table_of(tree, **how)
 

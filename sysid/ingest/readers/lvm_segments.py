@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
 from sysid.ingest.cells.numbers import NumberFormat
-from sysid.ingest.readers.joining import joined_signals, not_over_time
 from sysid.ingest.readers.late import table_of
-from sysid.ingest.readers.leaves import Leaf
 from sysid.ingest.readers.marks import LABVIEW
 from sysid.ingest.readers.reader import damaged
+from sysid.ingest.readers.trees.joining import joined_signals, not_over_time
+from sysid.ingest.readers.trees.leaves import Leaf
 from sysid.ingest.tables.joining import Signal
 from sysid.ingest.tables.options import FileOptions
 from sysid.ingest.tables.table import RawTable

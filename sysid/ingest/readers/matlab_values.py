@@ -16,9 +16,9 @@ from sysid.errors import ReaderError
 from sysid.extras import need
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.late import table_of
-from sysid.ingest.readers.leaves import Leaf, number_of, refused
 from sysid.ingest.readers.modelica import is_result, result_tree
 from sysid.ingest.readers.reader import damaged
+from sysid.ingest.readers.trees.leaves import Leaf, number_of, refused
 from sysid.ingest.tables.options import FileOptions
 from sysid.ingest.tables.table import RawTable
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.extras import need
-from sysid.ingest.readers.joining import as_leaf, joined_signals, not_over_time
 from sysid.ingest.readers.late import table_of
 from sysid.ingest.readers.reader import Reader, damaged, silent
+from sysid.ingest.readers.trees.joining import as_leaf, joined_signals, not_over_time
 from sysid.ingest.tables.joining import Signal
 from sysid.ingest.tables.options import FileOptions, RepairOptions
 from sysid.ingest.tables.table import RawTable

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ReaderError
-from sysid.ingest.readers.leaves import Leaf
+from sysid.ingest.readers.trees.leaves import Leaf
 
 _UNIT = re.compile(r"\[\s*([^\[\]|:#]+?)\s*(?:[|:#][^\[\]]*)?\]\s*$")
 

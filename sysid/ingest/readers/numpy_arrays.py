@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from sysid.errors import ReaderError
 from sysid.ingest.readers.bounds import check_claim
 from sysid.ingest.readers.late import table_of
-from sysid.ingest.readers.leaves import refused
 from sysid.ingest.readers.reader import Reader, damaged
+from sysid.ingest.readers.trees.leaves import refused
 from sysid.ingest.tables.options import FileOptions, RepairOptions
 from sysid.ingest.tables.table import RawTable
 

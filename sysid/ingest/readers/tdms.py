@@ -10,10 +10,10 @@ import numpy as np
 
 from sysid.errors import ReaderError
 from sysid.extras import need
-from sysid.ingest.readers.joining import joined_signals, not_over_time
 from sysid.ingest.readers.late import table_of
-from sysid.ingest.readers.leaves import Leaf, refused
 from sysid.ingest.readers.reader import Reader, damaged, silent
+from sysid.ingest.readers.trees.joining import joined_signals, not_over_time
+from sysid.ingest.readers.trees.leaves import Leaf, refused
 from sysid.ingest.tables.joining import Signal
 from sysid.ingest.tables.options import FileOptions, RepairOptions
 from sysid.ingest.tables.rates import said_step

@@ -18,7 +18,7 @@ import numpy as np
 from sysid.errors import ReaderError
 from sysid.extras import need
 from sysid.ingest.readers.bounds import check_zip, too_large
-from sysid.ingest.readers.csv_text import table_of_text
+from sysid.ingest.readers.csv.text import table_of_text
 from sysid.ingest.readers.marks import ZIP
 from sysid.ingest.readers.reader import damaged
 from sysid.ingest.readers.sheets import NO_COMMENT, SEPARATOR, UNCOMPUTED, Rows, Sheet, as_text

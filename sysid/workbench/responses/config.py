@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field, PlainSerializer, field_validator, model_validator
 
-from sysid.api.response_orders import FEWEST, MOST
-from sysid.api.response_problem import Weighting
+from sysid.api.measured_responses.orders import FEWEST, MOST
+from sysid.api.measured_responses.problem import Weighting
 from sysid.errors import ConfigError
 from sysid.estimation import TransferFunctionTraining
 from sysid.field_checks import FieldError, FolderName

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.api.response_fit import ResponseFit, export_response
-from sysid.api.response_fits import fitted_structure
-from sysid.api.response_orders import ResponseOrderSearch, Tried, search_orders_of
-from sysid.api.response_problem import ResponseProblem
+from sysid.api.measured_responses.fitting import fitted_structure
+from sysid.api.measured_responses.orders import ResponseOrderSearch, Tried, search_orders_of
+from sysid.api.measured_responses.problem import ResponseProblem
+from sysid.api.measured_responses.response_fit import ResponseFit, export_response
 from sysid.code_digest import code_digest
 from sysid.export.exporters import wanted_formats
 from sysid.ingest.inspecting.undescribed import GuessedWarning
@@ -244,9 +244,11 @@ def export_key(fit: str, config: ResponseConfig) -> str:
     export = config.export.model_dump(mode="json") | {"formats": list(wanted_formats(config.export.formats).names)}
     files = ("sysid/export/templates", "sysid/export/fmi_headers", "sysid/export/schemas")
     code = code_digest(
-        "sysid.api.response_fit:export_response", "sysid.export:export_bundle", "sysid.models:model_from_dict",
+        "sysid.api.measured_responses.response_fit:export_response",
+        "sysid.export:export_bundle",
+        "sysid.models:model_from_dict",
         files=files,
-    )  # fmt: skip
+    )
     return digest({"fit": fit, "export": export, "code": code})
 
 

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from sysid.errors import TraceError
 from sysid.estimation import FitResult, fit_arx, fit_transfer_function
-from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function.training import TransferFunctionTraining
 from sysid.models import ARX, Domain, Mapping, Start, StartKind, TransferFunction, TransferFunctionModel
 from sysid.traces import Role, Trace
 from sysid.validation.evaluation import evaluate_case

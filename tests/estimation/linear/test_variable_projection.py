@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sysid.estimation.linear.frequency_response.spectral_record import SpectralRecord
 from sysid.estimation.linear.records import AbstractRecord
-from sysid.estimation.linear.spectral_record import SpectralRecord
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
 from sysid.models.converting.orthonormal_basis import Domain

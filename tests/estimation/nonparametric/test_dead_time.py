@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from sysid.estimation import fit_transfer_function
-from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function.training import TransferFunctionTraining
 from sysid.estimation.nonparametric.dead_time import descend, likely, longest_dead_time
 from sysid.estimation.records.experiment import experiments_of
 from sysid.models import Mapping, Start, StartKind, TransferFunction

@@ -10,7 +10,9 @@ import pytest
 
 from sysid.errors import ReaderError
 from sysid.ingest import FileOptions, RepairOptions, read_table
-from sysid.ingest.readers import csv_body, csv_split, text_source
+from sysid.ingest.readers import text_source
+from sysid.ingest.readers.csv import body as csv_body
+from sysid.ingest.readers.csv import split as csv_split
 
 N = 9000
 TIME = (np.arange(N) / 8.0).tolist()

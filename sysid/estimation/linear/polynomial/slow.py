@@ -23,8 +23,8 @@ from sysid.estimation.linear.polynomial.starts import model_of_order
 from sysid.estimation.linear.segments import Segment, delayed_inputs, segments_of
 from sysid.estimation.linear.state_space.provider import PredictionErrors
 from sysid.estimation.linear.subspace.windows import Windows
-from sysid.estimation.linear.transfer_function import fit_transfer_function
-from sysid.estimation.linear.transfer_function_training import TransferFunctionTraining
+from sysid.estimation.linear.transfer_function.fit import fit_transfer_function
+from sysid.estimation.linear.transfer_function.training import TransferFunctionTraining
 from sysid.estimation.records.experiment import Experiment
 from sysid.estimation.results.result import Status
 from sysid.models import Mapping, Scaling, Start, TransferFunction, TransferFunctionModel

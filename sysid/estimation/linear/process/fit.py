@@ -19,7 +19,7 @@ from sysid.estimation.linear.process.uncertainty import process_uncertainty
 from sysid.estimation.linear.process.words import of_bounds, of_errors, of_open, of_parameters
 from sysid.estimation.linear.segments import scaling_of
 from sysid.estimation.linear.stretches import stretches, told_of
-from sysid.estimation.linear.transfer_function_words import of_stability
+from sysid.estimation.linear.transfer_function.words import of_stability
 from sysid.estimation.nonparametric.dead_time import likely, longest_dead_time
 from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.records.informative import informative

@@ -14,7 +14,7 @@ from sysid.estimation.least_squares.provider import AbstractProvider, Linearisat
 from sysid.estimation.least_squares.termination import Termination
 from sysid.estimation.linear.process.problem import Problem
 from sysid.estimation.linear.process.starts import Begun, begun_at
-from sysid.estimation.linear.transfer_function_runs import flat_prior
+from sysid.estimation.linear.transfer_function.runs import flat_prior
 from sysid.estimation.results.result import Status
 from sysid.models.process.process_type import DEAD_TIME
 

@@ -1,9 +1,9 @@
 """Poles at 1 of a state space: those that the records do not tell from an integrator are held there.
 
 A pole that is a little off 1 has an equilibrium, as far away as it is near: with a state before the record of its own
-it makes a ramp that no input does, and a run from rest is lost. What :mod:`sysid.estimation.linear.integrators` does
-with the poles of transfer functions is done here with those of a matrix. In coordinates in which the sums stand
-first, apart from the other states, they are held as entries that are no parameters.
+it makes a ramp that no input does, and a run from rest is lost. What is done with the poles of transfer functions
+(:mod:`sysid.estimation.linear.transfer_function.integrators`) is done here with those of a matrix. In coordinates in
+which the sums stand first, apart from the other states, they are held as entries that are no parameters.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.linear import slow_poles
-from sysid.estimation.linear.integrators import TOGETHER
 from sysid.estimation.linear.segments import Segment
 from sysid.estimation.linear.state_space.coordinates import Chart
 from sysid.estimation.linear.state_space.free_runs import free_run_error
 from sysid.estimation.linear.state_space.refinement import Found, Level, Problem, size_of
 from sysid.estimation.linear.subspace.system import foreseeing
+from sysid.estimation.linear.transfer_function.integrators import TOGETHER
 from sysid.models.linear.innovations import Innovations
 
 Array = NDArray[np.float64]
