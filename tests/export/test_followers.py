@@ -13,7 +13,7 @@ from sysid.export.c.exporter import _library
 from sysid.export.measured_run import check_able, run_measured
 from sysid.models import NARX, Start, StartKind
 from tests.export.cascades import build_committee, wired_narx
-from tests.export.test_matlab import matlab, prefix_of, session  # noqa: F401
+from tests.export.languages.test_matlab import matlab, prefix_of, session  # noqa: F401
 
 BEGUN = np.array([20.0, 41.0])
 """Another level than declared, of the outputs in their order."""

@@ -7,8 +7,28 @@ from numpy.typing import NDArray
 
 from sysid.models.converting.orthonormal_basis import Domain, section_orders
 
+TOO_FAST = 10.0
+"""How many times faster than half of the sampling rate a pole is that no record shows: it settles within a sample."""
+
 _EDGE = 1e-6
 """How far inside the stable region a reflected pole comes to lie at least (relative in the s plane)."""
+
+
+def too_fast(poles: NDArray[np.complex128], sample_time: float) -> NDArray[np.complex128]:
+    """Poles of the s plane that records of a sample time do not show.
+
+    Args:
+        poles: In rad/s.
+        sample_time: In seconds.
+
+    Returns:
+        Those of them.
+
+    Example:
+        >>> too_fast(np.array([-1.0 + 0.0j, -1e6]), 0.1)
+        array([-1000000.+0.j])
+    """
+    return poles[np.abs(poles) > TOO_FAST * np.pi / sample_time]
 
 
 def sections_of(poles: NDArray[np.complex128], domain: Domain) -> tuple[NDArray[np.float64], ...]:

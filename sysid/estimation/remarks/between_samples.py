@@ -9,171 +9,33 @@ gains by these as well.
 
 The other way round, a model may have an input move that is held: :math:`n` coefficients from one lag more on, as behind
 a hold, then leave clearly less than its own run does, and as little as all lags together.
+
+A continuous transfer function has whole samples of dead time. One that ends between samples, as nearly every dead time
+of a plant does, moves its input within a sample: behind a hold, a coefficient more, one lag later, says it exactly.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
-from numpy.typing import NDArray
 
 from sysid.estimation.linear.slow_poles import significantly_better
 from sysid.estimation.records.informative import informative
 from sysid.estimation.remarks.fitted_run import FreeRun
+from sysid.estimation.remarks.tried_lags import Array, Tried, moving_in, tried_of
 from sysid.models import AbstractModel, ProcessModel, TransferFunction
-from sysid.models.contract.ratio import Ratio
 from sysid.models.converting.orthonormal_basis import Domain
 from sysid.models.orders.intersample import HELD, MOVING
 
-Array = NDArray[np.float64]
-
-MOST_SAMPLES, LEAST_SAMPLES, MOST_COLUMNS = 5_000, 100, 60
-"""Samples that are looked at: more would make the finding no surer; and columns beyond which nothing is tried."""
+MOST_SAMPLES, LEAST_SAMPLES = 5_000, 100
+"""Samples that are looked at: more would make the finding no surer."""
 WORTH, LESS, FED, ONE_STEP = 1e-2, 0.8, 0.25, 0.9
 """Part of the output's standard deviation that an error must have; what one lag less leaves at most of its square; the
 same where the output acts on the inputs, as a controller that is read backwards leaves half of it or more; and what it
 must leave by a single step, before it is tried further."""
 AS_GOOD = 1.05
 """Times the squared error of a model with a pole more up to which one lag less is as good, with less."""
-STEPS, HALVES, DONE = 8, 4, 1e-4
-"""Gauss-Newton steps of each model, how often one is halved, and by how little a step is the last."""
-MOST_RADIUS = 1.0 + 1e-9
-"""Magnitude of a pole from which a run over the record is no use to compare with."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Tried:
-    """Models of output error of one output: numerators, first states and a constant follow from the denominators.
-
-    Args:
-        inputs: Less their means, shape ``(n_samples, n_inputs)``.
-        output: Likewise, shape ``(n_samples,)``.
-        usable: Which samples count.
-        lags: Of each input the first and the last lag.
-        F: Of each input its denominator, in ``1/z``.
-        shared: Whether all have one.
-    """
-
-    inputs: Array
-    output: Array
-    usable: NDArray[np.bool_]
-    lags: tuple[tuple[int, int], ...]
-    F: tuple[Array, ...]
-    shared: bool
-
-    @property
-    def columns(self) -> int:
-        """Of all that is fitted."""
-        states = [len(F) - 1 for F in (self.F[:1] if self.shared else self.F)]
-        return sum(last - first + 1 for first, last in self.lags) + 2 * sum(states) + 1
-
-    def linear(self) -> Array:
-        """What the output is made of for these denominators, shape ``(n_samples, n_columns)``."""
-        parts = [
-            _late(scipy.signal.lfilter([1.0], F, u), lag)
-            for u, F, (first, last) in zip(self.inputs.T, self.F, self.lags, strict=True)
-            for lag in range(first, last + 1)
-        ]
-        impulse = np.eye(1, len(self.output))[0]
-        for F in self.F[:1] if self.shared else self.F:
-            begun = scipy.signal.lfilter([1.0], F, impulse)
-            parts += [_late(begun, lag) for lag in range(len(F) - 1)]
-        return np.column_stack([*parts, np.ones(len(self.output))])
-
-    def moves(self, columns: Array, weights: Array) -> Array:
-        """How the run moves with the coefficients of the denominators."""
-        found, at = [], 0
-        states = sum(last - first + 1 for first, last in self.lags)
-        each = []
-        for F, (first, last) in zip(self.F, self.lags, strict=True):
-            n = last - first + 1
-            part = columns[:, at : at + n] @ weights[at : at + n]
-            at += n
-            if not self.shared:
-                n = len(F) - 1
-                part = part + columns[:, states : states + n] @ weights[states : states + n]
-                states += n
-            each.append(part)
-        if self.shared:
-            each = [columns[:, :-1] @ weights[:-1]]
-        for F, part in zip(self.F, each, strict=False):
-            filtered = -scipy.signal.lfilter([1.0], F, part)
-            found += [_late(filtered, lag) for lag in range(1, len(F))]
-        return np.column_stack(found) if found else np.zeros((len(self.output), 0))
-
-    def moved(self, by: Array) -> _Tried:
-        """With other denominators."""
-        found, at = [], 0
-        for F in self.F[:1] if self.shared else self.F:
-            n = len(F) - 1
-            found.append(np.concatenate([[1.0], F[1:] + by[at : at + n]]))
-            at += n
-        return replace(self, F=tuple(found * len(self.F) if self.shared else found))
-
-    def solved(self) -> tuple[Array, Array, Array]:
-        """Columns, weights, and what is left of the samples that count."""
-        columns = self.linear()
-        rows = columns[self.usable]
-        scale = np.maximum(np.linalg.norm(rows, axis=0), np.finfo(np.float64).tiny)
-        weights = np.linalg.lstsq(rows / scale, self.output[self.usable], rcond=1e-12)[0] / scale
-        return columns, weights, self.output[self.usable] - rows @ weights
-
-    def stable(self) -> bool:
-        """Whether it can be run over the record."""
-        return all(np.isfinite(F).all() and _radius(F) <= MOST_RADIUS for F in self.F)
-
-    def best(self) -> tuple[_Tried, Array]:
-        """The denominators that this leads to, and what they leave."""
-        here = self
-        columns, weights, left = here.solved()
-        for _ in range(STEPS):
-            J = here.moves(columns, weights)[here.usable]
-            found = here.stepped(_step(columns[here.usable], J, left), float(left @ left))
-            if found is None:
-                break
-            before = float(left @ left)
-            here, (columns, weights, left) = found
-            if left @ left > (1.0 - DONE) * before:
-                break
-        return here, left
-
-    def stepped(self, step: Array, loss: float) -> tuple[_Tried, tuple[Array, Array, Array]] | None:
-        """Where a step, or half of it and so on, leaves less; ``None`` where none does."""
-        for halves in range(HALVES):
-            there = self.moved(step / 2**halves)
-            if there.stable():
-                found = there.solved()
-                if found[2] @ found[2] < loss:
-                    return there, found
-        return None
-
-    def best_beside(self, other: _Tried) -> Array:
-        """The least that is left from here and from the denominators of another."""
-        return min((self.best()[1], replace(self, F=other.F).best()[1]), key=lambda left: float(left @ left))
-
-    def gain(self, j: int) -> float:
-        """Part of the squared error that one lag less of an input leaves, by one step from here."""
-        columns, weights, left = self.solved()
-        J = self.moves(columns, weights)[self.usable]
-        base = np.column_stack([columns[self.usable], J])
-        first = self.lags[j][0]
-        new = _late(scipy.signal.lfilter([1.0], self.F[j], self.inputs[:, j]), first - 1)[self.usable]
-        q = scipy.linalg.orth(base / np.maximum(np.linalg.norm(base, axis=0), np.finfo(np.float64).tiny))
-        left, new = (x - q @ (q.T @ x) for x in (left, new))
-        power = float(new @ new) * float(left @ left)
-        return 1.0 - (float(new @ left) ** 2 / power if power > 0.0 else 0.0)
-
-    def with_lags(self, j: int, first: int, last: int) -> _Tried:
-        """With other lags of one input."""
-        return replace(self, lags=(*self.lags[:j], (first, last), *self.lags[j + 1 :]))
-
-    def with_pole(self, j: int) -> _Tried:
-        """With a pole more, at zero, for one input, or for all that share them."""
-        more = [np.append(F, 0.0) if self.shared or k == j else F for k, F in enumerate(self.F)]
-        return replace(self, F=tuple(more))
 
 
 def between_samples(model: AbstractModel, run: FreeRun, fed: Collection[int] = ()) -> dict[tuple[int, int], str]:
@@ -196,45 +58,25 @@ def between_samples(model: AbstractModel, run: FreeRun, fed: Collection[int] = (
     kept = informative(inputs[usable])
     for i in range(len(model.mapping.outputs)):
         own = {j: model.ratios[i, j] for j in kept if (i, j) in model.ratios and len(model.ratios[i, j].B)}
-        tried = _of(model, own, inputs - inputs[usable].mean(axis=0), output[:, i], usable)
+        tried = tried_of(model, own, inputs - inputs[usable].mean(axis=0), output[:, i], usable)
         spread = float(np.std(output[usable, i]))
         if tried is None or not np.std((run.output - run.simulated)[window][usable, i]) > WORTH * spread:
             continue
         for place, j in enumerate(own):
-            if _moves(model, j):
+            if moving_in(model, j):
                 held = _held(tried, place, spread, (run.output - run.simulated)[window][:, i])
                 told |= {} if held is None else {(i, j): _said_held(model, j, i, held)}
                 continue
             fits = _sooner(tried, place, spread, least=FED if i in fed else LESS)
             if fits is not None:
                 told[i, j] = _said(model, j, i, tried.lags[place][0], fits)
+            elif _continuous(model):
+                late = _late(tried, place, spread, (run.output - run.simulated)[window][:, i])
+                told |= {} if late is None else {(i, j): _said_late(model, j, i, late)}
     return told
 
 
-def _of(
-    model: AbstractModel, own: dict[int, Ratio], inputs: Array, output: Array, usable: NDArray[np.bool_]
-) -> _Tried | None:
-    """The models that are tried, from the poles of the one that was fitted; ``None`` where there are none to try."""
-    if not own or not np.isfinite(output[usable]).all():
-        return None
-    T = model.sample_time
-    F = tuple(_denominator(ratio, T) for ratio in own.values())
-    shared = all(len(one) == len(F[0]) and np.array_equal(one, F[0]) for one in F) and not isinstance(
-        model.structure, TransferFunction | ProcessModel
-    )
-    found = _Tried(
-        inputs=inputs[:, list(own)],
-        output=np.where(usable, output, 0.0) - output[usable].mean(),
-        usable=usable,
-        lags=tuple(_lags(ratio, moves=_moves(model, j)) for j, ratio in own.items()),
-        F=F,
-        shared=shared or len(F) == 1,
-    )
-    many = found.columns > min(MOST_COLUMNS, usable.sum() // 10)
-    return None if many or not found.stable() else found
-
-
-def _sooner(tried: _Tried, j: int, spread: float, *, least: float) -> tuple[float, float] | None:
+def _sooner(tried: Tried, j: int, spread: float, *, least: float) -> tuple[float, float] | None:
     """Fits in percent with the lags of an input as they are, and with one less, where that is clearly better."""
     first, last = tried.lags[j]
     if first == 0 or tried.gain(j) > ONE_STEP:
@@ -256,7 +98,7 @@ def _sooner(tried: _Tried, j: int, spread: float, *, least: float) -> tuple[floa
     return fits[0], fits[1]
 
 
-def _held(tried: _Tried, j: int, spread: float, errors: Array) -> tuple[float, float] | None:
+def _held(tried: Tried, j: int, spread: float, errors: Array) -> tuple[float, float] | None:
     """Fits in percent of a model's own run and of one whose input is held, where that is clearly better.
 
     Args:
@@ -271,10 +113,7 @@ def _held(tried: _Tried, j: int, spread: float, errors: Array) -> tuple[float, f
     first, last = tried.lags[j]
     if last - first < 1:
         return None
-    # A run with other first states is the same model's.
-    begun = tried.linear()[tried.usable, sum(end - start + 1 for start, end in tried.lags) :]
-    own = errors[tried.usable]
-    own = own - begun @ np.linalg.lstsq(begun, own, rcond=1e-12)[0]
+    own = tried.own(errors)
     there, held = tried.with_lags(j, first + 1, last).best()
     if not held @ held < LESS * (own @ own):
         return None
@@ -286,6 +125,57 @@ def _held(tried: _Tried, j: int, spread: float, errors: Array) -> tuple[float, f
         return None
     fits = [100.0 * (1.0 - float(np.linalg.norm(e)) / (spread * np.sqrt(len(own)))) for e in (own, held)]
     return fits[0], fits[1]
+
+
+def _late(tried: Tried, j: int, spread: float, errors: Array) -> tuple[float, float, float] | None:
+    """Fits in percent where a dead time ends between samples, and that is clearly better.
+
+    Args:
+        tried: With the lags of an input that is held.
+        j: Its place among the inputs.
+        spread: Standard deviation of the output.
+        errors: Of the model's own run, shape ``(n_samples,)``.
+
+    Returns:
+        Of the model's own run, of one with as many zeros as there can be, and of one with a coefficient more; ``None``
+        where the record does not ask for it.
+    """
+    first, last = tried.lags[j]
+    own = tried.own(errors)
+    there, late = tried.with_lags(j, first, last + 1).best()
+    if not late @ late < LESS * (own @ own):
+        return None
+    larger = there.with_pole(j).best()[1]
+    if late @ late > AS_GOOD * (larger @ larger):
+        return None
+    if not significantly_better([late[:, np.newaxis]], [own[:, np.newaxis]], parameters=1, scale=spread**2):
+        return None
+    zeros = tried.best_beside(there)
+    fits = [100.0 * (1.0 - float(np.linalg.norm(e)) / (spread * np.sqrt(len(own)))) for e in (own, zeros, late)]
+    return fits[0], fits[1], fits[2]
+
+
+def _said_late(model: AbstractModel, j: int, i: int, fits: tuple[float, float, float]) -> str:
+    structure = model.structure
+    assert isinstance(structure, TransferFunction)  # noqa: S101 - no other comes here
+    name, n, zeros = model.mapping.inputs[j], structure.poles[j], structure.zeros[j]
+    own, filled, late = fits
+    begins = f"The free run of {model.mapping.outputs[i]} has a fit of {own:.1f} %, and"
+    if zeros < n - 1 and 100.0 - filled < np.sqrt(AS_GOOD) * (100.0 - late):
+        return (
+            f"{begins} {filled:.1f} % with all zeros that {n} poles may have from {name}: it has less zeros than the "
+            f"plant, or the plant's dead time ends between samples. Write zeros: {n - 1}, or fit a ProcessModel, whose "
+            "dead time is a time."
+        )
+    return (
+        f"{begins} {late:.1f} % where {name} acts from within a sample on: the plant's dead time is no whole number of "
+        "samples, as this model's is. Fit a ProcessModel, whose dead time is a time, or write domain: discrete and "
+        f"zeros: {n}."
+    )
+
+
+def _continuous(model: AbstractModel) -> bool:
+    return isinstance(model.structure, TransferFunction) and model.structure.domain is Domain.CONTINUOUS
 
 
 def _said_held(model: AbstractModel, j: int, i: int, fits: tuple[float, float]) -> str:
@@ -301,6 +191,8 @@ def _said_held(model: AbstractModel, j: int, i: int, fits: tuple[float, float]) 
 def _said(model: AbstractModel, j: int, i: int, lag: int, fits: tuple[float, float]) -> str:
     name, target = model.mapping.inputs[j], model.mapping.outputs[i]
     other = "its dead time is too long" if lag > 1 else "it acts at once"
+    if lag > 1 and _continuous(model):
+        other += ", or no whole number of samples, as a ProcessModel's may be"
     return (
         f"{target} answers {name} sooner than this model has it: with a coefficient at lag {lag - 1} a free run of "
         f"these orders has a fit of {fits[1]:.1f} %, and without it one of {fits[0]:.1f} %. Either {name} moves "
@@ -323,46 +215,3 @@ def _remedy(model: AbstractModel, lag: int) -> str:
         return f"write feedthrough: true, or fit {whole}"
     more = " and nb greater by 1" * hasattr(structure, "nb")
     return f"write nk: {lag - 1}{more}, or fit {whole}"
-
-
-def _moves(model: AbstractModel, j: int) -> bool:
-    """Whether a model takes an input to move between samples."""
-    structure = model.structure
-    return isinstance(structure, TransferFunction) and structure.moving(model.mapping.inputs)[j]
-
-
-def _lags(ratio: Ratio, *, moves: bool) -> tuple[int, int]:
-    """First and last lag of an input in the difference equation of its samples."""
-    if ratio.discrete:
-        moved = np.flatnonzero(ratio.B)
-        first = int(moved[0]) if len(moved) else 0
-        return int(ratio.delay) + first, int(ratio.delay) + len(ratio.B) - 1
-    n, B = len(ratio.F) - 1, np.trim_zeros(ratio.B, "b")
-    k, part = divmod(ratio.delay, 1.0)
-    first = int(k) + (len(B) <= n and not moves)
-    return first, int(k) + n + (part > 0.0)
-
-
-def _denominator(ratio: Ratio, T: float) -> Array:
-    """In ``1/z``, with a first coefficient of 1."""
-    if ratio.discrete:
-        return np.asarray(ratio.F / ratio.F[0])
-    poles = np.roots(np.trim_zeros(ratio.F, "b")[::-1])
-    return np.asarray(np.real(np.poly(np.exp(poles * T))))
-
-
-def _radius(F: Array) -> float:
-    return float(np.abs(np.roots(F)).max(initial=0.0))
-
-
-def _step(columns: Array, J: Array, left: Array) -> Array:
-    """Of the coefficients of the denominators, the rest following (Kaufman 1975)."""
-    both = np.column_stack([columns, J])
-    scale = np.maximum(np.linalg.norm(both, axis=0), np.finfo(np.float64).tiny)
-    found = np.linalg.lstsq(both / scale, left, rcond=1e-12)[0] / scale
-    return np.asarray(found[columns.shape[1] :])
-
-
-def _late(x: Array, lag: int) -> Array:
-    """A signal some samples later, from zero; inputs before the record are a matter of the first states."""
-    return x if lag == 0 else np.concatenate([np.zeros(lag), x[:-lag]])

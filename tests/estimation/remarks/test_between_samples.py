@@ -19,8 +19,10 @@ PLANTS = {1: ([2.0], [1.0, 1.0]), 2: ([1.0, 0.5], [1.0, 1.4, 1.0])}
 T = 0.5
 
 
-def record(order: int, kind: str, *, noise: float, seed: int = 0, n: int = 600) -> tuple[np.ndarray, np.ndarray]:
-    """Input and output of a plant that is run forty times between samples."""
+def record(
+    order: int, kind: str, *, noise: float, seed: int = 0, n: int = 600, late: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Input and output of a plant that is run forty times between samples, so many samples late."""
     rng, t = np.random.default_rng(seed), np.arange(n * FINE) * T / FINE
     if kind == "ramps":
         u = np.interp(t, np.arange(0.0, t[-1] + 4.0, 3.0), rng.uniform(-1, 1, len(np.arange(0.0, t[-1] + 4.0, 3.0))))
@@ -32,7 +34,8 @@ def record(order: int, kind: str, *, noise: float, seed: int = 0, n: int = 600) 
         u = np.repeat(rng.choice([-1.0, 1.0], n), FINE)
     held = kind in {"held", "levels"}
     num, den, _ = signal.cont2discrete(PLANTS[order], T / FINE, "zoh" if held else "foh")
-    y = signal.lfilter(np.ravel(num), den, u)[::FINE]
+    dead = round(late * FINE)
+    y = np.concatenate([np.zeros(dead), signal.lfilter(np.ravel(num), den, u)])[: len(u) : FINE]
     return u[::FINE], y + noise * np.std(y) * rng.normal(size=n)
 
 
@@ -149,3 +152,39 @@ def test_an_input_that_does_move_is_not_said_to_be_held(poles: int, kind: str) -
 def test_a_model_with_too_few_poles_is_not_told_of_a_hold() -> None:
     for seed in range(4):
         assert not said_held(*record(2, "sines", noise=0.01, seed=seed), 1)
+
+
+def continuous(poles: int, zeros: int) -> sysid.TransferFunction:
+    return sysid.TransferFunction(poles=poles, zeros=zeros, domain="continuous")
+
+
+def told_late(structure: sysid.TransferFunction, u: np.ndarray, y: np.ndarray) -> list[str]:
+    fit = fitting.fit([trace_of(u, y, sample_time=T)], ONE, structure, start=ESTIMATED, stability=None)
+    return [told for told in fit.warnings if "ProcessModel" in told]
+
+
+@pytest.mark.parametrize("late", [0.5, 1.3])
+@pytest.mark.parametrize("poles", PLANTS)
+def test_a_dead_time_that_ends_between_samples_is_told_with_what_has_one(poles: int, late: float) -> None:
+    """Such fits ended 3 to 5 points below what the record allows, CONVERGED, without a word."""
+    u, y = record(poles, "levels", noise=0.01, late=late)
+    (told,) = told_late(continuous(poles, poles - 1), u, y)
+    assert "no whole number of samples" in told
+    said = float(told.split(", and ")[1].split(" %")[0])
+    assert f"domain: discrete and zeros: {poles}" in told
+    discrete = sysid.TransferFunction(poles=poles, zeros=poles, domain="discrete")
+    fit = fitting.fit([trace_of(u, y, sample_time=T)], ONE, discrete, start=ESTIMATED, stability=None)
+    assert said == pytest.approx(100.0 * (1.0 - np.sqrt(fit.history["mse"][-1]) / np.std(y)), abs=0.3)
+
+
+def test_a_zero_that_is_missing_is_told_as_that() -> None:
+    u, y = record(2, "levels", noise=0.01)
+    (told,) = told_late(continuous(2, 0), u, y)
+    assert "Write zeros: 1" in told
+
+
+@pytest.mark.parametrize("late", [0.0, 2.0])
+@pytest.mark.parametrize("poles", PLANTS)
+def test_a_dead_time_of_whole_samples_brings_no_word(poles: int, late: float) -> None:
+    u, y = record(poles, "levels", noise=0.05, late=late, seed=2)
+    assert not told_late(continuous(poles, poles - 1), u, y)

@@ -8,9 +8,11 @@ import numpy as np
 
 from sysid.estimation.linear.delay_search import CHANCE, READ_BACKWARDS, searched_delays
 from sysid.estimation.linear.pole_starts import PoleStart
+from sysid.estimation.linear.poles import too_fast
 from sysid.estimation.linear.transfer_function.problem import AbstractProblem
 from sysid.estimation.linear.transfer_function.runs import EXACT, Candidate, short_run, tried
 from sysid.estimation.nonparametric.dead_time import AROUND, around
+from sysid.models.converting.orthonormal_basis import Domain, section_poles
 
 COMPARED = 2
 """Starts, the best as they are, from which a dead time is tried."""
@@ -116,6 +118,8 @@ class DelaySearch:
     def loss_near(self, delays: tuple[int, ...], unknown: int) -> float:
         """After a short run from the poles of the best next to them: a sample more of an input hardly moves those.
 
+        A dead time that is too long has poles run away to where they do nothing, from where no run comes back.
+
         Args:
             delays: In samples.
             unknown: First samples of each record that do not count.
@@ -125,9 +129,16 @@ class DelaySearch:
         """
         near = [one for of, one in self.reached.items() if max(abs(np.subtract(of, delays))) <= AROUND]
         best = min(near, key=lambda one: one.loss, default=None)
-        if best is None or not np.isfinite(best.loss):
+        if best is None or not np.isfinite(best.loss) or self._run_away(best):
             return self.loss_at(delays, unknown)
         start = PoleStart(name="next to it", sections=best.provider.poles.sections(best.theta))
         provider = self.problem.provider(delays, unknown=unknown)
         self.reached[delays] = short_run(start, delays, provider, self.problem.training)
         return self.reached[delays].loss
+
+    def _run_away(self, found: Candidate) -> bool:
+        """Whether poles lie where a record shows nothing of them."""
+        if self.problem.orders.domain is Domain.DISCRETE:
+            return False
+        each = [section_poles(d, Domain.CONTINUOUS) for of in found.provider.poles.sections(found.theta) for d in of]
+        return bool(len(too_fast(np.concatenate(each), self.problem.terms.sample_time)))

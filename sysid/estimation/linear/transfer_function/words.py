@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.linear import slow_poles
+from sysid.estimation.linear.poles import too_fast
 from sysid.estimation.linear.transfer_function.level import at_edge
 from sysid.estimation.linear.transfer_function.runs import Candidate
 from sysid.models import TransferFunctionModel
 from sysid.models.converting.orthonormal_basis import Domain
 from sysid.units import in_unit
-
-TOO_FAST = 10.0
-"""How many times faster than half of the sampling rate a pole is that no record shows: it settles within a sample."""
 
 
 def of_starts(candidates: Sequence[Candidate], best: Candidate, unit: float) -> tuple[str, ...]:
@@ -104,8 +102,7 @@ def of_speed(model: TransferFunctionModel) -> tuple[str, ...]:
     if model.orders.domain is Domain.DISCRETE:
         return ()
     poles = np.concatenate([model.poles(j) for j in range(len(model.sections))])
-    nyquist = np.pi / model.sample_time
-    fast = poles[np.abs(poles) > TOO_FAST * nyquist]
+    nyquist, fast = np.pi / model.sample_time, too_fast(poles, model.sample_time)
     if not len(fast):
         return ()
     fastest = complex(fast[int(np.argmax(np.abs(fast)))])
