@@ -26,7 +26,7 @@ from scipy.signal import butter, lfilter
 
 import sysid
 from sysid.estimation.linear.polynomial import fit as polynomial
-from sysid.estimation.linear.transfer_function.fit import fit as transfer_function
+from sysid.estimation.linear.transfer_function import fit as transfer_function
 
 COMPILING, NOISE, SEED = 2_000, 0.05, 0
 START = sysid.Start(kind="estimated")

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from sysid.estimation.fitting import fit
 from sysid.estimation.linear.polynomial import fit as polynomial
 from sysid.estimation.linear.stretches import KEPT, LONG, SHORTEST, stretches
-from sysid.estimation.linear.transfer_function.fit import fit as transfer_function
+from sysid.estimation.linear.transfer_function import fit as transfer_function
 from sysid.estimation.linear.variable_projection import SeparableProvider
 from sysid.estimation.records.experiment import experiments_of
 from sysid.models import ARMAX, OE, Mapping, Start, StartKind, TransferFunction

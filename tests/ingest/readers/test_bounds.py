@@ -14,7 +14,7 @@ import pytest
 
 from sysid.errors import ReaderError, TraceError
 from sysid.ingest import inspect_file, propose_dataset, read_table
-from sysid.ingest.readers import bounds, json_text
+from sysid.ingest.readers import bounds, json_tree
 from tests.ingest.readers.test_zoo_binary import proposed
 from tests.ingest.readers.zoo_binary import TIME, U, Y, cells, hdf5, iddata, mat, npz, packed, workbook
 
@@ -109,7 +109,7 @@ def test_a_link_into_another_file_is_not_followed(tmp_path: Path) -> None:
 
 def test_json_is_counted_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a.json").write_text(json.dumps([[]] * 10_000))
-    monkeypatch.setattr(json_text, "_MOST_BYTES", 10_000)
+    monkeypatch.setattr(json_tree, "_MOST_BYTES", 10_000)
     with pytest.raises(ReaderError, match="lists and numbers"):
         read_table(tmp_path / "a.json")
 

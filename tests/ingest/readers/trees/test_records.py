@@ -125,15 +125,15 @@ def test_a_temperature_is_no_clock(tmp_path: Path) -> None:
 def test_records_of_one_json_file_are_parsed_once_until_it_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from sysid.ingest.readers import json_text
+    from sysid.ingest.readers import json_tree
 
-    parsed, plain = list[str](), json_text._content
+    parsed, plain = list[str](), json_tree._content
 
     def counted(text: str) -> Any:
         parsed.append(text)
         return plain(text)
 
-    monkeypatch.setattr(json_text, "_content", counted)
+    monkeypatch.setattr(json_tree, "_content", counted)
     file = tmp_path / "a.json"
     for last in (1, 2):
         file.write_text(json.dumps({"u": [1, 2, last], "padding": "x" * last}))
