@@ -163,7 +163,7 @@ def _said_late(model: AbstractModel, j: int, i: int, fits: tuple[float, float, f
     begins = f"The free run of {model.mapping.outputs[i]} has a fit of {own:.1f} %, and"
     if zeros < n - 1 and 100.0 - filled < np.sqrt(AS_GOOD) * (100.0 - late):
         return (
-            f"{begins} {filled:.1f} % with all zeros that {n} poles may have from {name}: it has less zeros than the "
+            f"{begins} {filled:.1f} % with all zeros that {n} poles may have from {name}: it has fewer zeros than the "
             f"plant, or the plant's dead time ends between samples. Write zeros: {n - 1}, or fit a ProcessModel, whose "
             "dead time is a time."
         )
