@@ -237,6 +237,7 @@ def test_what_needs_no_care_is_left_alone() -> None:
     assert names.visible(plain) == names.markdown(plain) == names.c_comment(plain) == plain
     assert names.csv_cell("BP [kPa]") == "BP [kPa]"
     assert names.tracking_key("VAL 1") == "VAL 1"
+    assert names.tracking_key("VAL 1 (µ=0.3)/a") == "VAL 1 ___0.3__a"
     assert not keyword.iskeyword(names.c_identifier("level"))
 
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from sysid.errors import UserError
 from sysid.estimation.linear.arx import fit_arx
-from sysid.estimation.linear.order_search import Criterion, OrderGrid, search_orders
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import Criterion, search_orders
 from sysid.estimation.remarks.fitted_run import FreeRun
 from sysid.models import ARX, ARXModel, Mapping, Start, StartKind
 from sysid.traces import Trace

@@ -11,7 +11,8 @@ from sysid.api.fits import Fit
 from sysid.api.per_output import PerOutput, framed
 from sysid.api.vector_order_search import VectorOrderSearch
 from sysid.estimation import StabilityOptions, fitting
-from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import Criterion, OrderLosses
 from sysid.estimation.linear.state_space.orders import StateOrders
 from sysid.models import ARX, Mapping, Start
 from sysid.traces import Role, TraceSet

@@ -15,7 +15,8 @@ from sysid.api.vector_order_search import VectorOrderSearch
 from sysid.errors import ConfigError, shortened
 from sysid.estimation.least_squares.threads import one_blas_thread
 from sysid.estimation.linear import order_search
-from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import Criterion, OrderLosses
 from sysid.estimation.linear.state_space.orders import state_orders
 from sysid.estimation.nonparametric.dead_time import longest_dead_time, shares
 from sysid.estimation.nonparametric.feedback import feedback_of

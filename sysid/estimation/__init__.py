@@ -6,8 +6,8 @@ from sysid.lazy_names import imported_when_asked
 
 if TYPE_CHECKING:
     from sysid.estimation.linear.arx import fit_arx as fit_arx
-    from sysid.estimation.linear.frequency_response.fit import Spectrum as Spectrum
     from sysid.estimation.linear.frequency_response.fit import fit_spectra as fit_spectra
+    from sysid.estimation.linear.frequency_response.spectrum import Spectrum as Spectrum
     from sysid.estimation.linear.instrumental import fit_iv4 as fit_iv4
     from sysid.estimation.linear.modes import Mode as Mode
     from sysid.estimation.linear.modes import modes as modes

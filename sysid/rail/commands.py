@@ -18,6 +18,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from sysid.rail.dynamics.track import TrackProfile
+    from sysid.rail.dynamics.train import Train
+    from sysid.rail.track.features import Feature
+    from sysid.rail.track.terrain import Shape
+
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -73,7 +78,6 @@ def terrain(
 
     from sysid.rail.dynamics.train import read_train
     from sysid.rail.track.features import features
-    from sysid.rail.track.handling import SPEED_GAINS, lateral_ratio, passage, peak_force, quadrant, sag_acceleration
     from sysid.rail.track.terrain import CREST, PATTERNS, Shape, combined, correlation, effective_grade
 
     line, consist = _line(track, section), read_train(train)
@@ -91,33 +95,14 @@ def terrain(
             remedy="take a longer step",
         )  # fmt: skip
     typer.echo(f"{line.name}: {len(x)} places from {x[0]:.0f} to {x[-1]:.0f} m; {consist.name}, {shape.length:.0f} m")
-    if dry_run:
-        typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/terrain.csv and .svg" if out else ""))
+    if _only_said(dry_run, out, "terrain"):
         return
     patterns = (CREST,) if pattern is Combination.CREST else PATTERNS
     each = [correlation(line, shape, x, pattern=one, look_ahead=look_ahead) for one in patterns]
     felt = each[0] if len(each) == 1 else combined(each, pattern.value)
     found = features(x, felt)
     for one in found:
-        over = passage(one, consist)
-        force = peak_force(line, consist, over)
-        if one.kind == "crest":
-            handling = f"no power until half the train is past; gain at most {3.6 * SPEED_GAINS[one.severity]:.0f} km/h"
-        else:
-            handling = f"hold {sag_acceleration(line, shape, one.apex):+.3f} m/s2"
-        pulls = f"{'draft' if force.force >= 0.0 else 'buff'} {abs(force.force) / 1000.0:.0f} kN at {force.at:.0f} m"
-        typer.echo(
-            f"{one.kind:<6} {one.severity.value:<7} {one.start:8.0f} to {one.end:8.0f} m, strongest at {one.apex:8.0f} "
-            f"m ({1000.0 * one.correlation:+.1f} per mille): {handling}"
-            + (f"; coupler {force.coupler} {pulls}" if force.coupler else "")
-        )
-        if line.curvatures.any():
-            ratios = np.stack([lateral_ratio(line, consist, float(place)) for place in over])
-            place, worst = np.unravel_index(np.argmax(np.abs(ratios)), ratios.shape)
-            typer.echo(
-                f"       {quadrant(one, line, shape).value}; at a crawl L/V {ratios[place, worst]:+.3f} at vehicle "
-                f"{worst + 1} at {over[place]:.0f} m"
-            )
+        _tell_feature(one, line, consist, shape)
     if not found:
         typer.echo("neither crest nor sag")
     if out is not None:
@@ -126,11 +111,38 @@ def terrain(
             "position_m": x, "elevation_m": line.elevation(x), "grade": line.grade(x),
             "effective_grade": grades, "correlation": felt,
         }  # fmt: skip
-        _write(out, "terrain", columns)
-        _picture(out / "terrain.svg", x / 1000.0, "position of the leading end [km]", [
+        spans = [(one.start / 1000.0, one.end / 1000.0, f"{one.kind}, {one.severity.value}") for one in found]
+        _save(out, "terrain", columns, x=x / 1000.0, label="position of the leading end [km]", rows=[
             ("elevation [m]", columns["elevation_m"]), ("correlation [per mille]", 1000.0 * felt),
             ("effective grade [per mille]", 1000.0 * grades),
-        ], [(one.start / 1000.0, one.end / 1000.0, f"{one.kind}, {one.severity.value}") for one in found])  # fmt: skip
+        ], spans=spans)  # fmt: skip
+
+
+def _tell_feature(one: Feature, line: TrackProfile, consist: Train, shape: Shape) -> None:
+    """Where a crest or a sag lies, how severe it is, how to handle it and what couplers feel; and in curves, L/V."""
+    import numpy as np
+
+    from sysid.rail.track.handling import SPEED_GAINS, lateral_ratio, passage, peak_force, quadrant, sag_acceleration
+
+    over = passage(one, consist)
+    force = peak_force(line, consist, over)
+    if one.kind == "crest":
+        handling = f"no power until half the train is past; gain at most {3.6 * SPEED_GAINS[one.severity]:.0f} km/h"
+    else:
+        handling = f"hold {sag_acceleration(line, shape, one.apex):+.3f} m/s2"
+    pulls = f"{'draft' if force.force >= 0.0 else 'buff'} {abs(force.force) / 1000.0:.0f} kN at {force.at:.0f} m"
+    typer.echo(
+        f"{one.kind:<6} {one.severity.value:<7} {one.start:8.0f} to {one.end:8.0f} m, strongest at {one.apex:8.0f} "
+        f"m ({1000.0 * one.correlation:+.1f} per mille): {handling}"
+        + (f"; coupler {force.coupler} {pulls}" if force.coupler else "")
+    )
+    if line.curvatures.any():
+        ratios = np.stack([lateral_ratio(line, consist, float(place)) for place in over])
+        place, worst = np.unravel_index(np.argmax(np.abs(ratios)), ratios.shape)
+        typer.echo(
+            f"       {quadrant(one, line, shape).value}; at a crawl L/V {ratios[place, worst]:+.3f} at vehicle "
+            f"{worst + 1} at {over[place]:.0f} m"
+        )
 
 
 @app.command(epilog="Example: sysid rail drive card.csv train.yaml --section A --stop 1000 --point 700")
@@ -172,8 +184,7 @@ def drive(
         driver: Any = CardDriver(train=consist, card=rows, section=section, stop=stop, point=begins)
     else:
         driver = FullNotchDriver(train=consist, limits=line, stop=stop, point=begins)
-    if dry_run:
-        typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/drive.csv and .svg" if out else ""))
+    if _only_said(dry_run, out, "drive"):
         return
     moving = MovingTrain(train=consist, track=line)
     run = driven(moving, no_brake(len(consist.vehicles)), driver, Limits(duration=longest, block=1, back=MISSED))
@@ -203,8 +214,7 @@ def drive(
             "time_s": run.motion.time, "position_m": run.position, "speed_m_s": run.speed, "limit_m_s": limits,
             "notch": run.notch.astype(float),
         }  # fmt: skip
-        _write(out, "drive", columns)
-        _picture(out / "drive.svg", run.position / 1000.0, "distance [km]", [
+        _save(out, "drive", columns, x=run.position / 1000.0, label="distance [km]", rows=[
             ("speed [km/h]", 3.6 * run.speed), ("limit [km/h]", np.where(np.isfinite(limits), 3.6 * limits, np.nan)),
             ("notch", columns["notch"]), ("elevation [m]", line.elevation(run.position)),
         ])  # fmt: skip
@@ -235,8 +245,7 @@ def eot(
     for at, done, psi in bench.readings:
         typer.echo(f"{at:6.1f} s  {psi:6.2f} psi  {done}")
     typer.echo(f"{consist.vehicles} vehicles, handle to {handle:g} psi after 5 s, {seconds:g} s")
-    if dry_run:
-        typer.echo("nothing is done: --dry-run" + (f"; it would write {out}/eot.csv and .svg" if out else ""))
+    if _only_said(dry_run, out, "eot"):
         return
     found = from_both_ends(consist, handle, seconds=seconds)
     for message, answer in found.log[:1]:
@@ -260,9 +269,7 @@ def eot(
             for ends, values in (("both", found.both), ("one", found.one))
             for place, node in places.items()
         }
-        _write(out, "eot", columns)
-        shown = [(name.replace("_", " "), values) for name, values in columns.items() if name != "time_s"]
-        _picture(out / "eot.svg", found.time, "time [s]", shown)
+        _save(out, "eot", columns, x=found.time, label="time [s]")
 
 
 @app.command(epilog="Example: sysid rail stops --friction 0.7 --grade -0.01")
@@ -294,9 +301,7 @@ def stops(
     known = characteristic_of(servo()) if trace is None else identify_characteristic(read_trace(trace))
     knots = ", ".join(f"{a / MPH:.2f} at {p:.1f}" for p, a in zip(known.signals, known.decelerations, strict=True))
     typer.echo(f"characteristic from {trace or 'the nominal vehicle'}: {knots} (mph/s at mA)")
-    if dry_run:
-        files = [str(record)] * (record is not None) + [f"{out}/stops.csv and .svg"] * (out is not None)
-        typer.echo("nothing is done: --dry-run" + (f"; it would write {', '.join(files)}" if files else ""))
+    if _only_said(dry_run, out, "stops", record):
         return
     if record is not None:
         write_csv(slow_application(TransitVehicle(model=servo(), friction=friction, speed=2000.0)), record)
@@ -315,9 +320,7 @@ def stops(
             for name, channel in (("wanted_m_s", "V_REF"), ("speed_m_s", "V"), ("deceleration_m_s2", "A"),
                                   ("signal_mA", "P"), ("modifier", "M"))
         }  # fmt: skip
-        _write(out, "stops", columns)
-        shown = [(name.replace("_", " "), values) for name, values in columns.items() if name != "time_s"]
-        _picture(out / "stops.svg", columns["time_s"], "time of all stops [s]", shown)
+        _save(out, "stops", columns, x=columns["time_s"], label="time of all stops [s]")
 
 
 def _line(path: Path, section: str | None) -> Any:
@@ -341,22 +344,36 @@ def _line(path: Path, section: str | None) -> Any:
     return card.profile(section or card.sections[0])
 
 
-def _write(folder: Path, name: str, columns: dict[str, NDArray[np.float64]]) -> None:
+def _only_said(dry_run: bool, out: Path | None, name: str, record: Path | None = None) -> bool:
+    """Whether nothing shall be done; then it is said what would be written."""
+    if dry_run:
+        files = [str(record)] * (record is not None) + [f"{out}/{name}.csv and .svg"] * (out is not None)
+        typer.echo("nothing is done: --dry-run" + (f"; it would write {', '.join(files)}" if files else ""))
+    return dry_run
+
+
+def _save(
+    folder: Path,
+    name: str,
+    columns: dict[str, NDArray[np.float64]],
+    *,
+    x: NDArray[np.float64],
+    label: str,
+    rows: Sequence[tuple[str, NDArray[np.float64]]] = (),
+    spans: Sequence[tuple[float, float, str]] = (),
+) -> None:
+    """The table, and a picture of some rows, or of every column but the time."""
     import numpy as np
 
     from sysid.atomic import replacing
 
     folder.mkdir(parents=True, exist_ok=True)
     with replacing(folder / f"{name}.csv") as draft:
-        np.savetxt(
-            draft,
-            np.column_stack(list(columns.values())),
-            fmt="%.9g",
-            delimiter=",",
-            header=",".join(columns),
-            comments="",
-        )
+        table = np.column_stack(list(columns.values()))
+        np.savetxt(draft, table, fmt="%.9g", delimiter=",", header=",".join(columns), comments="")
     typer.echo(f"written: {folder / f'{name}.csv'}")
+    shown = rows or [(one.replace("_", " "), values) for one, values in columns.items() if one != "time_s"]
+    _picture(folder / f"{name}.svg", x, label, shown, spans)
 
 
 def _picture(
@@ -364,7 +381,7 @@ def _picture(
     x: NDArray[np.float64],
     label: str,
     rows: Sequence[tuple[str, NDArray[np.float64]]],
-    spans: Sequence[tuple[float, float, str]] = (),
+    spans: Sequence[tuple[float, float, str]],
 ) -> None:
     """One panel a row, what is marked shaded in all of them."""
     from matplotlib.figure import Figure

@@ -19,15 +19,14 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.atomic import replacing
 from sysid.errors import ConfigError
 from sysid.ingest import TraceCache, content_key, default_cache_folder
 from sysid.references.config import ReferenceConfig
+from sysid.references.kept_runs import KeptRuns, Note
 from sysid.references.kinds import FORMAT
 from sysid.references.processes import ReferenceProcess
 from sysid.traces import Channel, Trace
@@ -278,7 +277,10 @@ class ReferenceRuns:
         if self._stopped.is_set():
             return None
         if not any(how in (outcome.reason or "") for how in FROM_OUTSIDE):
-            self._keep(key, outcome)
+            note = Note(
+                reason=outcome.reason, before=outcome.before, cpu_s=outcome.cpu_s, wall_s=outcome.wall_s
+            )  # fmt: skip
+            self._store.keep(key, note, outcome.trace)
         return outcome
 
     def _made(self, case: Case) -> Outcome:
@@ -334,55 +336,33 @@ class ReferenceRuns:
             provenance=(case.told,) if case.told else (),
         )
 
-    def _note(self, key: str) -> Path:
-        return self.folder / "references" / f"{key}.json"
-
     @property
     def _too_long(self) -> str:
         return f"{TOO_LONG} {self.config.time_limit:g} s, its time limit"
 
-    def _told(self, key: str) -> dict[str, Any] | None:
+    @property
+    def _store(self) -> KeptRuns:
+        return KeptRuns(self.folder)
+
+    def _told(self, key: str) -> Note | None:
         """What is noted of a run; nothing of one that had another time limit, and was not done in it."""
-        try:
-            note = dict(json.loads(self._note(key).read_text(encoding="utf-8")))
-            outdated = str(note["reason"]).startswith(TOO_LONG) and note["reason"] != self._too_long
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
+        note = self._store.note(key)
+        outdated = note is not None and (note.reason or "").startswith(TOO_LONG) and note.reason != self._too_long
         return None if outdated else note
 
     def _kept(self, case: Case, key: str) -> Outcome | None:
         note = self._told(key)
         if note is None:
             return None
-        try:
-            trace = None if note["reason"] else TraceCache(folder=self.folder).load(key)
-            if trace is None and not note["reason"]:
-                return None
-            # The same experiment may have had another name in another study.
-            named = None if trace is None else self._trace(case, trace.columns(tuple(self.config.outputs)))
-            return Outcome(
-                case=case, trace=named, before=note["before"], reason=note["reason"], cpu_s=_number(note["cpu_s"]),
-                wall_s=_number(note["wall_s"]), stored=True,
-            )  # fmt: skip
-        except (OSError, ValueError, KeyError, TypeError):
+        kept = None if note.reason else self._store.trace(key)
+        if kept is None and not note.reason:
             return None
-
-    def _keep(self, key: str, outcome: Outcome) -> None:
-        """The record first, the note that it is there last."""
-        if outcome.trace is not None:
-            TraceCache(folder=self.folder).store(key, outcome.trace)
-        note = {
-            "reason": outcome.reason,
-            "before": dict(outcome.before),
-            "cpu_s": outcome.cpu_s if np.isfinite(outcome.cpu_s) else None,
-            "wall_s": outcome.wall_s if np.isfinite(outcome.wall_s) else None,
-        }
-        with contextlib.suppress(OSError), replacing(self._note(key)) as draft:
-            draft.write_text(json.dumps(note), encoding="utf-8")
-
-
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else float(value)
+        # The same experiment may have had another name in another study.
+        trace = None if kept is None else self._trace(case, kept.columns(tuple(self.config.outputs)))
+        return Outcome(
+            case=case, trace=trace, before=note.before, reason=note.reason, cpu_s=note.cpu_s, wall_s=note.wall_s,
+            stored=True,
+        )  # fmt: skip
 
 
 def channels_of(config: ReferenceConfig) -> tuple[Channel, ...]:

@@ -19,7 +19,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sysid.estimation import fit_transfer_function
-from sysid.estimation.linear.order_search import OrderGrid, search_orders
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import search_orders
 from sysid.estimation.linear.time_record import TimeRecord
 from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
 from sysid.models import Domain, Mapping, TransferFunction

@@ -15,7 +15,8 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from sysid.estimation import FitResult, Training, fit_arx, fit_narx, fit_transfer_function
-from sysid.estimation.linear.order_search import OrderGrid, search_orders
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import search_orders
 from sysid.ingest import load_dataset
 from sysid.models import ARX, NARX, Mapping, Start, TransferFunction
 from sysid.traces import Role, TraceSet

@@ -23,7 +23,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from sysid.estimation import FitResult, fit_arx, fit_state_space, fit_transfer_function
-from sysid.estimation.linear.order_search import OrderGrid, search_orders
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import search_orders
 from sysid.models import LinearStateSpace, Mapping, Start, StartKind, TransferFunction
 from sysid.traces import Channel, Trace
 from sysid.validation.order_finalists import finalist_of, run_finalists

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 from sysid.estimation import fit_arx, fit_iv4
-from sysid.estimation.linear.order_search import OrderGrid, search_orders
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import search_orders
 from sysid.models import ARX, Mapping, Start, StartKind
 from sysid.traces import Trace
 from tests.estimation.linear_systems import arx_response, trace_of

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sysid.estimation.linear.order_search import OrderGrid, search_orders
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import search_orders
 from sysid.models import ARX, Mapping, Start
 from sysid.traces import Role
 from sysid.validation import evaluate_case

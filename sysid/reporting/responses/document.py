@@ -190,13 +190,10 @@ def _orders(fit: ResponseFitRecord) -> Table:
     return plain_table(
         "Structures that were compared, the best first.",
         [
-            ("structure", ""), ("poles", ""), ("zeros", ""), ("dead time", "s"), ("error where left out", "%"),
-            ("fit", "%"), ("score", "beyond the best"),
+            ("poles / zeros", ""), ("dead time", "s"), ("error where left out", "%"), ("fit", "%"),
+            ("score", "beyond the best"),
         ],
-        [
-            [f"{one.poles} / {one.zeros}", one.poles, one.zeros, one.dead_time, one.left_out, one.fit, one.score]
-            for one in orders
-        ],
+        [[f"{one.poles} / {one.zeros}", one.dead_time, one.left_out, one.fit, one.score] for one in orders],
         note="Score: the squared errors where left out, in variances of the noise, and BIC's price of a parameter.",
     )  # fmt: skip
 

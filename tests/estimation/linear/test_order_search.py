@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from sysid.errors import ConfigError, TraceError
 from sysid.estimation import fit_arx
-from sysid.estimation.linear.order_search import Criterion, OrderGrid, OrderLosses, search_orders
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import Criterion, OrderLosses, search_orders
 from sysid.models import ARX, Mapping, Start, StartKind
 from sysid.traces import Trace
 from tests.estimation.linear_systems import arx_response, steps, trace_of

@@ -13,7 +13,8 @@ from sysid.errors import TraceError
 from sysid.estimation import Loop, Training, fit_arx, fit_narx
 from sysid.estimation.fitting import fit
 from sysid.estimation.linear.instrumental import fit_iv4
-from sysid.estimation.linear.order_search import OrderGrid, search_orders
+from sysid.estimation.linear.order_grid import OrderGrid
+from sysid.estimation.linear.order_search import search_orders
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import (
     ARX,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.models import ARX, NeuralStateSpace
@@ -33,13 +34,23 @@ def trial(point: Point, mse: float) -> Trial:
     )
 
 
+def planned(
+    wall_s: float | None = None, *, iterations: int | None = None, clock: Sequence[float] = (0.0,), workers: int = 1,
+    looked: Looked = LOOKED, **given: Any,
+) -> Plan:  # fmt: skip
+    """A plan of which nothing was tried yet; the first number of the clock is the time."""
+    budget = Budget(
+        wall_s=wall_s, iterations=iterations, clock=lambda: clock[0], is_stored=lambda _: False, side_by_side=workers
+    )
+    return Plan(looked=looked, budget=budget, error=error, **given)
+
+
 def searched(
     worth: Worth, *, iterations: int = 10**9, looked: Looked = LOOKED, again: int = 0
 ) -> tuple[Plan, list[list[Point]]]:
     """A search in which a point is worth what is said of it, without a fit."""
-    budget = Budget(wall_s=None, iterations=iterations, clock=lambda: 0.0, is_stored=lambda _: False)
     training = {"max_iterations": 50}
-    plan, rounds = Plan(looked=looked, budget=budget, error=error, training=training, again=again), []
+    plan, rounds = planned(iterations=iterations, looked=looked, training=training, again=again), []
     while points := plan.ask():
         rounds.append(points)
         plan.tell([trial(point, worth(point)) for point in points])

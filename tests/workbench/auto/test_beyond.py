@@ -16,7 +16,7 @@ from sysid.workbench.auto.beyond import FEWEST, TOLD, Beyond, Models, look_beyon
 from sysid.workbench.auto.words import choose, sentence, shown_in
 from sysid.workbench.auto.worth import error
 from sysid.workbench.sweep.search_space import Point
-from tests.workbench.auto.test_plan import trial
+from tests.workbench.auto.searches import trial
 
 CHANNELS = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
 U = np.repeat([0.0, 1.0, 0.0, 1.0], 100)

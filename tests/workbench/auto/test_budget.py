@@ -8,7 +8,7 @@ from sysid.estimation.clock import SLOWEST
 from sysid.models import ARX, NeuralStateSpace
 from sysid.workbench.auto.budget import REFIT, Budget, price
 from sysid.workbench.sweep.search_space import Point
-from tests.workbench.auto.test_plan import trial
+from tests.workbench.auto.searches import trial
 
 
 def point(number: int, neurons: int, starts: int = 1) -> Point:

@@ -16,7 +16,7 @@ from sysid.workbench.auto.budget import REFIT, price
 from sysid.workbench.auto.last_fit import LEAST_LAST, SCATTER, SURE, LastFit
 from sysid.workbench.auto.parts import ENSEMBLE, UNITED
 from sysid.workbench.sweep.search_space import Point
-from tests.workbench.auto.test_plan import trial
+from tests.workbench.auto.searches import trial
 
 NETWORK = NeuralStateSpace(states=2, neurons=3)
 POINT = Point(number=7, structure=NETWORK, training={"max_iterations": 100, "choose_by": "evidence"}, values={})

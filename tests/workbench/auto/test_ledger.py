@@ -10,13 +10,13 @@ import pytest
 from sysid.estimation.estimators import ESTIMATORS
 from sysid.models import NeuralStateSpace
 from sysid.reporting.sweep_record import Trial
-from sysid.workbench.auto.budget import Budget, price
+from sysid.workbench.auto.budget import price
 from sysid.workbench.auto.parts import ENSEMBLE
-from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS, Plan
+from sysid.workbench.auto.plan import ENSEMBLES, FINALISTS
 from sysid.workbench.auto.worth import error, scatter, with_repeats
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import NOT_DONE
-from tests.workbench.auto.searches import LOOKED, by_size, linear, searched, trial
+from tests.workbench.auto.searches import by_size, linear, planned, searched, trial
 
 
 def test_the_best_networks_are_trained_again_and_luck_does_not_choose() -> None:
@@ -56,8 +56,7 @@ def test_what_comes_to_nothing_again_takes_no_other_away() -> None:
 
 def test_a_network_for_whose_second_start_the_time_was_up_is_worth_what_it_was() -> None:
     """One that was worse, and done again in time, had been chosen in its place."""
-    budget = Budget(wall_s=None, iterations=10**9, clock=lambda: 0.0, is_stored=lambda _: False)
-    plan = Plan(looked=LOOKED, budget=budget, error=error, training={"max_iterations": 50}, again=1)
+    plan = planned(iterations=10**9, training={"max_iterations": 50}, again=1)
     late = {"usable": False, "reason": NOT_DONE, "selection_free_run_mse": math.nan}
     while points := plan.ask():
         found = [trial(point, by_size(point)) for point in points]
@@ -72,15 +71,14 @@ def test_a_network_for_whose_second_start_the_time_was_up_is_worth_what_it_was()
 
 def test_a_network_for_whose_second_start_there_was_no_time_is_worth_what_it_was() -> None:
     """A state space of four neurons gave way to a network of eight with more error, as that alone was done again."""
-    budget = Budget(wall_s=None, iterations=10**9, clock=lambda: 0.0, is_stored=lambda _: False)
-    plan = Plan(looked=LOOKED, budget=budget, error=error, training={"max_iterations": 50}, again=1)
-    take = budget.take
+    plan = planned(iterations=10**9, training={"max_iterations": 50}, again=1)
+    take = plan.budget.take
 
     def all_but_the_first(points: Sequence[Point]) -> list[Point]:
         again = "seed" in points[0].training and "ensemble" not in points[0].training
         return take(points[1:] if again else points)
 
-    budget.take = all_but_the_first  # type: ignore[method-assign]
+    plan.budget.take = all_but_the_first  # type: ignore[method-assign]
     while points := plan.ask():
         plan.tell([trial(point, by_size(point)) for point in points])
     assert plan.n_again == FINALISTS - 1

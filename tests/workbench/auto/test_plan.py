@@ -8,12 +8,12 @@ from dataclasses import replace
 import pytest
 
 from sysid.models import ARX, HammersteinWiener, LinearStateSpace, NeuralStateSpace, VectorGreyBox, WienerHammerstein
-from sysid.workbench.auto.budget import FINAL, Budget, price
+from sysid.workbench.auto.budget import FINAL, price
 from sysid.workbench.auto.look import Looked
-from sysid.workbench.auto.plan import FIRST, HELD, MET, PATIENCE, Plan
+from sysid.workbench.auto.plan import FIRST, HELD, MET, PATIENCE
 from sysid.workbench.auto.worth import error
 from sysid.workbench.sweep.search_space import Point
-from tests.workbench.auto.searches import LOOKED, by_size, linear, searched, trial
+from tests.workbench.auto.searches import LOOKED, by_size, linear, planned, searched, trial
 
 UNASKED = 4
 """Rounds that are tried whatever comes of them: linear structures, then others; the least of each kind first."""
@@ -34,8 +34,7 @@ def test_linear_structures_come_first_and_alone() -> None:
 
 def test_linear_structures_leave_time_for_networks() -> None:
     clock = [0.0]
-    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
-    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    plan = planned(100.0, clock=clock)
     tried: list[Point] = []
     while (points := plan.ask()) and len(tried) < 20:
         tried += points
@@ -51,10 +50,7 @@ def test_a_slow_machine_tries_a_nonlinear_model_a_worker_where_that_leaves_time_
     after: float, workers: int, some: int
 ) -> None:
     clock = [0.0]
-    budget = Budget(
-        wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False, side_by_side=workers
-    )
-    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    plan = planned(100.0, clock=clock, workers=workers)
     plan.tell([trial(point, 1.0) for point in plan.ask()])
     clock[0] = after
     while (points := plan.ask()) and all(map(linear, points)):  # what takes no time is tried in any case
@@ -64,8 +60,7 @@ def test_a_slow_machine_tries_a_nonlinear_model_a_worker_where_that_leaves_time_
 
 def test_linear_structures_that_take_no_time_are_tried_however_late_it_is() -> None:
     clock = [0.0]
-    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
-    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    plan = planned(100.0, clock=clock)
     plan.tell([trial(point, 1.0) for point in plan.ask()])
     clock[0] = 75.0
     tried = plan.ask()
@@ -74,8 +69,7 @@ def test_linear_structures_that_take_no_time_are_tried_however_late_it_is() -> N
 
 
 def test_the_least_linear_structures_are_tried_whatever_the_time_until_one_can_be_used() -> None:
-    budget = Budget(wall_s=1.0, iterations=None, clock=lambda: 1000.0, is_stored=lambda _: False)
-    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    plan = planned(1.0, clock=[1000.0])
     tried: list[str] = []
     while points := plan.ask():
         tried += [point.structure.label for point in points]
@@ -92,9 +86,7 @@ def test_in_motion_one_network_is_tried_whatever_the_time_and_equations_of_event
         ({"resets": events}, "VectorGreyBox", False),
         ({"mechanism": (events,)}, "VectorGreyBox", True),  # which may be far off: its numbers were fitted once
     ):
-        budget = Budget(wall_s=1.0, iterations=None, clock=lambda: 1000.0, is_stored=lambda _: False)
-        looked = replace(LOOKED, in_motion=True, **found)
-        plan = Plan(looked=looked, budget=budget, error=error)
+        plan = planned(1.0, clock=[1000.0], looked=replace(LOOKED, in_motion=True, **found))
         (point,) = plan.ask()
         assert point.structure.kind.endswith(first)
         plan.tell([trial(point, 1.0)])
@@ -172,8 +164,7 @@ def test_there_is_something_to_try_for_any_mapping(looked: Looked) -> None:
 def test_one_linear_model_is_tried_where_networks_that_came_first_took_the_time() -> None:
     """Without it nobody knew that a furnace's network, with half the time, was worse than least squares."""
     clock = [0.0]
-    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
-    plan = Plan(looked=replace(LOOKED, in_motion=True), budget=budget, error=error)
+    plan = planned(100.0, clock=clock, looked=replace(LOOKED, in_motion=True))
     tried: list[Point] = []
     while points := plan.ask():
         tried += points
@@ -208,12 +199,9 @@ def test_what_is_held_at_ends_leaves_time_for_other_kinds_however_long_it_gains(
 
 def test_no_round_of_what_is_held_at_ends_lasts_for_all_of_the_time() -> None:
     """As one of large networks does on a busy machine."""
-    spent = [0.0]
-    budget = Budget(
-        wall_s=600.0, iterations=None, clock=lambda: spent[0], is_stored=lambda _: False, side_by_side=2
-    )  # fmt: skip
+    spent, when = [0.0], dict[str, float]()
     looked = replace(LOOKED, ends=True, all_end=True)
-    plan, when = Plan(looked=looked, budget=budget, error=error, training={"max_time_s": 90.0}), dict[str, float]()
+    plan = planned(600.0, clock=spent, workers=2, looked=looked, training={"max_time_s": 90.0})
     while points := plan.ask():
         found = []
         for point in points:
@@ -270,8 +258,7 @@ def test_what_adds_up_has_first_what_adds_up_exactly() -> None:
 
 def test_where_no_network_can_be_used_the_time_for_their_other_starts_is_for_more_of_them() -> None:
     clock = [0.0]
-    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: clock[0], is_stored=lambda _: False)
-    plan = Plan(looked=LOOKED, budget=budget, error=error)
+    plan = planned(100.0, clock=clock)
     rounds: list[list[Point]] = []
     while points := plan.ask():
         rounds.append(points)
@@ -282,12 +269,13 @@ def test_where_no_network_can_be_used_the_time_for_their_other_starts_is_for_mor
             for p, one in zip(points, lost, strict=True)
         ])  # fmt: skip
     tried = [(point.structure.label, str(point.training)) for points in rounds for point in points]
-    assert budget.kept == 0.0
+    assert plan.budget.kept == 0.0
     assert len(tried) == len(set(tried)), "nothing is tried twice"
     last = rounds[-1]
     assert not any(map(linear, last))
     before = clock[0] - 6.0 * len(last)
-    assert before <= (1.0 - budget.refit - FINAL) * 100.0 < clock[0] <= (1.0 - budget.refit) * 100.0
+    refit = plan.budget.refit
+    assert before <= (1.0 - refit - FINAL) * 100.0 < clock[0] <= (1.0 - refit) * 100.0
 
 
 @pytest.mark.parametrize(("needed", "begun"), [(1, 2), (3, 3), (5, 5)])
@@ -355,8 +343,7 @@ def test_two_blocks_are_followed_where_they_lead() -> None:
 
 
 def test_only_what_can_be_cut_short_has_a_limit_and_that_has_it() -> None:
-    budget = Budget(wall_s=100.0, iterations=None, clock=lambda: 0.0, is_stored=lambda _: False)
-    points = Plan(looked=LOOKED, budget=budget, error=error, training={"max_time_s": 10.0}).ask()
+    points = planned(100.0, training={"max_time_s": 10.0}).ask()
     assert {p.structure.kind: p.training.get("max_time_s") for p in points} == {
         "ARX": None, "TransferFunction": 10.0, "SS": 10.0,
     }  # fmt: skip
@@ -367,10 +354,8 @@ def test_equations_of_events_come_first_and_end_the_search_where_they_stay_withi
     shares: tuple[float, ...],
 ) -> None:
     events = VectorGreyBox(equations="y = where(before >= 1, 0, before + u)\nbefore[k+1] = y", initial={"before": 0})
-    budget = Budget(wall_s=None, iterations=10**9, clock=lambda: 0.0, is_stored=lambda _: False)
-    looked = replace(LOOKED, resets=events)
-    training = {"max_iterations": 50}
-    plan = Plan(looked=looked, budget=budget, error=error, training=training, tolerance=0.01, again=0)
+    looked, training = replace(LOOKED, resets=events), {"max_iterations": 50}
+    plan = planned(iterations=10**9, looked=looked, training=training, tolerance=0.01, again=0)
     (first,) = plan.ask()
     assert first.structure == events
     plan.tell([trial(first, 1e-6).model_copy(update={"selection_rms_shares": list(shares)})])
@@ -386,8 +371,7 @@ def test_equations_of_what_holds_an_output_are_tried_one_by_one_before_networks(
         VectorGreyBox(equations=f"y = deadzone(before + a*u, -{k}, {k})\nbefore[k+1] = y", parameters={"a": 0.1})
         for k in (1, 2)
     )
-    budget = Budget(wall_s=None, iterations=10**9, clock=lambda: 0.0, is_stored=lambda _: False)
-    plan = Plan(looked=replace(LOOKED, mechanism=some), budget=budget, error=error, tolerance=0.01, again=0)
+    plan = planned(iterations=10**9, looked=replace(LOOKED, mechanism=some), tolerance=0.01, again=0)
     for share, structure in zip(errors, some, strict=False):
         (point,) = plan.ask()
         assert (point.structure, point.training["starts"]) == (structure, 1)

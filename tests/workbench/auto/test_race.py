@@ -13,7 +13,7 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.race import AHEAD, FINALISTS, Race, as_far, as_rival, behind
 from sysid.workbench.auto.worth import error, ranked_by
 from sysid.workbench.sweep.search_space import Point
-from tests.workbench.auto.test_plan import trial
+from tests.workbench.auto.searches import trial
 
 NETWORKS = 6
 

@@ -14,7 +14,7 @@ from sysid.workbench.auto.budget import Budget
 from sysid.workbench.auto.ripe import LONGEST, RIPE, Ripening, is_young, young_told
 from sysid.workbench.auto.worth import error, ranked_by
 from sysid.workbench.sweep.search_space import Point
-from tests.workbench.auto.test_plan import trial
+from tests.workbench.auto.searches import trial
 
 RANK = ranked_by(error, None)
 

@@ -11,7 +11,7 @@ from sysid.models import LinearStateSpace, NeuralStateSpace
 from sysid.workbench.auto import told
 from sysid.workbench.auto.last_fit import SCATTER
 from sysid.workbench.sweep.search_space import Point
-from tests.workbench.auto.test_plan import trial
+from tests.workbench.auto.searches import trial
 
 ONE = trial(Point(number=7, structure=NeuralStateSpace(states=2, neurons=3), training={}, values={}), 1.0)
 

@@ -15,7 +15,7 @@ from sysid.workbench.auto.trials import HOPELESS, SEEN, Trials, together
 from sysid.workbench.auto.worth import error
 from sysid.workbench.sweep.search_space import Point
 from sysid.workbench.sweep.trial import NOT_DONE
-from tests.workbench.auto.test_plan import trial
+from tests.workbench.auto.searches import trial
 
 
 def points(n: int) -> list[Point]:

@@ -11,7 +11,7 @@ from sysid.reporting.sweep_record import Trial
 from sysid.workbench.auto.words import choose, sentence
 from sysid.workbench.auto.worth import error
 from sysid.workbench.sweep.search_space import Point
-from tests.workbench.auto.test_plan import trial
+from tests.workbench.auto.searches import trial
 
 
 def network(number: int, rms: float, operations: int) -> Trial:

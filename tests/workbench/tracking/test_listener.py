@@ -20,7 +20,6 @@ import pytest
 
 from sysid.export import read_bundle
 from sysid.models import History
-from sysid.names import tracking_key
 from sysid.reporting import read_signals
 from sysid.reporting.results import Results
 from sysid.workbench.cli import run_cli
@@ -328,10 +327,6 @@ def test_a_failing_store_costs_no_fit(
     assert (workspace / "run" / "report" / "index.html").is_file()
     assert tracker.failures
     assert all("the disk is full" in text for text in tracker.failures)
-
-
-def test_names_that_a_store_refuses_are_changed() -> None:
-    assert tracking_key("VAL 1 (µ=0.3)/a") == "VAL 1 ___0.3__a"
 
 
 def load_onnx(workspace: Path, uri: str):

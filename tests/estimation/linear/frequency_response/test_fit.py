@@ -8,7 +8,8 @@ from scipy import signal
 
 import sysid
 from sysid.errors import TraceError
-from sysid.estimation.linear.frequency_response.fit import Spectrum, fit_spectra
+from sysid.estimation.linear.frequency_response.fit import fit_spectra
+from sysid.estimation.linear.frequency_response.spectrum import Spectrum
 from sysid.estimation.linear.transfer_function.training import TransferFunctionTraining
 from sysid.models import Domain, Mapping, TransferFunction
 
