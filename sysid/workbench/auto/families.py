@@ -81,6 +81,7 @@ class Family:
         at_ends: What of it is tried before all else where outputs stand at ends: what is held there.
         adds_up: What of it is tried before all else where outputs add up what inputs bring.
         at_events: What of it is tried before all else where outputs jump at events.
+        at_once: What of it is tried before all else where outputs follow from inputs at the same time alone.
         held: What of it is tried, one by one, before networks where something is known to hold an output.
     """
 
@@ -95,6 +96,7 @@ class Family:
     at_ends: Callable[[Looked], Sequence[Try]] = lambda _: ()
     adds_up: Callable[[Looked], Sequence[Try]] = lambda _: ()
     at_events: Callable[[Looked], Sequence[Try]] = lambda _: ()
+    at_once: Callable[[Looked], Sequence[Try]] = lambda _: ()
     held: Callable[[Looked], Sequence[Try]] = lambda _: ()
 
 
@@ -211,6 +213,13 @@ def _around_neural(one: Try, looked: Looked) -> list[Try]:
 
 def _narx(looked: Looked) -> list[Try]:
     return [_narx_of(looked.lags, neurons, looked) for neurons in (4, 10)]
+
+
+def _narx_at_once(looked: Looked) -> list[Try]:
+    """Curves without memory: more inputs have more corners."""
+    least = 8 + 4 * looked.n_inputs
+    sizes = (least, 2 * least) if looked.static else ()
+    return [Try(structure=NARX(input_delays="0:0", output_delays=[], neurons=n)) for n in sizes]
 
 
 def _narx_at_ends(looked: Looked) -> list[Try]:
@@ -385,6 +394,7 @@ FAMILIES = (
         around=_around_narx,
         in_motion=lambda looked: [_narx_of(1, 10, looked)],
         at_ends=_narx_at_ends,
+        at_once=_narx_at_once,
     ),
     Family(kind=VectorNARX.kind, linear=False, first=lambda _: [], at_ends=_vector_at_ends),
     Family(

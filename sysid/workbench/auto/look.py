@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid.advice import Advice, Verdict, advise, looked_at
 from sysid.advice.dynamics import INTEGRATES
@@ -15,6 +16,7 @@ from sysid.api.orders import search_orders
 from sysid.errors import UserError
 from sysid.estimation.linear.state_space.orders import StateOrders, state_orders
 from sysid.estimation.records.output_ends import found_ends
+from sysid.estimation.records.static_maps import is_static
 from sysid.estimation.resets import derived_from, found_resets, grey_box_of, switches
 from sysid.models import ARX, AbstractStructure, Mapping, Start, StartKind, VectorGreyBox
 from sysid.reporting.advice.record import AdviceRecord
@@ -66,6 +68,7 @@ class Looked:
         resets: Where outputs jump and are linear between, the equations of that: then it is tried before all else.
         mechanism: Where friction holds an output, or play an input, equations of that, the likeliest first: they are
             tried next.
+        static: Whether outputs follow from inputs at the same time alone: then curves without memory are tried first.
         seen_from: Samples after which an input is seen to act first, in a response that takes no drift for its own.
     """
 
@@ -83,6 +86,7 @@ class Looked:
     shown: int = 0
     clear: int = 0
     exact: bool = False
+    static: bool = False
     seen_from: int | None = None
     resets: VectorGreyBox | None = None
     mechanism: tuple[VectorGreyBox, ...] = ()
@@ -136,6 +140,7 @@ def look(data: Data, mapping: Mapping, start: Start, *, exact: bool = False) -> 
         shown=0 if shown is None else shown.chosen,
         clear=0 if shown is None else int((shown.correlations[: shown.most] ** 2 > HALF).sum()),
         exact=exact,
+        static=_is_static(data.estimation, mapping),
         never_negative=all(_never_negative(data.estimation, name) for name in mapping.outputs),
         suggested=tuple(suggestion.structure for one in advice for suggestion in one.suggestions),
         cautions=(*_cautions(advice), *_not_looked_at(mapping)),
@@ -230,11 +235,20 @@ def at_ends(traces: Sequence[Trace], mapping: Mapping) -> dict[str, bool]:
     Returns:
         The verdicts, by name.
     """
-    parts = [(trace.columns(mapping.inputs), trace, trace.usable_of(mapping.channels)) for trace in traces]
+    parts = _usable(traces, mapping)
     return {
-        name: found_ends([(u[usable], trace[name][usable]) for u, trace, usable in parts]) != (None, None)
-        for name in mapping.outputs
+        name: found_ends([(u, y[:, k]) for u, y in parts]) != (None, None) for k, name in enumerate(mapping.outputs)
     }
+
+
+def _is_static(traces: Sequence[Trace], mapping: Mapping) -> bool:
+    return bool(mapping.inputs) and is_static(_usable(traces, mapping))
+
+
+def _usable(traces: Sequence[Trace], mapping: Mapping) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Inputs and outputs where all of them count."""
+    some = [(trace, trace.usable_of(mapping.channels)) for trace in traces]
+    return [(trace.columns(mapping.inputs)[usable], trace.columns(mapping.outputs)[usable]) for trace, usable in some]
 
 
 def whole_traces(traces: Sequence[Trace], most: int) -> Sequence[Trace]:

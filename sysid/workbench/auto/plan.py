@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from sysid.estimation.estimators import estimator_of
 from sysid.models import ARX, NeuralStateSpace
 from sysid.workbench.auto.budget import LARGER, LINEAR, size_of
-from sysid.workbench.auto.families import Try, suggested
+from sysid.workbench.auto.families import Family, Try, suggested
 from sysid.workbench.auto.ledger import Ledger
 from sysid.workbench.auto.parts import ENSEMBLE
 from sysid.workbench.sweep.search_space import Point
@@ -37,6 +37,10 @@ MET = "what is linear between its events stays within the tolerance on every tra
 """Why a search ends that has found a model of events."""
 HELD = "equations of what holds an output stay within the tolerance on every trace that chooses"
 """The same of a model of friction."""
+AT_ONCE = "a map without memory stays within the tolerance on every trace that chooses"
+"""The same of outputs that follow from inputs at the same time alone."""
+TRAINED = 2
+"""Linear models that are trained, and take as long as a network at most, before a network is tried."""
 TAPS = 10
 """Past values of each input of a model that is taken for want of time."""
 
@@ -145,20 +149,14 @@ class Plan(Ledger):
 
     def _search(self) -> Iterator[list[Try]]:
         nonlinear_first = sorted(self.families, key=lambda family: family.linear)
-        # A smooth map meets no jump; what is exact where it was fitted has nothing to gain from others.
-        if self.looked.resets is not None:
+        for some, ended in self._exact(nonlinear_first):
             self.budget.unlimited = 1
-            yield from self._rounds_of([one for family in nonlinear_first for one in family.at_events(self.looked)])
+            yield from self._rounds_of(some)
             if self._is_met:
-                self.ended = MET
+                self.ended = ended
                 return
-        # What sticks and slips is as little smooth: its equations have few numbers, and are trained in no time.
-        for one in (one for family in nonlinear_first for one in family.held(self.looked)):
-            self.budget.unlimited = 1
-            yield from self._rounds_of([one])
-            if self._is_met:
-                self.ended = HELD
-                return
+        if self.looked.static:
+            yield from self._near_the_best(FIRST)
         # Whatever else adds up drifts, and is close to what was held out by luck.
         if self.looked.integrators:
             self.budget.unlimited = 1
@@ -179,6 +177,12 @@ class Plan(Ledger):
             rivals = [one for one in self._least(linear=False) if estimator_of(one.structure).initial is not None]
             yield from self._rounds_of([one for one in rivals if one.structure.kind not in kinds])
             yield from self._near_the_best(FIRST)
+        # Of records without noise what is linear shows at once by least squares; where the look took much of the time,
+        # linear models that are trained would have all of the rest.
+        if self.looked.exact and not self.budget.has_room(self.budget.trial * (self.budget.wall_s or 0.0) * TRAINED):
+            yield from self._least_squares()
+            self.budget.unlimited = 1
+            yield from self._rounds_of(self._hidden()[:1])
         yield from self._unasked(linear=True)
         yield from self._larger()
         self.looked = replace(self.looked, states=self._linear_states())
@@ -186,10 +190,23 @@ class Plan(Ledger):
         self.budget.unlimited = self.budget.side_by_side
         if self.looked.exact:
             # Blocks and polynomials take long, one model for each output, and seldom end stable.
-            hidden = [one for one in self._first(linear=False) if one.structure.kind == NeuralStateSpace.kind]
-            yield from self._rounds_of(hidden)
+            yield from self._rounds_of(self._hidden())
         yield from self._unasked(linear=False)
         yield from self._near_the_best()
+
+    def _exact(self, families: Sequence[Family]) -> Iterator[tuple[list[Try], str]]:
+        """What nothing else gains on where it meets the tolerance, and what is said then.
+
+        A smooth map meets no jump. What sticks and slips is as little smooth: its equations have few numbers, and are
+        trained in no time, one by one. Of what has no memory every state is in the way.
+        """
+        for some, ended in (
+            ([one for family in families for one in family.at_events(self.looked)], MET),
+            *(([one], HELD) for family in families for one in family.held(self.looked)),
+            ([one for family in families for one in family.at_once(self.looked)], AT_ONCE),
+        ):
+            if some:
+                yield some, ended
 
     def _near_the_best(self, share: float = 1.0) -> Iterator[list[Try]]:
         """What stands next to good ones, as long as it gains.
@@ -223,13 +240,20 @@ class Plan(Ledger):
             linear: Linear structures, which leave time for the others; or those.
         """
         if linear and self.trials and not any(estimator_of(one.structure).linear for one in self._tries):
-            # Least squares cost next to nothing, and without them nobody knows what the networks before are worth.
-            self.budget.unlimited = 1
-            yield from self._rounds_of([one for one in self._first(linear=True) if one.structure.kind == ARX.kind][:1])
+            yield from self._least_squares()
         yield from self._rounds_of(self._least(linear=linear))
         self.budget.most = LINEAR if linear else 1.0
         yield from self._rounds_of(self._first(linear=linear))
         self.budget.most = 1.0
+
+    def _least_squares(self) -> Iterator[list[Try]]:
+        """They cost next to nothing, and without them nobody knows what networks are worth."""
+        self.budget.unlimited = 1
+        yield from self._rounds_of([one for one in self._first(linear=True) if one.structure.kind == ARX.kind][:1])
+
+    def _hidden(self) -> list[Try]:
+        """Networks of states that no output shows."""
+        return [one for one in self._first(linear=False) if one.structure.kind == NeuralStateSpace.kind]
 
     def _larger(self) -> Iterator[list[Try]]:
         """Linear models of more states, round by round, as long as more states gain."""

@@ -10,7 +10,7 @@ import pytest
 from sysid.models import ARX, HammersteinWiener, LinearStateSpace, NeuralStateSpace, VectorGreyBox, WienerHammerstein
 from sysid.workbench.auto.budget import FINAL, price
 from sysid.workbench.auto.look import Looked
-from sysid.workbench.auto.plan import FIRST, HELD, MET, PATIENCE
+from sysid.workbench.auto.plan import AT_ONCE, FIRST, HELD, MET, PATIENCE
 from sysid.workbench.auto.worth import error
 from sysid.workbench.sweep.search_space import Point
 from tests.workbench.auto.searches import LOOKED, by_size, linear, planned, searched, trial
@@ -389,3 +389,24 @@ def test_of_records_without_noise_networks_with_clear_states_are_tried_before_bl
     assert [point.structure.label for point in first] == ["NSS 3/8", "NSS 3/16", "NSS 4/12"]
     near = {str(point.training.get("regularisation")) for points in rounds for point in points if points is not first}
     assert near == {"None"}, "sizes are changed, weights that hold noise down are not tried"
+
+
+def test_a_map_without_memory_is_tried_before_states_and_alone_where_it_meets_the_tolerance() -> None:
+    static = replace(LOOKED, static=True)
+    _, rounds = searched(lambda _: 1.0, looked=static)
+    assert [point.structure.label for point in rounds[0]] == ["NFIR 0:0/12", "NFIR 0:0/24"]
+    assert any(linear(point) for some in rounds for point in some)
+    plan = planned(iterations=10**9, looked=static, tolerance=0.01, again=0)
+    points = plan.ask()
+    plan.tell([trial(point, 1e-6).model_copy(update={"selection_rms_shares": [1e-3]}) for point in points])
+    assert (plan.ask(), plan.ended) == ([], AT_ONCE)
+
+
+def test_a_network_comes_before_trained_linear_models_where_the_look_took_their_time() -> None:
+    for seconds, kinds in ((5.0, {"ARX", "TransferFunction", "SS"}), (45.0, {"NSS"})):
+        plan = planned(100.0, clock=[seconds], looked=replace(LOOKED, exact=True), tolerance=0.01)
+        tried = []
+        while len(tried) < 2:
+            tried.append({point.structure.kind for point in plan.ask()})
+            plan.tell([trial(plan.points[n], 1.0) for n in sorted(plan.points)[len(plan.trials) :]])
+        assert kinds in tried
