@@ -54,7 +54,7 @@ def in_unit(figure: str, unit: str) -> str:
     return figure if unit == "1" else f"{figure} {unit}"
 
 
-_IN_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+_IN_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "hns": 1e-7, "min": 60.0, "h": 3600.0}
 """Units that clocks count in: pint, which takes half a second to build, is not asked for what every file has."""
 
 _ATMOSPHERE = {

@@ -15,7 +15,9 @@ def registry() -> pint.UnitRegistry[float]:
     """The units that pint knows; it takes 0.3 s to import and build, which only those who convert pay for."""
     import pint
 
-    return pint.UnitRegistry(cache_folder=None)
+    found: pint.UnitRegistry[float] = pint.UnitRegistry(cache_folder=None)
+    found.define("hns = 1e-7 second")  # hundreds of nanoseconds, in which Windows and .NET count
+    return found
 
 
 # What people write and pint does not know, or takes for something else: "amps" are attometres per second to it,
@@ -36,15 +38,15 @@ _WRITTEN = {
         "degF": "fahrenheit|degrees fahrenheit|degf|deg_f|deg f|deg. f|degrees f|degree f|°f|ºf|° f|℉",
         "m": "meter|meters|metre|metres",
         "deg": "°|º|degs|degrees|degree|grad|altgrad|degr",
-        "rad": "radian|radians|rads",
+        "rad": "rad|radian|radians|rads|рад",
         "s": "sec|secs|second|seconds|sek|sek.|sec.|sekunden|с|сек",
         "ms": "msec|msecs|millisecond|milliseconds|мс",
-        "us": "usec|µsec|microsecond|microseconds",
+        "us": "usec|µsec|microsecond|microseconds|мкс",
         "min": "min|min.|minute|minutes|mins|minuten|мин",
         "hour": "hours|hrs|hr|std|std.|stunde|stunden|ч",
-        "1": "-|–|--|none|dimensionless|unitless|n/a|na|ratio|bool",
-        "percent": "%|pct|%rh|% rh|%r.h.|prozent",
-        "rpm": "rpm|u/min|rev/min|r/min|revs/min|revolutions/min|tr/min|umin|upm|об/мин",
+        "1": "-|–|--|none|dimensionless|unitless|n/a|na|ratio|bool|p.u.|pu|per unit",
+        "percent": "%|pct|%rh|% rh|%r.h.|prozent|percent|per cent|pourcent",
+        "rpm": "rpm|u/min|umdr./min|umdr/min|rev/min|r/min|revs/min|revolutions/min|tr/min|umin|upm|об/мин",
         "kN*m": "knm|kn-m|kn·m",
         "N*mm": "nmm|n-mm|n·mm",
         "Pa*s": "pas|pa.s|pa·s",
@@ -53,7 +55,10 @@ _WRITTEN = {
         "hp": "hp",
         "g_0": "g's|g-force",
         "N/mm^2": "n/mm2",
-        "kgf/cm^2": "kp/cm2|kp/cm²",
+        "kgf/cm^2": "kp/cm2|kp/cm²|кгс/см2|кгс/см²",
+        "torr": "torr",
+        "gauss": "gauss",
+        "lb": "lbm",
         "mmH2O": "mmws|mm ws|mm h2o|mmwc|mm wc",
         "mH2O": "mws",
         "kg": "kgs|кг",
@@ -75,7 +80,10 @@ _EXACT = {
     **{"nm": "nm", "kn": "knot", "mS": "mS", "MS": "MS", "mPa": "mPa", "mpa": "mPa", "KG": "kg", "Kg": "kg"},
     **{"C": "degC", "F": "degF", "PS": "metric_horsepower", "mb": "mbar", "mNm": "mN*m", "MNm": "MN*m"},
     **{"В": "V", "А": "A", "Вт": "W", "кВт": "kW", "Па": "Pa", "кПа": "kPa", "МПа": "MPa", "бар": "bar", "Гц": "Hz"},
-    **{"м": "m", "мм": "mm", "см": "cm", "Н": "N", "Нм": "N*m", "Н·м": "N*m", "л/мин": "liter/min", "м³/ч": "m^3/hour"},
+    **{"м": "m", "мм": "mm", "см": "cm", "км": "km", "Н": "N", "кН": "kN", "Нм": "N*m", "Н·м": "N*m", "л": "liter"},
+    **{"г": "g", "т": "t", "Дж": "J", "кДж": "kJ", "МВт": "MW", "мВ": "mV", "мА": "mA", "Ом": "ohm", "кгс": "kgf"},
+    # pint's picohenry, and a capital of it that nobody means either.
+    **{"pH": "1", "PH": "1", "ph": "1"},
 }
 """Texts whose capitals matter: a nanometre is no newton metre. C is of degrees, not coulombs."""
 _UNPREFIXED = frozenset(
@@ -88,9 +96,18 @@ _UNPREFIXED = frozenset(
 _TOWER = re.compile(r"(?:\*\*|\^)[^*/^]*(?:\*\*|\^)|\d{5,}")
 _LONGEST_UNIT = 40
 # Normal and standard volumes (at 0 degC or 15 degC, by convention) are no unit of volume.
-_NORMAL_VOLUME = re.compile(r"[NS](?:m\s*(?:\^|\*\*)?\s*[3³]|[lL](?![A-Za-z])|cm)")
+_NORMAL_VOLUME = re.compile(
+    r"[NS](?:m\s*(?:\^|\*\*)?\s*[3³]|[lL](?![A-Za-z])|cm)|(?i:std|norm|nom)[. ]\W*(?i:m|l|ft|c)"
+)
+_SHARE = re.compile(
+    r"%\s*(?:open|auf|O2|CO2|H2O|\(?v/v\)?|\(?w/w\)?)|(?:vol|mol|wt|w|mass|masse|gew)[.-]{0,2}\s?%", re.I
+)
+"""Shares of something: to pint, %MW are megawatts and mol% moles."""
+_BELOW = re.compile(r"(?P<above>[^/]+)/\s*(?P<below>[^\W\d_]+[-^²³\d]*(?:[ .·][^\W\d_]+[²³^\d]*)+|m[\^]?[2²]K|kgK)")
+"""``W/m2 K``, ``kJ/kg.K``: a blank or a point below a stroke joins what stands there; to pint, K would be above."""
 _POWER = re.compile(r"\b([kcdmµu]?m|s|min|h|hr|in|ft|kg|K|V|A|N|mol)(-?[1-6])\b")
-_WORD = re.compile(r"[A-Za-z°µΩ%]+")
+_WORD = re.compile(r"[A-Za-z°µΩ%А-яЁё]+")
+_JOINED = re.compile(r"[ .·]|(?<=[\d²])(?=K)|(?<=kg)(?=K)")
 _LETTERS = re.compile(r"[^\W\d_]+")
 
 USUAL_UNITS = frozenset(
@@ -143,8 +160,20 @@ def plain_unit(unit: str) -> str | None:
     written = _EXACT.get(text) or _WRITTEN.get(text.casefold())
     if written is not None:
         return written
-    words = _WORD.sub(lambda word: _EXACT.get(word[0]) or _WRITTEN.get(word[0].casefold(), word[0]), text)
-    return next((t for t in (text, _POWER.sub(r"\1^\2", text), _POWER.sub(r"\1^\2", words)) if _is_pint(t)), None)
+    if _SHARE.fullmatch(text):
+        return "percent"
+    if below := _BELOW.fullmatch(text):
+        return plain_unit(f"{below['above']}/({_JOINED.sub('*', below['below'])})")
+    words = _WORD.sub(lambda word: _meant(word[0]), text)
+    # As people mean it first: in Nm/A, pint would find a unit of yarn. A letter is what pint knows it as, if it can.
+    longer = _WORD.sub(lambda word: _meant(word[0]) if len(word[0]) > 1 else word[0], text)
+    tries = (longer, _POWER.sub(r"\1^\2", longer), text, _POWER.sub(r"\1^\2", words))
+    return next((unit for unit in tries if _is_pint(unit)), None)
+
+
+def _meant(word: str) -> str:
+    unit = _EXACT.get(word) or _WRITTEN.get(word.casefold(), word)
+    return f"({unit})" if "*" in unit or "/" in unit else unit
 
 
 def _is_pint(text: str) -> bool:

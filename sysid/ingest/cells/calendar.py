@@ -65,6 +65,7 @@ _HOURS_AHEAD = {
     for word in words.split()
 }  # fmt: skip
 """What zones are called behind a time of day. IST is left out: it is a zone of three countries."""
+_TWO = re.compile(r"[0-9]{1,4}:[0-9]{1,2}")
 _LONGEST = 40
 _SHORTEST_INTERVAL = 32
 _INTERVAL = re.compile(
@@ -227,11 +228,13 @@ class Calendar:
         pattern: As for ``datetime.strptime``; ``None`` recognises ISO 8601, day.month.year, month/day/year, names of
             months, AM and PM, and times of day alone.
         zone: The zone of the clock, where the stamps do not say theirs.
+        minutes: Whether two numbers are said to be minutes and seconds.
     """
 
     where: str
     pattern: str | None = None
     zone: str | None = None
+    minutes: bool = False
     began: Began | None = field(default=None, init=False)
     """When the first stamp is, once the column is finished; ``None`` of times of day."""
     _dates: list[NDArray[np.int64]] = field(default_factory=list)
@@ -251,6 +254,8 @@ class Calendar:
         Raises:
             ReaderError: If a cell is not a date and time of the pattern.
         """
+        if self.minutes:  # 15:30.0 is minutes and seconds
+            cells = [f"{cell.strip()}.0" if _TWO.fullmatch(cell.strip()) else cell for cell in cells]
         alike = _all_alike(cells) if self.pattern is None else None
         if alike is not None:
             dates, micros, offset = alike
@@ -341,7 +346,7 @@ class Calendar:
                 remedy="export the time stamps in one form",
             )
         if not dates.any():
-            local, notes = _over_midnight(*_minutes_and_seconds(micros) if self._of_two else (micros, []))
+            local, notes = self._of_no_date(micros)
         else:
             days, notes = days_of(dates, micros, self.where)
             local = days * DAY + micros
@@ -362,6 +367,10 @@ class Calendar:
         notes = [*notes, "stamps are intervals: time is where each begins"] if self._intervals else notes
         seconds[known] = (local - local[0]) / 1e6
         return seconds, notes, guess
+
+    def _of_no_date(self, micros: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:
+        guessed = self._of_two and not self.minutes
+        return _over_midnight(*_minutes_and_seconds(micros) if guessed else (micros, []))
 
 
 def _minutes_and_seconds(micros: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:

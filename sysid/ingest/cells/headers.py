@@ -36,6 +36,8 @@ _OF_CYCLERS = frozenset(
 )
 """Further units behind a stroke, as battery cyclers and potentiostats have them."""
 _QUOTIENT = re.compile(r"(?P<name>[^/\s][^/]*)/(?P<unit>\S+)")
+_IN_RUSSIAN = frozenset("счВАмНКгтл%")
+"""Units of one letter that stand behind a comma, as the Russian standard has it."""
 _LASTS = re.compile(r"(?:^|[_. ])(?:t|[Tt]ime|[Zz]eit|[Tt]id|[Ee]lapsed|[Rr]untime|[Dd]uration|[Dd]auer)[_.]min$")
 _WRITTEN_OUT = {
     "second": "s", "sec": "s", "millisecond": "ms", "microsecond": "us", "minute": "min", "hour": "h", "volt": "V",
@@ -232,4 +234,4 @@ def _quotient(name: str, unit: str) -> Header | None:
 def _is_spoken(unit: str, mark: str | None) -> bool:
     """Whether a word behind a name is its unit: a single letter may be a name, too."""
     letters = {"s", "h"} if mark != "/" else {"s", "h", "V", "A", "N", "W", "K", "m", "1", "%"}
-    return is_unit(unit) if len(unit) > 1 else unit in letters
+    return is_unit(unit) if len(unit) > 1 else unit in letters | _IN_RUSSIAN

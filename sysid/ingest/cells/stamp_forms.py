@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import date, timedelta
 
 _WEEKDAY = re.compile(r"(?:mon|tue|wed|thu|fri|sat|sun|mo|di|mi|do|fr|sa|so)[a-z]{0,6}\.?,?\s+(?=\S)", re.IGNORECASE)
 _MONTH_FIRST = re.compile(
@@ -10,7 +11,10 @@ _MONTH_FIRST = re.compile(
     r"(?:(?P<year>[0-9]{4})(?:,?\s+(?P<clock>\S.*))?|(?P<before>\S.*?)\s+(?P<late>[0-9]{4}))"
 )
 _DAYS = re.compile(r"(?P<days>[0-9]{1,5}) days?,? \+?(?P<h>[0-9]{1,2})(?P<rest>:[0-9]{2}:[0-9]{2}(?:[.,][0-9]+)?)")
-_DATED = r"[0-9]{4}(?P<by>[-_./])[0-9]{1,2}(?P=by)[0-9]{1,2}|[0-9]{1,2}(?P<to>[-./])[0-9]{1,2}(?P=to)[0-9]{4}"
+_DATED = (
+    r"[0-9]{4}(?P<by>[-_./])[0-9]{1,2}(?P=by)[0-9]{1,2}|[0-9]{1,2}(?P<to>[-./])[0-9]{1,2}(?P=to)[0-9]{4}"
+    r"|[0-9]{1,2}(?P<of>[-./])[^\W\d_]{3,9}(?P=of)[0-9]{2,4}"
+)
 _MARKED = re.compile(
     rf"(?P<date>{_DATED}|(?:19|20)[0-9]{{6}}(?=-))(?:--?|[_ T]|, )(?P<h>[0-9]{{1,2}})"
     r"(?:(?P<mark>[-_.:])(?P<m>[0-9]{2})(?:(?P=mark)(?P<s>[0-9]{2}))?|(?P<tm>[0-9]{2})(?P<ts>[0-9]{2}))"
@@ -18,6 +22,16 @@ _MARKED = re.compile(
     re.IGNORECASE,
 )
 _HALF = re.compile(r"(?P<h>[0-9]{1,2})\.(?P<m>[0-9]{2})(?:\.(?P<s>[0-9]{2}))?\s?(?P<half>[ap]\.?m\.?)", re.IGNORECASE)
+_OF_YEAR = re.compile(
+    r"(?P<year>(?:19|20)[0-9]{2})[-:](?P<day>[0-3][0-9]{2})(?:(?:[T ]|(?<=:[0-9]{3}):)(?P<clock>\S.*))?"
+)
+_DAYS_AND_HOURS = re.compile(r"(?P<days>[0-9]{1,5})\.(?P<h>[0-9]{2})(?P<rest>:[0-9]{2}:[0-9]{2}(?:\.[0-9]+)?)")
+"""As .NET writes a length of time."""
+_IN_ASIA = re.compile(
+    r"(?P<date>[0-9]{4}\s?[年년]\s?[0-9]{1,2}\s?[月월]\s?[0-9]{1,2})\s?[日일](?:\s?\([^)]*\))?\s*"
+    r"(?P<half>上午|下午|午前|午後|오전|오후)?\s*(?P<clock>[0-9].*)?"
+)
+_NOON = {**dict.fromkeys(("上午", "午前", "오전"), " AM"), **dict.fromkeys(("下午", "午後", "오후"), " PM")}
 _LETTERED = re.compile(
     r"(?:(?P<d>[0-9]{1,5})\s?d\s?)?(?:(?P<h>[0-9]{1,5})\s?h\s?)(?P<m>[0-9]{1,2})\s?m(?:in)?\s?"
     r"(?:(?P<s>[0-9]{1,2}(?:[.,][0-9]+)?)\s?s(?:ec)?)?",
@@ -45,21 +59,35 @@ def usual_form(text: str) -> str:
         ('1 Jan 2024 23:59:50.100', '12 March 2024 08:15')
         >>> usual_form("2 days 06:00:00"), usual_form("1h02m03.5s"), usual_form("12.5 V")
         ('54:00:00', '1:02:03.5', '12.5 V')
+        >>> usual_form("2024-072T08:15:00"), usual_form("1.06:00:00"), usual_form("2024年3月12日 下午8时15分")
+        ('2024-03-12 08:15:00', '30:00:00', '2024-3-12 8:15 PM')
         >>> usual_form("2024-03-12-08-15-00"), usual_form("12.03.2024 08.15"), usual_form("11.59pm")
         ('2024-03-12 08:15:00', '12.03.2024 08:15:00', '11:59:00 pm')
     """
-    found = _DAYS.fullmatch(text)
+    found = _DAYS.fullmatch(text) or _DAYS_AND_HOURS.fullmatch(text)
     if found is not None:
         return f"{24 * int(found['days']) + int(found['h'])}{found['rest']}"
+    found = _OF_YEAR.fullmatch(text)
+    if found is not None and 0 < int(found["day"]) <= 366:
+        stamp = date(int(found["year"]), 1, 1) + timedelta(days=int(found["day"]) - 1)
+        return f"{stamp} {found['clock'] or ''}".rstrip()
+    found = _IN_ASIA.fullmatch(text)
+    if found is not None:
+        day, clock = re.sub(r"\s?[年년月월]\s?", "-", found["date"]), found["clock"] or ""
+        clock = re.sub(r"\s?[时時点點시分분]\s?(?=[0-9])", ":", clock).rstrip("秒초分분时時点點시 ")
+        clock = f"{clock}:00" if clock.isdecimal() else clock
+        return f"{day} {clock}{_NOON.get(found['half'], '')}".rstrip()
     found = _LETTERED.fullmatch(text)
     if found is not None:
         return f"{24 * int(found['d'] or 0) + int(found['h'])}:{found['m']}:{found['s'] or '00'}"
     found = _MARKED.fullmatch(text)
     if found is not None:
-        date = found["date"].replace("_", "-") if found["by"] or found["to"] else _with_marks(found["date"])
+        day = (
+            found["date"].replace("_", "-") if found["by"] or found["to"] or found["of"] else _with_marks(found["date"])
+        )
         beyond = f".{found['milli']:>03}" if found["milli"] else found["f"] or ""
         clock = f"{found['h']}:{found['m'] or found['tm']}:{found['s'] or found['ts'] or '00'}{beyond}"
-        return f"{date} {clock}{found['half'] or ''}"
+        return f"{day} {clock}{found['half'] or ''}"
     found = _HALF.fullmatch(text)
     if found is not None:
         return f"{found['h']}:{found['m']}:{found['s'] or '00'} {found['half']}"

@@ -24,8 +24,20 @@ TRUTH = {
 PAIRS: tuple[dict[str, float], ...] = tuple(
     dict(zip(words.split(), (0.0, 1.0), strict=True))
     for words in (
-        *("off on", "aus ein", "aus an", "uit aan", "closed open", "close open", "zu auf", "dicht open", "shut open"),
+        *(
+            "off on",
+            "aus ein",
+            "aus an",
+            "uit aan",
+            "closed open",
+            "closed opened",
+            "close open",
+            "zu auf",
+            "dicht open",
+            "shut open",
+        ),
         *("no yes", "nein ja", "nee ja", "low high", "stop run", "stopped running", "inactive active", "idle active"),
+        *("inaktiv aktiv", "deactivated activated", "unlocked locked", "absent present", ".f. .t.", "#false# #true#"),
         *("disabled enabled", "released applied", "released pressed", "f t", "n y"),
         *("down up", "ok alarm", "normal alarm", "ok fault", "manual auto", "ok nok"),
         *("non oui", "fermé ouvert", "fermée ouverte", "ferme ouvert", "arrêt marche", "arret marche", "éteint allumé"),

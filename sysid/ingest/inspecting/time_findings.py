@@ -26,6 +26,8 @@ _EVEN_SHARE = 0.9  # of its steps, that are like the usual one
 _MOSTLY_ALIKE, _OFTEN, _MOST_UNEVEN = 0.5, 0.05, 20.0
 _ARRAYS = {"matlab", "numpy"}
 _MINUTE = 60.0
+_MICROS, _MANY = 500.0, 20
+"""From which step on a clock may count microseconds, and how many of its steps show in what it counts."""
 _ENDS_IN_TIME = re.compile(r"time(?![a-z])", re.IGNORECASE)
 _YEARS, _CALLED_YEAR = (1700.0, 2300.0), re.compile(r"year|jahr|date|année|año", re.IGNORECASE)
 
@@ -78,6 +80,8 @@ def _years(column: RawColumn) -> str | None:
 def _unit_by_step(steps: NDArray[np.float64], *, arrays: bool) -> tuple[str, str]:
     """The unit of a clock that says none, and the other one that it may well be, or nothing."""
     step = float(np.median(steps)) if len(steps) else 0.0
+    if _MICROS <= step < 5e3 and len(steps) > _MANY and _is_of_boards(steps):
+        return "us", "ms"
     # Few records are sampled slower than every 5 s, but for those of whole minutes; few clocks count finer than they
     # sample.
     if step < 5.0:
@@ -86,7 +90,15 @@ def _unit_by_step(steps: NDArray[np.float64], *, arrays: bool) -> tuple[str, str
     # What is computed with has its time in s, where a logger's clock is uneven.
     if (step >= _MINUTE and step % _MINUTE == 0.0) or (arrays and even and step < 1e3):
         return "s", "ms"
-    return ("ms", "s") if step < 5e3 else ("us", "ms")
+    if step < _MICROS:
+        return "ms", "s"
+    return ("ms", "us") if step < 5e3 else ("us", "ms")
+
+
+def _is_of_boards(steps: NDArray[np.float64]) -> bool:
+    """Whether all that uneven steps have in common is 4 or 8, as the microseconds of small boards do."""
+    whole = np.rint(steps).astype(np.int64)
+    return bool((whole == steps).all()) and int(np.gcd.reduce(whole)) in {4, 8} and bool((whole != whole[0]).any())
 
 
 def without_copies(columns: Sequence[RawColumn]) -> tuple[RawColumn, ...]:

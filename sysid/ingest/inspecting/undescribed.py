@@ -18,7 +18,7 @@ from sysid.ingest.inspecting.findings import FileFinding, listed
 from sysid.ingest.inspecting.inspection import inspect_file
 from sysid.ingest.inspecting.proposal import propose_dataset
 from sysid.ingest.inspecting.second_clocks import without_clocks
-from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file, typed_options
+from sysid.ingest.memory.in_python import proposal_of, remedies_of_a_file, typed_options, with_guess
 from sysid.ingest.readers.text_source import bare_stem
 from sysid.ingest.reading import read_table, trace_of
 from sysid.ingest.tables.no_record import over_frequency, refuse_frequencies
@@ -117,7 +117,8 @@ def _described(
     try:
         traces = load_described(described, path, cache=False)
     except UserError as also:
-        raise also if error is None or isinstance(error, UnitError) else error from None
+        raised = also if error is None or isinstance(error, UnitError) else error
+        raise with_guess(raised, found.time_told.removeprefix("guessed: ")) from None
     if guesses:
         told = f"{_told(path, guesses)}. {proposal_of(path)} writes this down, to be corrected"
         warnings.warn(told, GuessedWarning, stacklevel=5)

@@ -71,6 +71,19 @@ def typed_options(error: UserError, path: Path) -> UserError:
     return _with(error, f"{error.remedy}. Options are typed behind {proposal_of(path)}; --help lists them")
 
 
+def with_guess(error: UserError, told: str) -> UserError:
+    """The error of a file whose clock was guessed, with that guess.
+
+    Args:
+        error: It.
+        told: What was guessed of time; empty where nothing was.
+
+    Returns:
+        The same error; where something was guessed, the remedy names it.
+    """
+    return _with(error, f"{error.remedy}. Of time it was guessed: {told}") if told else error
+
+
 @contextmanager
 def remedies_of_a_run() -> Iterator[None]:
     """Errors of a table that a model is to run over say where its options can be written."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from datetime import datetime
 from functools import lru_cache
@@ -25,6 +26,7 @@ _MOST_BYTES = 2**30
 """Of Python objects, which JSON becomes before it is numbers."""
 _OPENING, _ITEM = 96, 40  # bytes that a list or a mapping takes, and an item in one
 _DEEPEST = 64
+_STAMP = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 _KEPT = 2**24  # bytes of a file that is kept, as it was read last
 _VALUES = {"values", "data", "samples", "value"}
 
@@ -133,7 +135,7 @@ def _is_by_row(node: Mapping[str, Any]) -> bool:
     """Whether the keys are row numbers, or stamps: what pandas writes by default."""
     return (
         len(node) > 1
-        and (all(str(key).isdigit() for key in node) or all(is_calendar(str(key)) for key in node))
+        and (all(map(_STAMP.fullmatch, map(str, node))) or all(is_calendar(str(key)) for key in node))
         and not any(isinstance(value, list | Mapping) for value in node.values())
     )
 
@@ -150,8 +152,8 @@ def _with_index(index: list[Any], columns: dict[str, Any]) -> dict[str, Any]:
     """Columns behind their index, where it says more than the number of the row."""
     if [str(item) for item in index] == [str(row) for row in range(len(index))]:
         return columns
-    numbers = all(isinstance(item, int) or (isinstance(item, str) and item.isdigit()) for item in index)
-    return {"index": _vector([int(item) for item in index] if numbers else index), **columns}
+    numbers = all(isinstance(item, int) or (isinstance(item, str) and _STAMP.fullmatch(item)) for item in index)
+    return {"index": _vector([float(item) for item in index] if numbers else index), **columns}
 
 
 def _signal(node: Mapping[str, Any]) -> Leaf | None:

@@ -24,6 +24,7 @@ from sysid.ingest.tables.table import RawTable
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _OBJECT = 0xDD000000
+_HEAD = 2
 _NOT_NUMBERS = {"cell", "struct", "char", "function_handle", "opaque", "object"}
 
 
@@ -155,9 +156,24 @@ def _array(value: Any, name: str, path: Path) -> Any:
     if value.dtype.kind in "US":
         texts = [str(text).replace("\0", "").rstrip() for text in value.reshape(-1)]
         return texts[0] if len(texts) == 1 else texts
+    if value.dtype.kind == "O" and (table := _table_of_cells(value, path)) is not None:
+        return table
     if value.dtype.kind == "O":
         return [_node(item, name, path) for item in value.reshape(-1, order="F")]
     return value
+
+
+def _table_of_cells(value: Any, path: Path) -> dict[str, Any] | None:
+    """A cell array that is a sheet, as ``readcell`` and ``xlsread`` leave it: names above numbers of one each."""
+    if value.ndim != 2 or value.shape[0] <= _HEAD or value.shape[1] < 2:
+        return None
+    head = [_node(cell, "", path) for cell in value[0]]
+    if not all(isinstance(name, str) and name for name in head) or len(set(head)) < len(head):
+        return None
+    numbers = [[number_of(_node(cell, "", path)) for cell in row] for row in value[1:]]
+    if any(number is None for row in numbers for number in row):
+        return None
+    return dict(zip(head, np.array(numbers, dtype=np.float64).T, strict=True))
 
 
 def _is_known(kind: object, fields: Set[str]) -> bool:

@@ -23,6 +23,7 @@ class Clock:
         low: Smallest count that it is taken for.
         high: Largest count that it is taken for.
         by_name: Whether the step must be small, or the name that of a date: plain seconds reach as far.
+        names: What such a name has in it.
     """
 
     unit: str
@@ -31,12 +32,19 @@ class Clock:
     low: float
     high: float
     by_name: bool = False
+    names: tuple[str, ...] = _DATE_NAMES
 
 
 CLOCKS = (
     *(
         Clock(unit=unit, told=f"{unit} since 1970", seconds=scale, low=_FROM / scale, high=_TO / scale)
         for unit, scale in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+    ),
+    *(
+        Clock(
+            unit="hns", told=f"steps of 100 ns since the year {year}, as {by} counts", seconds=1e-7, low=low, high=high
+        )
+        for year, by, low, high in ((1601, "Windows", 1.260e17, 1.577e17), (1, ".NET", 6.308e17, 6.625e17))
     ),
     Clock(unit="day", told="days since 1900, as Excel counts", seconds=_DAY, low=25_569.0, high=73_050.0, by_name=True),
     Clock(
@@ -46,6 +54,15 @@ CLOCKS = (
         low=719_529.0,
         high=767_010.0,
         by_name=True,
+    ),
+    Clock(
+        unit="day",
+        told="Julian days",
+        seconds=_DAY,
+        low=2_415_020.5,
+        high=2_488_069.5,
+        by_name=True,
+        names=("jd", "julian"),
     ),
 )
 """The clocks that are known by the size of their numbers."""
@@ -75,8 +92,8 @@ def clock_of(values: NDArray[np.float64], name: str, *, origin: int = 0) -> Cloc
     if not len(rising):
         return None
     step, low, high = float(np.median(rising)), float(known.min()) + origin, float(known.max()) + origin
-    dated = any(word in name.casefold() for word in _DATE_NAMES)
     for clock in CLOCKS:
+        dated = any(word in name.casefold() for word in clock.names)
         possible = clock.low <= low and high <= clock.high and step * clock.seconds <= _DAY
         if possible and (not clock.by_name or dated or step * clock.seconds <= 2.0 or _is_in_days(step)):
             return clock

@@ -20,8 +20,10 @@ _TIME_NAMES = {
     "total time", "relative time", "cumulative time", "absolute time", "rel time",
     "record time", "recording time", "measurement time", "system time",
     "unix timestamp", "timestring", "time string", "millis", "micros",
+    "время", "дата", "дата/время", "дата и время", "czas", "čas", "tarih", "zaman", "idő", "aika",
+    "时间", "日期", "时间戳", "日期时间", "時間", "時刻", "日時", "日付", "시간", "시각", "날짜", "일시",
 }  # fmt: skip
-_TIME_UNITS = {"s", "ms", "us", "µs", "ns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
+_TIME_UNITS = {"s", "ms", "us", "µs", "ns", "hns", "ds", "min", "h", "second", "millisecond", "minute", "hour", "day"}
 
 _SPELT = {"millis": "ms", "micros": "us", "nanos": "ns", "day": "day", "days": "day", "d": "day"}
 _WORDS_IN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[^\W\d_A-Z]+")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import datetime
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sysid.errors import ReaderError
+import sysid
+from sysid.errors import ReaderError, TraceError
 from sysid.ingest import inspect_file, load_dataset, propose_dataset
 from sysid.ingest.assembling.timing import rounded_step, survey
 from sysid.ingest.tables.time_columns import is_called_time
@@ -70,14 +73,76 @@ def test_utf_16_without_its_mark(tmp_path: Path) -> None:
 
 
 def test_names_in_another_encoding_are_told(tmp_path: Path) -> None:
-    text = rows([f"{k / 10:.1f}" for k in range(N)], "Время (с),Давление,Температура")
-    (tmp_path / "a.csv").write_bytes(text.encode("cp1251"))
+    text = rows([f"{k / 10:.1f}" for k in range(N)], "Χρόνος (s),Πίεση,Θερμοκρασία")
+    (tmp_path / "a.csv").write_bytes(text.encode("cp1253"))
     assert any("name the encoding" in one for one in inspect_file(tmp_path / "a.csv").problems)
     assert not any("encoding" in one for one in inspect_file(write(tmp_path, text)).problems)
 
 
+@pytest.mark.parametrize(
+    ("encoding", "head"),
+    [
+        ("cp1251", "Время; с|Давление; МПа|Расход; м3/ч"),
+        ("gb18030", "时间(s)|压力(MPa)|流量(m3/h)"),
+        ("cp932", "時間(s)|圧力(MPa)|流量(m3/h)"),
+    ],
+)
+def test_names_that_are_words_in_another_encoding_are_read_in_it(tmp_path: Path, encoding: str, head: str) -> None:
+    """The comma before a unit is quoted, as it stands between cells too."""
+    names = ",".join(f'"{cell}"' for cell in head.replace(";", ",").split("|"))
+    text = rows([f"{k / 10:.1f}" for k in range(N)], names)
+    trace = proposed(tmp_path, text.encode(encoding))
+    assert [c.unit for c in trace.channels] == ["MPa", "m^3/h" if encoding != "cp1251" else "m^3/hour"]
+    assert [c.name[0] for c in trace.channels] == [head.split("|")[k][0] for k in (1, 2)]
+    assert any(encoding in one for one in inspect_file(tmp_path / "a.csv").problems)
+
+
+@pytest.mark.parametrize(
+    ("form", "step"),
+    [
+        ("%Y-%j %H:%M:%S", 1800.0),
+        ("%Y:%j:%H:%M:%S", 1800.0),
+        ("%Y年%m月%d日 %H:%M:%S", 1800.0),
+        ("%Y年%m月%d日%H时%M分", 1800.0),
+        ("%d-%b-%y %I.%M.%S.000000 %p", 1800.0),
+    ],
+)
+def test_dates_of_databases_and_of_asia(tmp_path: Path, form: str, step: float) -> None:
+    began = datetime.datetime(2024, 3, 12, 8, 15)
+    stamps = [(began + datetime.timedelta(seconds=step * k)).strftime(form) for k in range(N)]
+    trace = proposed(tmp_path, rows(stamps, "stamp,u [V],y [V]"))
+    assert trace.sample_time == step
+    np.testing.assert_array_equal(trace["y"], Y)
+
+
+@pytest.mark.parametrize(
+    ("head", "stamp", "step"),
+    [
+        ("mm:ss", lambda k: f"{k // 2:02d}:{k % 2 * 30:02d}", 30.0),
+        ("elapsed (min:s)", lambda k: f"{2 * k}:00.5", 120.0),
+        ("span", lambda k: f"{k // 4}.{k % 4 * 6:02d}:00:00.0000000", 21_600.0),
+        ("timestamp", lambda k: f"{133_546_995_000_000_000 + 1_000_000 * k}", 0.1),
+        ("ticks", lambda k: f"{638_458_281_000_000_000 + 1_000_000 * k}", 0.1),
+        ("JD", lambda k: f"{2_460_381.5 + k / 1440:.9f}", 60.0),
+        ("t", lambda k: f"{52_341_232 + 1000 * k + 4 * (k * k % 7)}", 0.001),
+    ],
+)
+def test_clocks_that_say_by_name_or_size_what_they_count(
+    tmp_path: Path, head: str, stamp: Callable[[int], str], step: float
+) -> None:
+    found = inspect_file(write(tmp_path, rows([stamp(k) for k in range(N)], f"{head},u [V],y [V]")))
+    assert found.sample_time == pytest.approx(step, rel=2e-3)
+    assert [column.name for column in found.channels] == ["u", "y"]
+
+
+def test_a_refusal_says_how_the_clock_was_guessed(tmp_path: Path) -> None:
+    stamps = [f"{1003 * k + 40_000 * (k > 30)}" for k in range(N)]
+    with pytest.raises(TraceError, match=r"missing in 1 gap(.|\n)*t in ms.*if it is us, say so"):
+        sysid.load(write(tmp_path, rows(stamps, "t,u [V],y [V]")))
+
+
 def test_stamps_in_a_form_that_is_not_known_ask_for_their_pattern(tmp_path: Path) -> None:
-    text = rows([f"2024:072:08:15:{k / 10:06.3f}" for k in range(N)], "Time,u [V],y [V]")
+    text = rows([f"2024-W11-2 08:15:{k / 10:06.3f}" for k in range(N)], "Time,u [V],y [V]")
     with pytest.raises(ReaderError, match=r"(?s)form that is not known.*format: "):
         inspect_file(write(tmp_path, text))
 

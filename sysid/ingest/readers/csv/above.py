@@ -69,6 +69,8 @@ def _unmarked(above: list[Row], split: Split) -> list[Row]:
         elif len(row.cells) == split.width + 1 and not timed:
             found.append(replace(row, cells=row.cells[1:]))
             timed = any(is_called_time(parse_header(cell).name) for cell in row.cells)
+        elif len(row.cells) == split.width + 1 and is_units(row.cells[1:]):
+            found.append(replace(row, cells=row.cells[1:]))
     return found
 
 

@@ -10,7 +10,7 @@ from sysid.errors import ReaderError, shortened
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.readers.csv.above import names_last
 from sysid.ingest.readers.csv.cells import BLANKS, DATA, Kind, Row, is_units, kind_of, trimmed
-from sysid.ingest.readers.csv.split import Split
+from sysid.ingest.readers.csv.split import SEPARATORS, Split
 from sysid.ingest.readers.csv.widths import has_no_column, rises, without_name
 from sysid.ingest.tables.options import FileOptions
 from sysid.ingest.tables.time_columns import is_called_time, is_time_unit
@@ -253,6 +253,16 @@ def _units_above(above: list[Row], split: Split) -> bool:
     return shares[0] == 1.0 and shares[1] < 1.0
 
 
+def _by_other_mark(row: Row, split: Split) -> list[str] | None:
+    """A head whose names stand between other marks than its numbers do: ``t,u,y`` over blanks."""
+    text = split.lines[row.line - 1]
+    for mark in SEPARATORS:
+        cells = [] if mark in {BLANKS, split.separator} else [cell.strip() for cell in text.strip(mark).split(mark)]
+        if len(set(cells)) == len(cells) == split.width and all(kind_of(cell) is Kind.WORD for cell in cells):
+            return cells
+    return None
+
+
 def _to_width(row: Row, split: Split) -> list[str] | None:
     """A header brought to the width of the numbers, or ``None`` if it does not fit them."""
     cells, width = trimmed(row.cells, split.width), split.width
@@ -265,6 +275,8 @@ def _to_width(row: Row, split: Split) -> list[str] | None:
         ):
             if len(cut) == width:
                 return cut
+    if len(cells) != width > 1 and (other := _by_other_mark(row, split)) is not None:
+        return other
     if 0 < len(cells) < width and all(kind is Kind.NOTHING for kind in split.kinds[len(cells) :]):
         return [*cells, *[""] * (width - len(cells))]
     if len(cells) == width - 1 > 1 and without_name(cells, row, split) is not None:

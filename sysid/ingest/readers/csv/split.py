@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import compress
+from itertools import compress, pairwise
 from pathlib import Path
 
 from sysid.errors import ReaderError
@@ -187,7 +187,9 @@ def numbers_columns(split: Split) -> bool:
     if not head[0]:
         index = [row[0] for row in rows]
         dated = all(kind_of(cell) is Kind.TIME for cell in index)
-        return all(map(_is_count, head[1:])) and (dated or index == [str(k) for k in range(len(rows))])
+        if all(map(_is_count, head[1:])) and (dated or index == [str(k) for k in range(len(rows))]):
+            return True
+        return _stands_over_a_clock(head[1:], rows)
     counts = [[str(k + begin) for k in range(len(head))] for begin in (0, 1)]
     if head not in counts:
         return False
@@ -197,6 +199,18 @@ def numbers_columns(split: Split) -> bool:
     begins = all(_NUMBER.fullmatch(cell) for cell in anew) and float(anew[0]) == 0.0 < float(anew[1])
     by_decimals = len(head) > 2 or head == counts[0]
     return begins or (by_decimals and not any(_is_count(cell) for row in rows for cell in row[1:]))
+
+
+def _stands_over_a_clock(places: list[str], rows: list[list[str]]) -> bool:
+    """Whether places, such as 100, 200, 300, stand in order over signals beside a clock that begins at 0."""
+    cells = [[cell.replace(",", ".") for cell in row] for row in (places, *rows)]
+    if len(places) < 2 or not all(_NUMBER.fullmatch(row[0]) for row in cells[1:]):
+        return False
+    if not all(map(_NUMBER.fullmatch, cells[0])):
+        return False
+    heads, clock = ([float(cell) for cell in column] for column in (cells[0], [row[0] for row in cells[1:]]))
+    rises = all(all(low < high for low, high in pairwise(numbers)) for numbers in (heads, clock))
+    return rises and clock[0] == 0.0
 
 
 def _is_count(cell: str) -> bool:

@@ -30,6 +30,7 @@ from sysid.ingest.readers.text_source import (
     TextFile,
     ZeroBytesError,
     encodings,
+    meant_encoding,
     not_text,
     seems_garbled,
 )
@@ -40,6 +41,8 @@ from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import is_called_time, recognise_time
 from sysid.names import from_csv_cell
 
+_MINUTES = re.compile(r"(?<![:\w])m{1,2}(?:in)?\s?:\s?s{1,2}(?:ec)?\b", re.IGNORECASE)
+"""How a head says that a clock of two numbers has minutes and seconds: mm:ss, (min:s)."""
 _MOST_TOLD = 6
 """Columns that are named in one note."""
 
@@ -49,7 +52,13 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     problem: Exception = ValueError("it has no encoding")
     for encoding in tries:
         try:
-            return table_of_text(TextFile(path=path, encoding=encoding), options, repairs)
+            table = table_of_text(TextFile(path=path, encoding=encoding), options, repairs)
+            meant = meant_encoding(table.names) if encoding == "cp1252" and options.encoding is None else None
+            if meant is None:
+                return table
+            table = table_of_text(TextFile(path=path, encoding=meant), options, repairs)
+            told = f"the names are words in {meant}, which is a guess (encoding: {meant})"
+            return replace(table, notes=(*table.notes, told))
         except (UnicodeError, LookupError) as error:
             problem = error
         except ZeroBytesError as error:
@@ -217,6 +226,7 @@ def _column(
                 where=where,
                 pattern=options.time.format if calendar else None,
                 zone=options.time.zone if calendar else None,
+                minutes=_MINUTES.search(f"{header.name} [{header.unit}]") is not None,
             )
         )
     if kind is Kind.WORD:

@@ -15,6 +15,7 @@ from sysid.ingest.readers.trees.leaves import Leaf, Whole, leaf_of, number_of, r
 from sysid.ingest.readers.trees.records import role_of
 from sysid.ingest.readers.trees.stacks import taken_apart
 from sysid.ingest.tables.joining import Signal
+from sysid.ingest.tables.time_columns import is_called_time
 
 _SECONDS = {
     "": 1.0, "seconds": 1.0, "second": 1.0, "s": 1.0, "sec": 1.0, "milliseconds": 1e-3, "ms": 1e-3,
@@ -24,6 +25,8 @@ _SECONDS = {
 
 _NAME, _SAMPLES = ("name", "label", "signalname", "channelname"), ("data", "values", "value", "samples")
 _CLOCK = ("time", "t", "raster", "timestamps", "stamps")
+_ROWS = 4
+"""Rows above which a matrix may have a clock in front."""
 _NAMED = {"InputName", "OutputName", "InputUnit", "OutputUnit", "TimeUnit"}
 
 
@@ -38,6 +41,8 @@ def understood(node: Any, notes: list[str]) -> Any:
         The tree of columns.
     """
     if isinstance(node, list):
+        if (records := _records_of_cells(node)) is not None:
+            return records
         return _named_signals(node) or [understood(item, notes) for item in node]
     if not isinstance(node, Mapping) or isinstance(node, Whole):
         return node
@@ -45,9 +50,48 @@ def understood(node: Any, notes: list[str]) -> Any:
         if is_one(node):
             return columns(node)
     node = taken_apart(node, notes) or node
+    node = _with_their_clock(node)
     found = {str(key): understood(value, notes) for key, value in node.items()}
     clocked = [str(key) for key, value in node.items() if isinstance(value, Mapping) and _is_clocked(value)]
     return _on_one_clock(found, clocked, notes) if len(clocked) > 1 else found
+
+
+def _records_of_cells(items: list[Any]) -> list[dict[str, Any]] | None:
+    """Cells in cells: a record of nameless columns for each of the outer ones."""
+    if not items or not all(isinstance(item, list) and len(item) > 1 for item in items):
+        return None
+    leaves = [[leaf_of(part) for part in item] for item in items]
+    if not all(leaf is not None and leaf.values.dtype.kind in "buif" for row in leaves for leaf in row):
+        return None
+    return [{f"column_{place + 1}": leaf for place, leaf in enumerate(row)} for row in leaves]
+
+
+def _with_their_clock(node: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Matrices that have the same clock in front of their signals, as Simulink's arrays with time: it is one time."""
+    leaves = {str(key): leaf for key, value in node.items() if (leaf := leaf_of(value)) is not None}
+    clocked = {
+        key: leaf
+        for key, leaf in leaves.items()
+        if not leaf.vector and not leaf.names and leaf.values.dtype.kind in "uif" and leaf.values.shape[0] > _ROWS
+    }
+    clocks = [leaf.values[:, 0].astype(np.float64) for leaf in clocked.values()]
+    if len(clocks) < 2 or not bool((np.diff(clocks[0]) > 0.0).all()):
+        return node
+    if any(not np.array_equal(one, clocks[0]) for one in clocks) or any(map(is_called_time, leaves)):
+        return node
+    if any(role_of(key) or key[-1].isdigit() for key in clocked) or len({key[:-1] or key for key in clocked}) == 1:
+        return node  # ze and zv, run1 and run2 are records, of the same columns each
+    found: dict[str, Any] = {"time": Leaf(values=clocks[0])}
+    for key, value in node.items():
+        whole = clocked.get(str(key))
+        single = whole is not None and whole.values.shape[1] == 2
+        parts = (
+            {}
+            if whole is None
+            else {(key if single else f"{key}_{i + 1}"): whole.values[:, i] for i in range(1, whole.values.shape[1])}
+        )
+        found |= parts or {str(key): value}
+    return found
 
 
 def _named_signals(items: list[Any]) -> dict[str, Leaf]:

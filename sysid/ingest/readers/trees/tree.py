@@ -7,7 +7,7 @@ the columns beside and below them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,8 @@ from sysid.ingest.tables.time_columns import is_called_time, recognise_time
 _DEEPEST = 40
 _NAMES = {"names", "channels", "columns", "labels", "signals", "variables", "fields", "header", "headers", "colheaders"}
 _NAMES |= {f"{one}{mark}names" for one in ("channel", "column", "signal", "variable", "var") for mark in ("", "_")}
+
+_UNITS = frozenset({"units", "unit", "channelunits", "channel_units", "varunits", "variableunits"})
 
 
 def table_of(
@@ -203,9 +205,12 @@ class _Walk:
         cells = {str(key): parts for key, value in node.items() if (parts := _cell(value)) is not None}
         elements = [leaf for cell in cells.values() for _, leaf in cell]
         lengths = _lengths((*leaves.items(), *(("", leaf) for leaf in elements)))
-        names = _names_beside(node)
+        names, theirs = _texts_beside(node, _NAMES), _texts_beside(node, _UNITS)
         leaves |= _texts_of_samples(node, lengths, leaves)
-        leaves = {key: replace(leaf, names=leaf.names or names) for key, leaf in leaves.items()}
+        leaves = {
+            key: replace(leaf, names=leaf.names or names, units=leaf.units or (theirs if names else ()))
+            for key, leaf in leaves.items()
+        }
         for key, value in node.items():
             name = str(key)
             if name in cells:
@@ -332,11 +337,11 @@ def _units_beside(node: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
-def _names_beside(node: Mapping[str, Any]) -> tuple[str, ...]:
-    """A list of texts that is called names, or channels, gives the columns of a matrix theirs."""
+def _texts_beside(node: Mapping[str, Any], called: Set[str]) -> tuple[str, ...]:
+    """A list of texts that is called names, or units, gives the columns of a matrix theirs."""
     for part in (node, *_saying(node)):
         for key, value in part.items():
-            if str(key).casefold().strip() not in _NAMES:
+            if str(key).casefold().strip() not in called:
                 continue
             leaf = leaf_of(value)
             texts = texts_of(value if leaf is None else leaf.values.tolist())
