@@ -1,6 +1,6 @@
 /* How the site's search ranks: where a word means the same on several pages, the one that says how comes before what was
    measured and before the reference. The numbers of Scorer are Sphinx's own. */
-const FIRST = /^(how\/|linear-models|choosing-lags|bundles|look-first|design-an-experiment|free-run|evidence|stability|composites|python|sweeps|auto|assemblies|reading-files)/;
+const FIRST = /^(how\/|linear-models|choosing-lags|bundles|look-first|design-an-experiment|free-run|evidence|stability|composites|python|sweeps|auto|assemblies|reading-files|files\/)/;
 const LAST = /^(measured\/|reference\/|results|gallery\/index|from-jax|from-sysidentpy|rail|index$)/;
 var Scorer = {
   score: ([docname, , anchor, , score]) => {

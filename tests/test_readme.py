@@ -170,11 +170,18 @@ def test_the_readme_is_one_screen_after_another_and_no_book() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
 
 
-def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_example_of_the_readme_prints_what_stands_below_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
-    (block,) = [
-        text for language, name, text in BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8")) if name
-    ]
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    (block,) = [text for language, name, text in BLOCK.findall(page) if name]
     exec(compile(block, "README.md", "exec"), {})  # noqa: S102 - our own page
+    told, shown = capsys.readouterr().out, page.partition("    free run, fit")[2].partition("\n\n")[0]
+    cells = [[line.rsplit(maxsplit=3) for line in text.splitlines()[1:]] for text in (told, shown)]
+    assert len(cells[0]) == 2
+    for (name, *fits), (name_shown, *fits_shown) in zip(*cells, strict=True):
+        assert name == name_shown.strip()
+        np.testing.assert_allclose([float(fit) for fit in fits], [float(fit) for fit in fits_shown], atol=0.5)
     assert (tmp_path / "compare.png").is_file()
     assert (tmp_path / "frame" / "model.json").is_file()

@@ -138,12 +138,11 @@ class FlowTable:
         return self.values[index] + (position - index) * self.slopes[index]
 
 
-def flow_table(*, laminar_ratio: float | None = None, intervals: int = TABLE_INTERVALS) -> FlowTable:
+def flow_table(*, laminar_ratio: float | None = None) -> FlowTable:
     """The table from the formulas.
 
     Args:
         laminar_ratio: Ratio above which the flow is laminar (linear), or ``None`` for the plain formula.
-        intervals: Number of intervals.
 
     Returns:
         The table.
@@ -159,5 +158,5 @@ def flow_table(*, laminar_ratio: float | None = None, intervals: int = TABLE_INT
             got=laminar_ratio,
             remedy="use a value from 0.99 to 0.999, or none",
         )
-    s = np.linspace(0.0, 1.0, intervals + 1)
+    s = np.linspace(0.0, 1.0, TABLE_INTERVALS + 1)
     return FlowTable(values=flow_coefficient(1.0 - s * s, laminar_ratio=laminar_ratio))

@@ -32,10 +32,12 @@ from sysid.models.converting.realisation import realise
 
 PLAIN_ITERATIONS = 3
 """Least-squares iterations before instruments are used: a model's output is one as soon as it resembles the data."""
+ITERATIONS, ROUNDS = 20, 3
+"""At most; and how often several inputs are gone through."""
 
 
 def _refined_poles(
-    records: Sequence[TimeRecord], start: NDArray[np.complex128], n_zeros: int, *, iterations: int = 20
+    records: Sequence[TimeRecord], start: NDArray[np.complex128], n_zeros: int
 ) -> NDArray[np.complex128]:
     """Stable poles of a transfer function with one input, as many as the start has.
 
@@ -43,7 +45,7 @@ def _refined_poles(
     """
     domain, n = records[0].domain, len(start)
     poles = stabilised(start, domain)
-    for iteration in range(iterations):
+    for iteration in range(ITERATIONS):
         sections = sections_of(poles, domain)
         basis = realise(basis_of(sections, n - 1, domain), domain)
         rows = [_rows(record, sections, n_zeros) for record in records]
@@ -102,23 +104,20 @@ def _noise_free(record: TimeRecord, sections: tuple[NDArray[np.float64], ...], n
     return replace(record, target=taps @ weights, free_start=False)
 
 
-def refined_sections(
-    records: Sequence[TimeRecord], start: Sections, n_zeros: tuple[int, ...], *, rounds: int = 3
-) -> Sections:
+def refined_sections(records: Sequence[TimeRecord], start: Sections, n_zeros: tuple[int, ...]) -> Sections:
     """Sections of several inputs, fitted in turn.
 
     Args:
         records: The data.
         start: For each input its sections to begin with.
         n_zeros: For each input.
-        rounds: How often all inputs are gone through; a single input needs one.
 
     Returns:
         For each input its sections.
     """
     domain = records[0].domain
     current = list(start)
-    for _ in range(rounds if len(current) > 1 else 1):
+    for _ in range(ROUNDS if len(current) > 1 else 1):
         for j, zeros in enumerate(n_zeros):
             alone = [_left_for(record, j, tuple(current), n_zeros) for record in records]
             poles = np.concatenate([np.roots(d if domain is Domain.DISCRETE else d[::-1]) for d in current[j]])

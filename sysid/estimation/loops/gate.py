@@ -57,7 +57,7 @@ class Law:
         return sorted((-np.log(poles.real)).tolist())
 
 
-def law_of(records: Sequence[tuple[Array, Array]], *, order: int, seed: int = 0) -> Law | None:
+def law_of(records: Sequence[tuple[Array, Array]], *, order: int) -> Law | None:
     """The law of some order that most samples follow.
 
     Changes have it without constants, in which pieces of a law differ whose slopes are one.
@@ -65,7 +65,6 @@ def law_of(records: Sequence[tuple[Array, Array]], *, order: int, seed: int = 0)
     Args:
         records: Inputs, shape ``(n_samples, n_inputs)``, and an output, shape ``(n_samples,)``, in shares of its range.
         order: Past samples.
-        seed: Of what is drawn at random.
 
     Returns:
         The law; ``None`` where hardly any samples have one in common.
@@ -80,7 +79,7 @@ def law_of(records: Sequence[tuple[Array, Array]], *, order: int, seed: int = 0)
         values.append(moved[t])
     all_terms, all_values = np.vstack(terms), np.concatenate(values)[:, np.newaxis]
     moves = np.abs(all_values[:, 0]) > MOVES
-    found = majority_map(all_terms, all_values, np.ones(1), NEAR, rng=np.random.default_rng(seed), among=moves)
+    found = majority_map(all_terms, all_values, np.ones(1), NEAR, rng=np.random.default_rng(0), among=moves)
     if found is None:
         return None
     row, follow = found[0][:, 0], found[1]

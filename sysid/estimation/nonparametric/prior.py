@@ -188,20 +188,19 @@ class DeadTime:
         return self.odds > DOUBT
 
 
-def dead_times(data: Triangle, prior: Prior, *, most: int, rounds: int = 2) -> tuple[tuple[DeadTime, ...], Prior]:
+def dead_times(data: Triangle, prior: Prior, *, most: int) -> tuple[tuple[DeadTime, ...], Prior]:
     """The dead times of largest evidence, one input after the other.
 
     Args:
         data: The regression on all lags of every input.
         prior: With any dead times; its kernel is kept.
         most: The longest dead time that is looked for.
-        rounds: How often all inputs are gone through.
 
     Returns:
         The dead times, and the prior that begins at the earliest ones that the data allow.
     """
     found: list[DeadTime] = []
-    for number in range(rounds):
+    for number in range(2):  # that of an input moves with those of the others
         found = []
         for j in range(len(prior.dead)):
             one = _scanned(data, prior, j, most, everywhere=number == 0)

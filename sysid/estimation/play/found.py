@@ -51,13 +51,12 @@ class Play:
     left: float
 
 
-def played(moved: Array, width: float, begin: float | None = None) -> Array:
+def played(moved: Array, width: float) -> Array:
     """What follows an input through play.
 
     Args:
         moved: The input, shape ``(n_samples,)``.
         width: To either side.
-        begin: Where it stands before; at the first input by default.
 
     Returns:
         Shape ``(n_samples,)``.
@@ -66,7 +65,7 @@ def played(moved: Array, width: float, begin: float | None = None) -> Array:
         >>> played(np.array([0.0, 0.1, 0.5, 0.45, 0.0]), 0.2).round(2).tolist()
         [0.0, 0.0, 0.3, 0.3, 0.2]
     """
-    at, found = (float(moved[0]) if begin is None else begin), np.empty(len(moved))
+    at, found = float(moved[0]), np.empty(len(moved))
     for k, one in enumerate(moved.tolist()):
         at = min(max(at, one - width), one + width)
         found[k] = at

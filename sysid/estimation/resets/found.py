@@ -54,13 +54,12 @@ class _Steps:
         return np.hstack([self.before, self.inputs, np.ones((len(self.before), 1))])
 
 
-def found_resets(records: Sequence[tuple[Array, Array]], *, seed: int = 0) -> ResetMap | None:
+def found_resets(records: Sequence[tuple[Array, Array]]) -> ResetMap | None:
     """Find such a map.
 
     Args:
         records: Inputs, shape ``(n_samples, n_inputs)``, and outputs, shape ``(n_samples, n_outputs)``; the outputs of
             a sample are those at its end.
-        seed: Of what is drawn at random.
 
     Returns:
         The map that has fewest looks for events a sample among those that fit best; ``None`` where there is none.
@@ -76,11 +75,11 @@ def found_resets(records: Sequence[tuple[Array, Array]], *, seed: int = 0) -> Re
         >>> found.steps, found.guards[0].level, found.guards[0].reset.round(6).tolist()
         (1, 0.0, [[0.0, 0.0], [0.0, -0.8], [0.0, 0.0]])
     """
-    found = _found(records, seed)
+    found = _found(records)
     ratios = ratios_of([u for u, _ in records]) if found is None else ()
     if not ratios:
         return found
-    found = _found([(with_ratios(u, ratios), y) for u, y in records], seed)
+    found = _found([(with_ratios(u, ratios), y) for u, y in records])
     return None if found is None else replace(found, ratios=ratios)
 
 
@@ -105,8 +104,8 @@ def switches(outputs: Array) -> list[Armed]:
     return found
 
 
-def _found(records: Sequence[tuple[Array, Array]], seed: int) -> ResetMap | None:
-    steps, rng = _steps_of(records), np.random.default_rng(seed)
+def _found(records: Sequence[tuple[Array, Array]]) -> ResetMap | None:
+    steps, rng = _steps_of(records), np.random.default_rng(0)
     if steps is None:
         return None
     two = sorted({one.output for one in switches(np.vstack([steps.before, steps.after]))})
@@ -135,12 +134,11 @@ def _found(records: Sequence[tuple[Array, Array]], seed: int) -> ResetMap | None
     return None
 
 
-def derived_from(outputs: Array, *, near: float = NEAR[0]) -> dict[int, Array]:
+def derived_from(outputs: Array) -> dict[int, Array]:
     """Outputs that are those before them, in another unit or added up: the rest is the state, and says all.
 
     Args:
         outputs: Of all records, shape ``(n_samples, n_outputs)``.
-        near: Share of its range that such an output may be off.
 
     Returns:
         By number of the output its factors of the outputs that are not among these, and of 1.
@@ -154,7 +152,7 @@ def derived_from(outputs: Array, *, near: float = NEAR[0]) -> dict[int, Array]:
     for k in range(outputs.shape[1]):
         terms = np.column_stack([outputs[:, own], np.ones(len(outputs))])
         row = np.asarray(np.linalg.lstsq(terms, outputs[:, k], rcond=None)[0], dtype=np.float64)
-        if own and np.abs(terms @ row - outputs[:, k]).max() <= near * np.ptp(outputs[:, k]):
+        if own and np.abs(terms @ row - outputs[:, k]).max() <= NEAR[0] * np.ptp(outputs[:, k]):
             found[k] = row
         else:
             own.append(k)

@@ -99,9 +99,9 @@ def step_core(
     return Step(raw=raw, memory=following)
 
 
-def join(nodes: Nodes, pieces: Sequence[str], name: str, axis: int = 0) -> str:
+def join(nodes: Nodes, pieces: Sequence[str], name: str) -> str:
     """Pieces one behind the other; no node where there is one."""
-    return pieces[0] if len(pieces) == 1 else nodes.add("Concat", pieces, name, axis=axis)
+    return pieces[0] if len(pieces) == 1 else nodes.add("Concat", pieces, name, axis=0)
 
 
 def past_rows(form: WideForm) -> dict[int, list[int]]:

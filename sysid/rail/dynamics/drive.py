@@ -121,8 +121,6 @@ class Run:
 
     Args:
         motion: Of every vehicle, one row per sample.
-        start_position: Of the first vehicle in m.
-        start_speed: Of the train in m/s.
         notch: Set in each sample.
         handle: Psi gauge in each sample.
         cylinders: Pa gauge, shape ``(n_samples, n_vehicles)``.
@@ -132,8 +130,6 @@ class Run:
     """
 
     motion: Motion
-    start_position: float
-    start_speed: float
     notch: NDArray[np.int64]
     handle: NDArray[np.float64]
     cylinders: NDArray[np.float64]
@@ -200,7 +196,7 @@ def drive(moving: MovingTrain, brake: AbstractBrake, driver: AbstractDriver, lim
         ConfigError: If the brake does not fit the train.
     """
     _check_fit(moving, brake)
-    log, start, speed = _Log(), float(moving.state.position[0]), moving.speed
+    log, start = _Log(), float(moving.state.position[0])
     total = round(limits.duration / moving.sample_time)
     done, acceleration, seen_speed = 0, 0.0, float(moving.state.speed[0])
     fastest = float(np.abs(moving.state.speed).max())
@@ -227,7 +223,7 @@ def drive(moving: MovingTrain, brake: AbstractBrake, driver: AbstractDriver, lim
         fastest = max(fastest, now)
         if (limits.until_still and still) or float(motion.positions[-1, 0]) < start - limits.back:
             break
-    return _run(moving, log, start, speed)
+    return _run(moving, log)
 
 
 def _check_fit(moving: MovingTrain, brake: AbstractBrake) -> None:
@@ -242,11 +238,9 @@ def _check_fit(moving: MovingTrain, brake: AbstractBrake) -> None:
         )
 
 
-def _run(moving: MovingTrain, log: _Log, start: float, speed: float) -> Run:
+def _run(moving: MovingTrain, log: _Log) -> Run:
     return Run(
         motion=Motion.joined(log.motions),
-        start_position=start,
-        start_speed=speed,
         notch=np.concatenate([controls.notch for controls in log.controls]),
         handle=np.concatenate([controls.handle for controls in log.controls]),
         cylinders=np.concatenate(log.cylinders),

@@ -142,7 +142,7 @@ class ErrorSensitivity:
 
 
 def error_sensitivity(
-    scenarios: Mapping[str, Scenario], *, reference: MakeBrake, size: float, biased: bool = True, seed: int = 0
+    scenarios: Mapping[str, Scenario], *, reference: MakeBrake, size: float, biased: bool = True
 ) -> ErrorSensitivity:
     """Run scenarios with a brake that errs by so much.
 
@@ -151,7 +151,6 @@ def error_sensitivity(
         reference: Makes the trusted brake.
         size: Of the error in psi.
         biased: Whether the error is a bias of every car, the worst that an error of a size can be, or noise.
-        seed: Of the noise.
 
     Returns:
         What came of it.
@@ -159,8 +158,8 @@ def error_sensitivity(
     Raises:
         ConfigError: If the brake does not fit the train.
     """
-    error = {"bias": size} if biased else {"noise": size}
-    comparison = compare(scenarios, reference=reference, other=lambda: ErringBrake(reference(), **error, seed=seed))
+    bias, noise = (size, 0.0) if biased else (0.0, size)
+    comparison = compare(scenarios, reference=reference, other=lambda: ErringBrake(reference(), bias=bias, noise=noise))
     return ErrorSensitivity(
         size=size,
         mse=float(np.mean([difference.mse for difference in comparison.differences.values()])),

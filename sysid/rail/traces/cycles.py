@@ -163,14 +163,13 @@ def card_of(track: TrackProfile, *, limit: float) -> TrackCard:
     return TrackCard(rows=tuple(rows.values()))
 
 
-def rolling_line(seed: int, *, length: float = 40_000.0) -> TrackProfile:
-    """A line down from the hills (ours): sections of 1 to 4 km, falling by 4 to 12 per mille and nearly level in turn.
+def rolling_line(seed: int) -> TrackProfile:
+    """A line of 40 km down from the hills (ours): sections of 1 to 4 km, that fall by 4 to 12 per mille or are level.
 
-    The rises of up to 1.5 per mille are what one locomotive takes a loaded train up at speed.
+    They fall and are nearly level in turn: one locomotive takes a loaded train up rises of 1.5 per mille at speed.
 
     Args:
         seed: Any integer of at least 0.
-        length: In m.
 
     Returns:
         The track.
@@ -182,7 +181,7 @@ def rolling_line(seed: int, *, length: float = 40_000.0) -> TrackProfile:
     rng = np.random.default_rng(seed)
     rows: list[tuple[float, float]] = []
     x = 0.0
-    while x < length:
+    while x < 40_000.0:
         grade = -rng.uniform(0.004, 0.012) if len(rows) % 2 == 0 else rng.uniform(0.0, 0.0015)
         rows.append((x, float(grade)))
         x += float(rng.uniform(1000.0, 4000.0))

@@ -28,11 +28,8 @@ LAGS = (0.15, 0.25)
 """Of the cylinder behind the commanded pressure in s, one after the other (ours)."""
 
 
-def servo(sample_time: float = SAMPLE_TIME) -> ARXModel:
+def servo() -> ARXModel:
     """The vehicle's brake: two lags from the commanded pressure to the cylinder.
-
-    Args:
-        sample_time: In s.
 
     Returns:
         A model with the mapping ``PC -> BC`` in psi.
@@ -43,13 +40,13 @@ def servo(sample_time: float = SAMPLE_TIME) -> ARXModel:
         >>> float(np.round(model.coefficients.sum(), 9))  # a gain of one: b0 + a1 + a2 = 1
         1.0
     """
-    fast, slow = (float(np.exp(-sample_time / lag)) for lag in LAGS)
+    fast, slow = (float(np.exp(-SAMPLE_TIME / lag)) for lag in LAGS)
     return ARXModel(
         orders=ARX(na=2, nb=(1,), nk=(1,)),
         coefficients=np.array([(1.0 - fast) * (1.0 - slow), fast + slow, -fast * slow]),
         intercept=0.0,
         mapping=Mapping.parse("PC -> BC"),
-        sample_time=sample_time,
+        sample_time=SAMPLE_TIME,
         input_units=("psi",),
         output_unit="psi",
         rest_output=0.0,
@@ -153,51 +150,46 @@ def learning_stops(
     return found
 
 
-def speed_commands(
-    seed: int,
-    duration: float,
-    *,
-    speeds: tuple[float, ...] = (40.0, 30.0, 20.0, 10.0),
-    hold: tuple[float, float] = (20, 90),
-) -> NDArray[np.float64]:
+SPEEDS = (40.0, 30.0, 20.0, 10.0)
+"""That are commanded at random, in mph; the first is where it begins."""
+HOLD = (20, 90)
+"""Shortest and longest time that a speed is commanded, in s."""
+
+
+def speed_commands(seed: int, duration: float) -> NDArray[np.float64]:
     """Random speed commands in m/s: each other than the one before, held for a random time.
 
     Args:
         seed: Any integer of at least 0.
         duration: In s.
-        speeds: That may be commanded, in mph; the first is where it begins.
-        hold: Shortest and longest time in s.
 
     Returns:
         Shape ``(n_samples,)``.
     """
     rng = np.random.default_rng(seed)
-    parts, present, filled = [], speeds[0], 0
+    parts, present, filled = [], SPEEDS[0], 0
     total = round(duration / SAMPLE_TIME)
     while filled < total:
-        count = round(float(rng.uniform(*hold)) / SAMPLE_TIME)
+        count = round(float(rng.uniform(*HOLD)) / SAMPLE_TIME)
         parts.append(np.full(count, present * MPH))
         filled += count
-        present = float(rng.choice([speed for speed in speeds if speed != present]))
+        present = float(rng.choice([speed for speed in SPEEDS if speed != present]))
     return np.concatenate(parts)[:total]
 
 
-def handle_of_signal(
-    signal: NDArray[np.float64],
-    *,
-    running: float = 90.0,
-    first: float = 5.8,
-    deepest: float = 25.8,
-    step: float = 2.0,
-) -> NDArray[np.float64]:
+RUNNING = 90.0
+"""Released handle in psi gauge."""
+FIRST, DEEPEST = 5.8, 25.8
+"""Smallest reduction, and that of full service, at 20 mA, in psi."""
+STEP = 2.0
+"""Between further reductions in psi (ours)."""
+
+
+def handle_of_signal(signal: NDArray[np.float64]) -> NDArray[np.float64]:
     """The handle of a direct-release brake that follows the controller's signal.
 
     Args:
         signal: P in mA, shape ``(n_samples,)``.
-        running: Released handle in psi gauge.
-        first: Smallest reduction in psi.
-        deepest: Of full service in psi, at 20 mA.
-        step: Between further reductions in psi (ours).
 
     Returns:
         Handle in psi gauge, same shape.
@@ -212,9 +204,9 @@ def handle_of_signal(
         if share <= 0.0:
             depth = 0.0
         else:
-            asked = first + step * np.floor(max(0.0, share * deepest - first) / step)
-            depth = max(depth, deepest if share >= 1.0 else float(asked))
-        handle[k] = round(running - depth, 6)
+            asked = FIRST + STEP * np.floor(max(0.0, share * DEEPEST - FIRST) / STEP)
+            depth = max(depth, DEEPEST if share >= 1.0 else float(asked))
+        handle[k] = round(RUNNING - depth, 6)
     return handle
 
 

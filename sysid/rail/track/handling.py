@@ -24,20 +24,16 @@ SAG_SHARE = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class CrestHandling:
-    """Over a crest: cut power until at least half of the train is past the apex, and hold the gain of speed.
+    """Over a crest: cut power until at least half of the train is past the apex.
 
     Args:
         power_allowed: Whether half of the train's mass is past the apex.
-        share_past: Share of the mass past the apex, 0 to 1.
-        largest_speed_gain: In m/s since the leading end reached the apex.
         car_at_apex: Number from 1 of the vehicle on the apex; 0 before it, one more than the last behind it.
         mass_before: Mass in kg still on the way up.
         mass_past: Mass in kg on the way down.
     """
 
     power_allowed: bool
-    share_past: float
-    largest_speed_gain: float
     car_at_apex: int
     mass_before: float
     mass_past: float
@@ -62,8 +58,6 @@ def crest_handling(feature: Feature, shape: Shape, x: float) -> CrestHandling:
     past = shape.mass_ahead(max(0.0, x - feature.apex))
     return CrestHandling(
         power_allowed=past >= 0.5 * shape.mass,
-        share_past=past / shape.mass,
-        largest_speed_gain=SPEED_GAINS[feature.severity],
         car_at_apex=int(np.searchsorted(shape.edges, x - feature.apex, side="left")),
         mass_before=shape.mass - past,
         mass_past=past,

@@ -53,13 +53,12 @@ def _whose(model: AbstractModel, mode: Mode, known: Known) -> str:
     return " from ".join(filter(None, (outputs, mode.of)))
 
 
-def step_of(known: Known, *, samples: int | None = None, seed: int = 0) -> StepResponse:
+def step_of(known: Known, *, samples: int | None = None) -> StepResponse:
     """Step responses of linear models, from every input to every output.
 
     Args:
         known: The models, with one sample time.
         samples: Length; by default until the slowest pole has settled, 20,000 at most.
-        seed: Of the draws for the intervals.
 
     Returns:
         The responses.
@@ -67,7 +66,7 @@ def step_of(known: Known, *, samples: int | None = None, seed: int = 0) -> StepR
     Raises:
         ConfigError: If a model is not linear, or no input moves any.
     """
-    pairs = _views(known, seed)
+    pairs = _views(known)
     n = samples or max(settling(view) for _, view in pairs)
     values, ends, found = [], [], []
     for model, view in pairs:
@@ -94,14 +93,13 @@ def _stepped(model: AbstractModel, view: LinearView) -> Linear:
     return cast("Linear", model)
 
 
-def bode_of(known: Known, *, frequency: Any = None, points: int = 200, seed: int = 0) -> Bode:
+def bode_of(known: Known, *, frequency: Any = None, points: int = 200) -> Bode:
     """Frequency responses of linear models, from every input to every output.
 
     Args:
         known: The models, with one sample time.
         frequency: In rad/s; by default four decades up to the Nyquist frequency.
         points: How many by default.
-        seed: Of the draws for the intervals.
 
     Returns:
         The responses.
@@ -109,7 +107,7 @@ def bode_of(known: Known, *, frequency: Any = None, points: int = 200, seed: int
     Raises:
         ConfigError: If a model is not linear, no input moves any, or a frequency is none.
     """
-    pairs = _views(known, seed)
+    pairs = _views(known)
     nyquist = np.pi / known[0][0].sample_time
     w = nyquist * np.logspace(-4.0, 0.0, points) if frequency is None else _frequencies(frequency)
     columns, unwrapped, gains, phases = [], [], [], []
@@ -163,9 +161,9 @@ def check_linear(known: Known) -> None:
             )
 
 
-def _views(known: Known, seed: int) -> list[tuple[AbstractModel, LinearView]]:
+def _views(known: Known) -> list[tuple[AbstractModel, LinearView]]:
     check_linear(known)
-    pairs = [(model, view) for model, known_by in known for view in linear_views(model, known_by, seed)]
+    pairs = [(model, view) for model, known_by in known for view in linear_views(model, known_by, 0)]
     if not pairs:
         raise ConfigError(
             "there is no input to respond to",

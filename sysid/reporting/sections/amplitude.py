@@ -41,12 +41,11 @@ class Band:
     mean: float
 
 
-def bands(signals: Dict[str, CaseSignals], count: int = BANDS) -> list[Band]:
+def bands(signals: Dict[str, CaseSignals]) -> list[Band]:
     """Errors of the free run by band of the target, over all samples of all cases.
 
     Args:
         signals: By case.
-        count: How many bands.
 
     Returns:
         From the lowest band up; none for a target that does not vary.
@@ -58,9 +57,9 @@ def bands(signals: Dict[str, CaseSignals], count: int = BANDS) -> list[Band]:
     low, high = float(target.min()), float(target.max())
     if not high > low:
         return []
-    edges = np.linspace(low, high, count + 1)
-    place = np.minimum(np.searchsorted(edges, target, side="right") - 1, count - 1)
-    return [_band(float(edges[k]), float(edges[k + 1]), error[place == k]) for k in range(count)]
+    edges = np.linspace(low, high, BANDS + 1)
+    place = np.minimum(np.searchsorted(edges, target, side="right") - 1, BANDS - 1)
+    return [_band(float(edges[k]), float(edges[k + 1]), error[place == k]) for k in range(BANDS)]
 
 
 def _band(low: float, high: float, error: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Band:

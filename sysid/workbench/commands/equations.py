@@ -27,6 +27,6 @@ def equations_command(pipeline: str) -> None:
             where=path,
             expected="a pipeline of kind assembly with fixed",
             got="fixed: none" if kind == "assembly" else f"kind: {kind}",
-            remedy="name an assembly, and add what is known to it: docs/assemblies.md",
+            remedy="name an assembly, and add what is known to it: docs/assemblies/known.md",
         )
     sys.stdout.write(equations_text(fixed))

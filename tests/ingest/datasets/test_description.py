@@ -188,7 +188,7 @@ def test_bytes_that_are_not_text_are_refused(write: Write) -> None:
 
 
 def test_the_page_about_files_shows_descriptions_that_are_valid(tmp_path: Path) -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "reading-files.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[3] / "docs" / "files" / "several-records.md").read_text(encoding="utf-8")
     shown = [
         block for block in re.findall(r"^```yaml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL) if "cases:" in block
     ]

@@ -88,11 +88,6 @@ class Choice:
         """Whether selection traces chose."""
         return self.by != "evidence" and bool(np.isfinite(self.chosen.score))
 
-    @property
-    def by_distance(self) -> bool:
-        """Whether a start in the middle of all was chosen."""
-        return self.by == "selection" and not self.by_selection and bool(np.isfinite(self.chosen.away))
-
 
 def choose(candidates: Sequence[Candidate], choose_by: str, vet: Callable[[Network], bool] | None = None) -> Choice:
     """Choose the best candidate, or the best stable one among the best.
