@@ -323,6 +323,23 @@ def written_name(name: str) -> str:
     return name if name.isidentifier() and name not in WORDS else '"' + name.replace('"', '""') + '"'
 
 
+def as_term(value: float) -> str:
+    """A number as it stands in a term, in brackets where it has a sign.
+
+    Args:
+        value: The number.
+
+    Returns:
+        The text, with 13 digits.
+
+    Example:
+        >>> as_term(0.5), as_term(-2.0)
+        ('0.5', '(-2)')
+    """
+    text = f"{value:.13g}"
+    return f"({text})" if text.startswith("-") else text
+
+
 def _in_order(node: Node) -> list[Node]:
     """A tree's nodes from left to right."""
     return sorted(nodes_of(node), key=lambda one: one.at)

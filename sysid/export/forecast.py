@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.errors import ConfigError, TraceError
+from sysid.export.measured_run import matrix_of
 from sysid.models import AbstractModel, Cascade, History
 from sysid.traces import Trace
 
@@ -86,11 +87,7 @@ def forecast(
         read, names = model.mapping.inputs, model.mapping.outputs
         output = np.column_stack([before[name] for name in names])
         output = output if model.structure.several_outputs else output[:, 0]
-        history = History(inputs=_columns(before, read, past), output=output)
-        run = model.forecast(_columns(inputs, read, n), history).reshape(n, -1)
+        history = History(inputs=matrix_of(before, read, past), output=output)
+        run = model.forecast(matrix_of(inputs, read, n), history).reshape(n, -1)
         found |= dict(zip(names, run.T, strict=True))
     return np.column_stack([found[name] for name in outputs])
-
-
-def _columns(channels: dict[str, Array], names: Sequence[str], samples: int) -> Array:
-    return np.column_stack([channels[name] for name in names]) if names else np.zeros((samples, 0))

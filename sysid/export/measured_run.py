@@ -147,9 +147,9 @@ def run_measured(
     measured = {**measured, **{name: measured[led] for name, led in surrogate.following(measured).items()}}
     first: dict[str, int] = {}
     for model in surrogate.source.models:
-        names, u = model.outputs, _matrix(known, model.inputs, len(inputs))
+        names, u = model.outputs, matrix_of(known, model.inputs, len(inputs))
         if set(names) <= set(measured):
-            run, begun = _begun(model, u, _matrix(measured, names, len(inputs)), start, usable)
+            run, begun = _begun(model, u, matrix_of(measured, names, len(inputs)), start, usable)
             first |= dict.fromkeys(names, begun)
         else:
             rest = np.array([levels[name] for name in names])
@@ -157,7 +157,7 @@ def run_measured(
             output = rest if model.structure.several_outputs else float(rest[0])
             run = model.simulate(u, History.at_rest(inputs=held, output=output)).reshape(len(inputs), -1)
         known |= dict(zip(names, run.T, strict=True))
-    computed = _matrix(known, [port.name for port in surrogate.computed], len(inputs))
+    computed = matrix_of(known, [port.name for port in surrogate.computed], len(inputs))
     return MeasuredRun(computed=computed, first=first)
 
 
@@ -215,6 +215,6 @@ def _begun(
     return run.reshape(len(inputs), -1), begun.first
 
 
-def _matrix(columns: Dict[str, NDArray[np.float64]], names: Collection[str], length: int) -> NDArray[np.float64]:
+def matrix_of(columns: Dict[str, NDArray[np.float64]], names: Collection[str], length: int) -> NDArray[np.float64]:
     """Columns by name side by side, shape ``(length, n_names)``."""
     return np.column_stack([columns[name] for name in names]) if names else np.zeros((length, 0))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sysid.errors import ConfigError
 from sysid.models.converting.continuous import rates
 from sysid.models.converting.realisation import Ratios, observer_row
+from sysid.models.linear.innovations import root_of
 
 Array = NDArray[np.float64]
 
@@ -331,18 +332,13 @@ def reduced(system: Any, states: int) -> Reduction:
         else (lambda A, Q: scipy.linalg.solve_continuous_lyapunov(A, -Q))
     )
     A, B, C = _scaled(given.A, given.B, given.C)
-    P, Q = _root(solve(A, B @ B.T)), _root(solve(A.T, C.T @ C))
+    P, Q = root_of(solve(A, B @ B.T)), root_of(solve(A.T, C.T @ C))
     U, sizes, Vt = scipy.linalg.svd(Q.T @ P)
     # Projections of the square-root method: nothing is inverted but the singular values that are kept.
     scale = 1.0 / np.sqrt(sizes[:states])
     left, right = (U[:, :states] * scale).T @ Q.T, P @ Vt[:states].T * scale
     small = control.StateSpace(left @ A @ right, left @ B, C @ right, given.D, given.dt, **_names(given))
     return Reduction(system=small, singular_values=sizes, bound=float(2.0 * sizes[states:].sum()))
-
-
-def _root(gramian: Array) -> Array:
-    sizes, vectors = scipy.linalg.eigh(0.5 * (gramian + gramian.T))
-    return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))
 
 
 def _names(system: Any) -> dict[str, list[str]]:

@@ -14,21 +14,24 @@ from sysid.models import ARX, ARXModel, Cascade, Limit, Mapping, Start
 from sysid.traces import Channel, Role, Trace, TraceSet
 from sysid.workbench.cli import run_cli
 from sysid.workbench.commands.simulate import _of_cases
+from tests.traces.made import trace_of
+
+
+def model(text):
+    return ARXModel(
+        orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.1, 0.9]), intercept=0.0,
+        mapping=Mapping.parse(text), sample_time=0.1, input_units=("V",), output_unit="V", rest_output=0.0,
+    )  # fmt: skip
+
+
+RECORD = trace_of({"u": np.linspace(0.0, 1.0, 50)}, name="EST", sample_time=0.1)
+TRACES = TraceSet(name="t", traces=(RECORD,), roles={"EST": Role.ESTIMATION})
 
 
 @pytest.fixture(scope="module")
 def bundle(tmp_path_factory):
-    def model(text):
-        return ARXModel(
-            orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.1, 0.9]), intercept=0.0,
-            mapping=Mapping.parse(text), sample_time=0.1, input_units=("V",), output_unit="V", rest_output=0.0,
-        )  # fmt: skip
-
     cascade = Cascade(models=(model("u -> a"), model("a -> b")), rest={"a": "u"}, limits={"b": Limit(low=0.5)})
-    channel = (Channel(name="u", unit="V"),)
-    record = Trace(name="EST", sample_time=0.1, channels=channel, values=np.linspace(0.0, 1.0, 50)[:, np.newaxis])
-    traces = TraceSet(name="t", traces=(record,), roles={"EST": Role.ESTIMATION})
-    return export_bundle(cascade, traces, tmp_path_factory.mktemp("c") / "b", formats=[]).folder
+    return export_bundle(cascade, TRACES, tmp_path_factory.mktemp("c") / "b", formats=[]).folder
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
@@ -47,17 +50,8 @@ def test_a_command_is_simulated_written_and_drawn(bundle, tmp_path, capsys, endi
 
 
 def test_each_of_several_outputs_begins_at_a_level_of_its_own(tmp_path, capsys):
-    def model(text):
-        return ARXModel(
-            orders=ARX(na=1, nb=(1,), nk=(0,)), coefficients=np.array([0.1, 0.9]), intercept=0.0,
-            mapping=Mapping.parse(text), sample_time=0.1, input_units=("V",), output_unit="V", rest_output=0.0,
-        )  # fmt: skip
-
     cascade = Cascade(models=(model("u -> T[1]"), model("u -> b")), rest={"T[1]": 0.0, "b": 0.0})
-    channel = (Channel(name="u", unit="V"),)
-    record = Trace(name="EST", sample_time=0.1, channels=channel, values=np.linspace(0.0, 1.0, 50)[:, np.newaxis])
-    traces = TraceSet(name="t", traces=(record,), roles={"EST": Role.ESTIMATION})
-    folder = export_bundle(cascade, traces, tmp_path / "b", formats=[]).folder
+    folder = export_bundle(cascade, TRACES, tmp_path / "b", formats=[]).folder
     (tmp_path / "u.csv").write_text("time [s],u\n" + "".join(f"{k / 10},{k}\n" for k in range(9)))
     words = ["simulate", str(folder), str(tmp_path / "u.csv"), "--units", "u=V", "--out", str(tmp_path / "o.csv")]
     assert run_cli([*words, "--initial", "T[1]=3", "--initial", "b=-1"]) == 0

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sysid.equations.system import written_name
+from sysid.equations.system import as_term, written_name
 from sysid.estimation.friction.found import Beside, Friction
 from sysid.models import Mapping, VectorGreyBox
 from sysid.models.blocks.curves import Text
@@ -92,7 +92,7 @@ class _Written:
     def _lines(self) -> Iterator[str]:
         own, found = self._own, self.found
         for j, name in enumerate(map(written_name, self.mapping.inputs)):
-            yield f"{own(f'u_{j}')} = ({name} - {_n(found.begins[j])})/{_n(found.reach[j])}"
+            yield f"{own(f'u_{j}')} = ({name} - {as_term(found.begins[j])})/{as_term(found.reach[j])}"
         pushes = " + ".join(f"{own(f'push_{j}')}*{own(f'u_{j}')}" for j in range(len(found.begins)))
         yield f"{own('push')} = {pushes} + {own('bias')}"
         names = ["speed", "place", "drive", *(f"sum_{n}" for n in range(len(self._sums)))]
@@ -102,7 +102,7 @@ class _Written:
             yield from self._step(now, after, k)
             now = after
         places = list(map(written_name, self.mapping.outputs))
-        yield f"{places[found.output]} = {_n(found.rest[found.output])} + {_n(found.span)}*{now['place']}"
+        yield f"{places[found.output]} = {as_term(found.rest[found.output])} + {as_term(found.span)}*{now['place']}"
         yield from self._beside(now, places)
         for name in names:
             if name != "drive" or self.lags:
@@ -113,7 +113,7 @@ class _Written:
         for n, one in enumerate(self.found.beside):
             value = f"{self._own(f'shows_{n}')}*{now['speed']}" if not one.by_inputs else now[f"sum_{sums}"]
             sums += bool(one.by_inputs)
-            yield f"{places[one.output]} = {_n(self.found.rest[one.output])} + {_n(one.size)}*{value}"
+            yield f"{places[one.output]} = {as_term(self.found.rest[one.output])} + {as_term(one.size)}*{value}"
 
     def _step(self, now: dict[str, str], after: dict[str, str], k: int) -> Iterator[str]:
         own, found = self._own, self.found
@@ -133,18 +133,12 @@ class _Written:
             held = own(f"held_{k}")
         yield f"{own(f'free_{k}')} = deadzone({now['speed']} + ({force})/{STEPS}, -{held}/{STEPS}, {held}/{STEPS})"
         step, rest = found.fastest / found.span / STEPS, found.rest[found.output]
-        place = f"{now['place']} + {_n(step)}*{own(f'free_{k}')}"
+        place = f"{now['place']} + {as_term(step)}*{own(f'free_{k}')}"
         for end, kept in zip(found.ends, ("max", "min"), strict=True):
-            place = place if end is None else f"{kept}({place}, {_n((end - rest) / found.span)})"
+            place = place if end is None else f"{kept}({place}, {as_term((end - rest) / found.span)})"
         yield f"{after['place']} = {place}"
-        yield f"{after['speed']} = ({after['place']} - {now['place']})/{_n(step)}"
+        yield f"{after['speed']} = ({after['place']} - {now['place']})/{as_term(step)}"
         for n in range(len(self._sums)):
             brought = " + ".join(f"{own(f'in_{n}_{j}')}*{own(f'u_{j}')}" for j in range(len(found.begins)))
             brought += f" + {own(f'follow_{n}')}*{after['speed']}"
             yield f"{after[f'sum_{n}']} = {now[f'sum_{n}']} + ({brought})/{STEPS}"
-
-
-def _n(value: float) -> str:
-    """A number, in brackets where it has a sign."""
-    text = f"{value:.13g}"
-    return f"({text})" if text.startswith("-") else text

@@ -58,13 +58,20 @@ def left_out(records: Sequence[Beginning], unknown: int, dead: int) -> list[int]
     """
     rests = [at_rest(record, dead) for record in records]
     lost = [max(unknown - rest, 0) for rest in rests]
-    moves = np.any([_moves(inputs) for inputs, _, _ in records], axis=0)
-    shown = np.any([_moves(one[0][max(n - dead - 1, 0) :]) for one, n in zip(records, lost, strict=True)], axis=0)
+    moves = np.any([moving(inputs) for inputs, _, _ in records], axis=0)
+    shown = np.any([moving(one[0][max(n - dead - 1, 0) :]) for one, n in zip(records, lost, strict=True)], axis=0)
     if not (moves & ~shown).any():
         return lost
     return [0 if rest else n for rest, n in zip(rests, lost, strict=True)]
 
 
-def _moves(inputs: Array) -> NDArray[np.bool_]:
-    """Which inputs move, of however few samples."""
+def moving(inputs: Array) -> NDArray[np.bool_]:
+    """Which inputs move.
+
+    Args:
+        inputs: Shape ``(n_samples, n_inputs)``, of however few samples.
+
+    Returns:
+        Shape ``(n_inputs,)``.
+    """
     return np.asarray((inputs != inputs[:1]).any(axis=0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from sysid.equations.system import written_name
+from sysid.equations.system import as_term, written_name
 from sysid.estimation.loops.loop import Found, Loop, Scaled
 from sysid.kernels.loop import DEAD_ZONE, RELAY, TINY, WAITS
 from sysid.models import Mapping, VectorGreyBox
@@ -87,7 +87,7 @@ class _Written:
     def _lines(self) -> Iterator[str]:
         own, scaled = self._own, self.scaled
         for j, name in enumerate(self.mapping.inputs):
-            yield f"{own(f'u{j}')} = ({written_name(name)} - {_n(scaled.begin[j])})/{_n(scaled.reach[j])}"
+            yield f"{own(f'u{j}')} = ({written_name(name)} - {as_term(scaled.begin[j])})/{as_term(scaled.reach[j])}"
         inputs = [own(f"u{j}") for j in self._m]
         for i in self._modes:
             yield f"{own(f'drive{i}')} = {_sum([own(f'drives{i}_{j}') for j in self._m], inputs)}"
@@ -105,7 +105,7 @@ class _Written:
         for k, name in enumerate(self.mapping.outputs):
             read = _sum([own(f"reads{k}_{i}") for i in self._n], now)
             shares = f"{read} + {own(f'reads{k}_{self.loop.states}')}"
-            yield f"{written_name(name)} = {_n(scaled.rest[k])} + {_n(scaled.span[k])}*({shares})"
+            yield f"{written_name(name)} = {as_term(scaled.rest[k])} + {as_term(scaled.span[k])}*({shares})"
         for i in self._n:
             yield f"{own(f'x{i}')}[k+1] = {now[i]}"
         if self.loop.kind == RELAY:
@@ -161,9 +161,3 @@ class _Written:
 
 def _sum(factors: Sequence[str], terms: Sequence[str]) -> str:
     return " + ".join(f"{factor}*{term}" for factor, term in zip(factors, terms, strict=True))
-
-
-def _n(value: float) -> str:
-    """A number, in brackets where it has a sign."""
-    text = f"{value:.13g}"
-    return f"({text})" if text.startswith("-") else text

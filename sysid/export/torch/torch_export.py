@@ -12,12 +12,10 @@ import zipfile
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sysid.export.archive import write_archive
-from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Run, Runner, given, step_by_step
+from sysid.export.exporter import AbstractExporter, ExportedFile, Kind, Runner, step_by_step
 from sysid.export.surrogate import Surrogate
+from sysid.export.torch.torchscript import run_of
 
 LARGEST_BATCH = 1 << 20
 """Cars in one call: the format wants to know."""
@@ -55,14 +53,7 @@ class TorchExportExporter(AbstractExporter):
 
         module = torch.export.load(folder / file.name).module()
 
-        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
-            with torch.inference_mode():
-                output, state_out, flags = module(
-                    torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(given(state)))
-                )
-            return Run(output=output.numpy(), state=state_out.numpy(), flags=flags.numpy()[..., 0])
-
-        return step_by_step(run)
+        return step_by_step(run_of(module))
 
 
 def _reproducible(archive: bytes) -> dict[str, bytes]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,14 +77,29 @@ class TorchScriptExporter(AbstractExporter):
         with _deprecation_known():
             module = torch.jit.load(folder / file.name, map_location="cpu")  # type: ignore[no-untyped-call]  # torch.jit has no types
 
-        def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
-            with torch.inference_mode():
-                output, state_out, flags = module(
-                    torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(given(state)))
-                )
-            return Run(output=output.numpy(), state=state_out.numpy(), flags=flags.numpy()[..., 0])
-
+        run = run_of(module)
         return run if file.kind is Kind.SEQUENCE else step_by_step(run)
+
+
+def run_of(module: Callable[[Any, Any], Any]) -> Runner:
+    """A loaded module as what a bundle's files are run by.
+
+    Args:
+        module: From inputs and state to output, next state and flags.
+
+    Returns:
+        The same of arrays.
+    """
+    import torch
+
+    def run(inputs: NDArray[Any], state: NDArray[Any] | None) -> Run:
+        with torch.inference_mode():
+            output, state_out, flags = module(
+                torch.from_numpy(np.ascontiguousarray(inputs)), torch.from_numpy(np.ascontiguousarray(given(state)))
+            )
+        return Run(output=output.numpy(), state=state_out.numpy(), flags=flags.numpy()[..., 0])
+
+    return run
 
 
 def reproducible_archive(archive: bytes) -> bytes:

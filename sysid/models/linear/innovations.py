@@ -249,8 +249,8 @@ class Innovations:
         """Coordinates in which a stable matrix with these drives and the outputs is balanced, and back; or none."""
         none = np.eye(self.n_state)
         try:
-            P = _root(_gramian(A, drive @ drive.T))
-            Q = _root(_gramian(A.T, self.C.T @ self.C))
+            P = root_of(_gramian(A, drive @ drive.T))
+            Q = root_of(_gramian(A.T, self.C.T @ self.C))
             U, sizes, Vt = scipy.linalg.svd(Q.T @ P)
             if not sizes[-1] > 1e-12 * sizes[0]:
                 return none, none
@@ -289,7 +289,7 @@ def _gramian(A: Array, Q: Array) -> Array:
     return P
 
 
-def _root(gramian: Array) -> Array:
+def root_of(gramian: Array) -> Array:
     """A factor ``G`` with ``G G' `` the Gramian, whose small eigenvalues rounding may have made negative."""
     sizes, vectors = scipy.linalg.eigh(0.5 * (gramian + gramian.T))
     return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))

@@ -30,8 +30,8 @@ from sysid.estimation.linear.polynomial.starts import long_models, looked_at, of
 from sysid.estimation.linear.segments import Segment, scaling_of, segments_of, torn
 from sysid.estimation.linear.state_space.colour import coloured
 from sysid.estimation.linear.state_space.provider import PredictionErrors
-from sysid.estimation.linear.state_space.refinement import flat_prior
 from sysid.estimation.linear.stretches import stretches, told_of
+from sysid.estimation.linear.transfer_function.runs import flat_prior
 from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.results.result import FitResult, Loop, Status
 from sysid.estimation.results.uncertainty import Uncertainty

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid.estimation.linear.begun_at_rest import at_rest
+from sysid.estimation.linear.begun_at_rest import at_rest, moving
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import Scaling
 from sysid.models.process.process_run import ProcessRun, parted, run
@@ -255,10 +255,10 @@ class Problem:
         k, part = parted(late, self.sample_time)
         most = k + (part > 0.0)
         lost = [min(most, len(one.target) - 1) * (one.free and not one.rests) for one in self.records]
-        moves = np.any([_moves(one.inputs) for one in self.records], axis=0)
+        moves = np.any([moving(one.inputs) for one in self.records], axis=0)
         rows = zip(self.records, lost, strict=True)
         shown = np.any(
-            [_moves(one.inputs[max(n - most, 0) : max(len(one.inputs) - most, 1)]) for one, n in rows], axis=0
+            [moving(one.inputs[max(n - most, 0) : max(len(one.inputs) - most, 1)]) for one, n in rows], axis=0
         )
         if (moves & ~shown).any():
             lost = [0] * len(lost)
@@ -339,8 +339,3 @@ class Problem:
             errors.append((y - record.target[record.first :]) * roots)
             slopes.append(J * roots[:, np.newaxis])
         return np.concatenate(errors), np.concatenate(slopes)
-
-
-def _moves(inputs: Array) -> Flags:
-    """Which inputs move."""
-    return np.asarray((inputs != inputs[:1]).any(axis=0))

@@ -16,7 +16,6 @@ from scipy import linalg
 
 from sysid.errors import FitDivergedError
 from sysid.estimation.clock import now
-from sysid.estimation.least_squares.evidence import Group, Prior
 from sysid.estimation.least_squares.levenberg_marquardt import LevenbergMarquardt
 from sysid.estimation.least_squares.provider import Linearisation
 from sysid.estimation.least_squares.state import Iteration
@@ -30,6 +29,7 @@ from sysid.estimation.linear.subspace.projections import Weighting
 from sysid.estimation.linear.subspace.starts import ENOUGH, Subspace
 from sysid.estimation.linear.subspace.system import EDGE, stabilised
 from sysid.estimation.linear.subspace.yardstick import beyond_chance
+from sysid.estimation.linear.transfer_function.runs import flat_prior
 from sysid.estimation.results.result import Status
 from sysid.models import LinearStateSpace
 from sysid.models.linear.innovations import Innovations
@@ -346,16 +346,3 @@ def _with_state(system: Innovations, pole: float) -> Innovations:
         C=np.hstack([system.C, np.full((p, 1), LITTLE)]),
         K=np.vstack([system.K, np.zeros((1, p))]) if n else np.zeros((1, p)),
     )
-
-
-def flat_prior(n: int) -> Prior:
-    """No prior: the loss alone counts.
-
-    Args:
-        n: Number of parameters.
-
-    Returns:
-        The prior.
-    """
-    everything = Group(name="all", members=np.arange(n))
-    return Prior(centre=np.zeros(n), groups=(everything,), alphas=np.zeros(1), beta=1.0)
