@@ -11,13 +11,15 @@ Limits: all inputs share the poles; converges to a good start rather than to a m
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
 from sysid.estimation.linear.poles import sections_of, stabilised
-from sysid.models.converting.orthonormal_basis import Domain, basis_of, responses
-from sysid.models.converting.realisation import Realisation, realise
+from sysid.models.converting.orthonormal_basis import BasisSection, Domain, basis_of, powers_of, responses
+from sysid.models.converting.realisation import realise
 
 MAX_ITERATIONS = 20
 """As in the estimators of the field (MATLAB's ``tfest``)."""
@@ -55,8 +57,8 @@ def sk_poles(
     poles = start
     for _ in range(iterations):
         sections = sections_of(stabilised(poles, domain), domain)
-        system = realise(basis_of(sections, len(start) - 1, domain), domain)
-        states = _state_responses(system, variable, domain)
+        basis = basis_of(sections, len(start) - 1, domain)
+        system, states = realise(basis, domain), _state_responses(basis, variable, domain)
         blocks = [-states * output[:, np.newaxis]]
         for j, zeros in enumerate(n_zeros):
             blocks.append(responses(basis_of(sections, zeros, domain), variable) * inputs[:, j : j + 1])
@@ -74,16 +76,24 @@ def sk_poles(
     return stabilised(found, domain) if stable else found
 
 
-def _state_responses(system: Realisation, variable: NDArray[np.complex128], domain: Domain) -> NDArray[np.complex128]:
+def _state_responses(
+    basis: Sequence[BasisSection], variable: NDArray[np.complex128], domain: Domain
+) -> NDArray[np.complex128]:
     """The state of a basis as functions of frequency: all strictly proper functions with its poles.
 
-    The variable is ``1/z`` or ``s``; shape ``(n_points, n_poles)``.
+    Section by section, as :func:`~sysid.models.converting.realisation.realise` has their states. The variable is
+    ``1/z`` or ``s``; shape ``(n_points, n_poles)``.
     """
-    n = len(system.A)
-    if domain is Domain.DISCRETE:
-        matrices = np.eye(n) - variable[:, np.newaxis, np.newaxis] * system.A
-        drive = variable[:, np.newaxis] * system.B
-    else:
-        matrices = variable[:, np.newaxis, np.newaxis] * np.eye(n) - system.A
-        drive = np.broadcast_to(system.B.astype(np.complex128), (len(variable), n))
-    return np.asarray(np.linalg.solve(matrices, drive[:, :, np.newaxis])[:, :, 0])
+    columns, x = [], np.ones(len(variable), dtype=np.complex128)
+    for section in basis:
+        powers = powers_of(variable, section.order)
+        all_pole = (x / (powers @ section.denominator))[:, np.newaxis]
+        if domain is Domain.DISCRETE:
+            columns.append(powers[:, 1:] * all_pole)
+        elif section.order == 1:
+            columns.append(all_pole)
+        else:
+            natural = float(np.sqrt(abs(section.denominator[0]))) or 1.0
+            columns.append(np.column_stack([powers[:, 1], np.full(len(variable), natural)]) * all_pole)
+        x = (powers @ section.onward) * all_pole[:, 0]
+    return np.concatenate(columns, axis=1)

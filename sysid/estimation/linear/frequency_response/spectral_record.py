@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.estimation.linear.records import AbstractRecord, Bases, tap_slices
-from sysid.models.converting.orthonormal_basis import BasisSection, Domain, responses
+from sysid.models.converting.orthonormal_basis import BasisSection, Domain, powers_of, responses
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +45,7 @@ class SpectralRecord(AbstractRecord):
             y = columns[:, at] @ weights[at]
             complex_y = y[:n] + 1j * y[n:]
             for section in basis:
-                powers = self.variable[:, np.newaxis] ** np.arange(section.order + 1)
+                powers = powers_of(self.variable, section.order)
                 v = -complex_y / (powers @ section.denominator)
                 discrete = self.domain is Domain.DISCRETE
                 chosen = range(1, section.order + 1) if discrete else range(section.order - 1, -1, -1)
