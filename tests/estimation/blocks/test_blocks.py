@@ -124,9 +124,12 @@ def named(structure: str, given: str, comes: str) -> sysid.Fit:
 
 
 @pytest.mark.parametrize(
-    ("given", "comes"), [("t", "max"), ('u "1"', "pi"), ("f_in", "and"), ("c1", "inside"), ("k", "x = 1")]
-)
-@pytest.mark.parametrize("structure", NAMED)
+    ("structure", "given", "comes"),
+    [
+        ("blocks", "t", "max"), ("polynomial", "t", "max"), ("blocks", 'u "1"', "pi"), ("polynomial", "f_in", "and"),
+        ("polynomial", "c1", "inside"), ("blocks", "k", "x = 1"),
+    ],
+)  # fmt: skip
 def test_channels_may_be_called_as_words_of_equations_are(structure: str, given: str, comes: str) -> None:
     found, plain, u = named(structure, given, comes), named(structure, "u", "y"), steps(0)
     np.testing.assert_array_equal(found.model.simulate(u[:, None]), plain.model.simulate(u[:, None]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -41,18 +42,25 @@ def fitted(columns: dict[str, Any], mapping: str, structure: Any) -> Any:
     return sysid.fit(sysid.data(columns, sample_time=0.1), mapping, structure)
 
 
+@cache
+def alone_of(kind: str) -> Any:
+    """A fit without the other input, and its step response."""
+    alone = fitted({"u": U, "y": Y}, "u -> y", ONE[kind])
+    return alone, alone.step()
+
+
 @pytest.mark.parametrize("kind", ONE)
 @pytest.mark.parametrize("how", OPEN)
 def test_an_input_that_says_nothing_has_no_effect_and_no_interval(kind: str, how: str) -> None:
     """The others' are those of a fit without it: of a state space it had a gain of 523."""
-    alone = fitted({"u": U, "y": Y}, "u -> y", ONE[kind])
+    alone, own = alone_of(kind)
     both = fitted({"u": U, "v": OPEN[how], "y": Y}, "u+v -> y", TWO[kind])
     moved = both.simulate(np.column_stack([U, RNG.standard_normal(400)]))
     assert_allclose(moved, alone.simulate(U), atol=1e-9)
     known = dict(zip(both.uncertainty.names, both.uncertainty.standard_deviations, strict=True))
     assert all(np.isnan(spread) for name, spread in known.items() if "(v, " in name)
     assert any("v " in note for note in both.notes)
-    found, own = both.step(), alone.step()
+    found = both.step()
     n = min(len(found.time), len(own.time))
     assert_allclose(found.low[:n, 0], own.low[:n, 0], rtol=1e-6, atol=1e-9)
     assert not found.values[:, 1].any() and np.isnan(found.low[:, 1]).all() and np.isnan(found.gain_low[1])

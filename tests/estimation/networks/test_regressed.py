@@ -144,7 +144,6 @@ def test_samples_are_made_for_random_starts_alone_and_let_go_when_no_start_has_t
     held: list[int] = []
 
     def watch(_: FitProgress) -> None:
-        gc.collect()
         held.append(sum(one() is not None for one in made))
 
     u = levels(400)

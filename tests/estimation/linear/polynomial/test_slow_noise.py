@@ -31,9 +31,9 @@ def free_run_fit(structure: AbstractPolynomial, u: np.ndarray, y: np.ndarray) ->
     return case.free_run.nrmse_fit, fit.model.pole_radius
 
 
-@pytest.mark.parametrize("seed", [0, 2])
-@pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("kind", "plant", "seed"), [("BJ", "a sum", 2), ("BJ", "slow", 0), ("ARMAX", "a sum", 0), ("ARMAX", "slow", 2)]
+)
 def test_with_noise_the_free_run_is_as_good_as_the_output_error(kind: str, plant: str, seed: int) -> None:
     """BJ was at -554 % of the sum with seed 2, and at -559 % of the slow plant with seed 1."""
     u, y = record(PLANTS[plant], seed)
