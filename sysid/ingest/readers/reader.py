@@ -18,6 +18,10 @@ from sysid.ingest.tables.table import RawTable
 
 _IS_TABLE = re.compile(rb"(?m)^[ \t|]*[-+]?[0-9][-+0-9.,eE]*[ \t;,|]+[-+]?[0-9][-+0-9.,eE]*[ \t;,|\r\n]")
 """A line that begins with two numbers."""
+_NAMES_ITS_VALUES = re.compile(
+    rb"(?m)^[^\n]*?\b(?P<name>[A-Za-z]\w*)\s?[:=]\s?[-+]?[.\d][^\n]*\n(?:[^\n]*\n){0,3}?[^\n]*?\b(?P=name)\s?[:=]\s?[-+]?[.\d]"
+)
+"""Lines of which two have a number behind the same name."""
 _FAR = 1 << 18
 """Bytes among which such a line is looked for: instruments write all of their settings above it."""
 
@@ -92,9 +96,8 @@ def choose_reader(path: Path, readers: Sequence[Reader], name: str | None = None
     if by_content is None and (by_suffix is None or by_suffix.is_mine is not None):
         if by_suffix is not None:
             _check_no_markup(head, by_suffix, path)
-        if _IS_TABLE.search(
-            _as_ascii(_head(path, _FAR))
-        ):  # programs give tables of text any name: "a.xls", "a.mat" of save -ascii
+        # Programs give tables of text any name: "a.xls", "a.mat" of save -ascii.
+        if _IS_TABLE.search(_as_ascii(_head(path, _FAR))) or _NAMES_ITS_VALUES.search(_as_ascii(head)):
             by_content = next((reader for reader in readers if reader.name == "csv"), None)
     if by_content is not None or by_suffix is not None:
         return by_content or by_suffix  # type: ignore[return-value]  # one of them is there

@@ -18,10 +18,12 @@ from sysid.ingest.cells.calendar import Calendar
 from sysid.ingest.cells.headers import Header, parse_headers, split_reference
 from sysid.ingest.cells.words import WordCollector, states_for
 from sysid.ingest.readers.csv.above import NO_UNITS
+from sysid.ingest.readers.csv.bad_cells import not_a_number
 from sysid.ingest.readers.csv.beside import records_beside
 from sysid.ingest.readers.csv.body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
 from sysid.ingest.readers.csv.cells import Kind, unit_text
 from sysid.ingest.readers.csv.layout import Layout, recognise
+from sysid.ingest.readers.csv.rewritten import in_a_table
 from sysid.ingest.readers.csv.sideways import sideways
 from sysid.ingest.readers.reader import Reader
 from sysid.ingest.readers.sheets import SheetText
@@ -52,7 +54,10 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
     problem: Exception = ValueError("it has no encoding")
     for encoding in tries:
         try:
-            table = table_of_text(TextFile(path=path, encoding=encoding), options, repairs)
+            text = in_a_table(TextFile(path=path, encoding=encoding))
+            table = table_of_text(text, options, repairs)
+            if isinstance(text, SheetText):
+                return replace(table, notes=(*text.notes, *table.notes))
             meant = meant_encoding(table.names) if encoding == "cp1252" and options.encoding is None else None
             if meant is None:
                 return table
@@ -366,7 +371,7 @@ def _numbers(header: Header, column: Numbers | Counts, layout: Layout, path: Pat
     problem = None
     if column.strange:
         cell, line = next(iter(column.strange.items()))
-        problem = _not_a_number(cell, header, line=line, layout=layout, path=path)
+        problem = not_a_number(cell, header, line=line, layout=layout, path=path)
         values = np.full(len(values), np.nan)
     return RawColumn(
         name=header.name,
@@ -377,31 +382,6 @@ def _numbers(header: Header, column: Numbers | Counts, layout: Layout, path: Pat
         strange=tuple(column.strange),
         counted_from=(column.origin or 0) if isinstance(column, Counts) else 0,
     )
-
-
-def _not_a_number(cell: str, header: Header, *, line: int, layout: Layout, path: Path) -> ReaderError:
-    thousands = f" and thousands {layout.numbers.thousands!r}" if layout.numbers.thousands else ""
-    return ReaderError(
-        "a cell is not a number",
-        where=f"{path}, line {line}, column {header.name}",
-        expected=f"a number with decimal {layout.numbers.decimal!r}{thousands}",
-        got=repr(cell),
-        remedy=_remedy(cell.strip()),
-    )
-
-
-def _remedy(cell: str) -> str:
-    if (cell.count(".") > 1 or cell.count(",") > 1) and any(map(str.isdigit, cell)):
-        mark = "." if cell.count(".") > 1 else ","
-        return (
-            f"say what the marks mean: thousands: '{mark}' if they all separate thousands, "
-            f"and decimal: '{mark}' beside it if the last one is the decimal mark"
-        )
-    if ":" in cell or cell.count("-") > 1 or cell.count("/") > 1:
-        return "if this is calendar time, write time: {column: ..., unit: datetime}"
-    if any(letter.isdigit() for letter in cell):
-        return "correct the cell, or name the decimal mark (decimal: ',')"
-    return f"if it stands for a missing value, write missing: ['{cell}']; if for a state, states: {{'{cell}': 0}}"
 
 
 def _metadata(layout: Layout) -> list[tuple[str, str]]:
