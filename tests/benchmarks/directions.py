@@ -28,9 +28,10 @@ from scipy import signal
 import sysid
 from sysid.estimation import StabilityOptions, Training
 from sysid.models import Mapping, NeuralStateSpace, Start, StartKind
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
 from tests.benchmarks._findings import found
 from tests.benchmarks._public import checked
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 NEURONS, ITERATIONS = 8, 200
@@ -44,8 +45,7 @@ Array = NDArray[np.float64]
 
 
 def trace(name: str, u: Array, y: Array) -> Trace:
-    channels = (Channel(name="u", unit="1"), Channel(name="y", unit="1"))
-    return Trace(name=name, sample_time=0.02, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, name=name, sample_time=0.02, units="1")
 
 
 def measured(samples: int) -> Start:

@@ -25,11 +25,13 @@ import numpy as np
 from sysid.errors import TraceError
 from sysid.estimation import Training
 from sysid.estimation.grey_box.fit import fit_grey_box
-from sysid.models import GreyBox, GreyBoxModel, Mapping, Scaling, Start, StartKind
-from sysid.traces import Channel, Trace
+from sysid.models import GreyBox, Start, StartKind
+from sysid.traces import Trace
 from tests.benchmarks._findings import found
+from tests.benchmarks.grey_boxes import MAPPING, model_of
+from tests.traces.made import trace_of
 
-MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
+ESTIMATED = Start(kind=StartKind.ESTIMATED)
 SAMPLES, NOISE, FOUND = 400, 0.015, 1.1
 
 
@@ -113,30 +115,14 @@ SYSTEMS = {
 def record(system: System, rng: np.random.Generator) -> tuple[Trace, float, dict[str, float]]:
     """The system at its true parameters, the mean square of its noise, and what its states range over."""
     u = np.repeat(rng.uniform(*system.inputs, SAMPLES // system.held + 1), system.held)[:SAMPLES]
-    model = GreyBoxModel(
-        grey=system.grey(system.true, system.begin),
-        theta=np.array(list(system.true.values())),
-        norms=(),
-        levels=(0.0,) * len(system.begin),
-        spans=(1.0,) * len(system.begin),
-        substeps=50,
-        scaling=Scaling.identity(1),
-        mapping=MAPPING,
-        sample_time=system.sample_time,
-        input_units=("V",),
-        output_unit="V",
-        rest_output=0.0,
-    )
+    model = model_of(system.grey(system.true, system.begin), system.true, system.sample_time)
     form = model.recursion
     begun = np.array([system.begin[name] for name in form.lowered.states])
     path = np.empty((SAMPLES, len(begun)))
     y = form.run(form.given(u[:, None], u[:1, None]), begun, path)[:, 0]
     spans = dict(zip(form.lowered.states, np.ptp(path, axis=0), strict=True))
     noise = NOISE * np.ptp(y) * rng.standard_normal(SAMPLES)
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    data = Trace(
-        name="record", sample_time=system.sample_time, channels=channels, values=np.column_stack([u, y + noise])
-    )
+    data = trace_of({"u": u, "y": y + noise}, sample_time=system.sample_time)
     return data, float(np.mean(noise**2)), spans
 
 

@@ -33,9 +33,10 @@ from sysid.errors import TraceError
 from sysid.estimation import FitResult, Training
 from sysid.estimation.grey_box.fit import fit_grey_box
 from sysid.models import GreyBox, GreyBoxModel, History, Mapping, Scaling, Start, StartKind, beginning
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
 from tests.benchmarks._findings import found
 from tests.benchmarks._public import checked
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
@@ -91,27 +92,23 @@ SYSTEMS = {
 
 
 def trace(u: np.ndarray, y: np.ndarray, sample_time: float, name: str = "record") -> Trace:
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    return Trace(name=name, sample_time=sample_time, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, name=name, sample_time=sample_time)
+
+
+def model_of(grey: GreyBox, true: dict[str, float], sample_time: float) -> GreyBoxModel:
+    """Equations at their true parameters, in the units of their states."""
+    states = len(grey.system.states)
+    return GreyBoxModel(
+        grey=grey, theta=np.array(list(true.values())), norms=(), levels=(0.0,) * states, spans=(1.0,) * states,
+        substeps=50, scaling=Scaling.identity(1), mapping=MAPPING, sample_time=sample_time, input_units=("V",),
+        output_unit="V", rest_output=0.0,
+    )  # fmt: skip
 
 
 def record(system: System, rng: np.random.Generator) -> Trace:
     """The system at its true parameters, from where it begins."""
     u = np.repeat(rng.uniform(*system.inputs, SAMPLES // 20), 20)
-    model = GreyBoxModel(
-        grey=system.grey(system.true),
-        theta=np.array(list(system.true.values())),
-        norms=(),
-        levels=(0.0,) * len(system.begin),
-        spans=(1.0,) * len(system.begin),
-        substeps=50,
-        scaling=Scaling.identity(1),
-        mapping=MAPPING,
-        sample_time=system.sample_time,
-        input_units=("V",),
-        output_unit="V",
-        rest_output=0.0,
-    )
+    model = model_of(system.grey(system.true), system.true, system.sample_time)
     y = model.simulate(u[:, None])
     return trace(u, y + NOISE * np.ptp(y) * rng.standard_normal(SAMPLES), system.sample_time)
 

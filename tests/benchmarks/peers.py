@@ -45,9 +45,10 @@ from sysid.estimation import FitProgress, Training, fit_narx, fit_neural_state_s
 from sysid.ingest import load_dataset
 from sysid.models import NARX, Mapping, NeuralStateSpace
 from sysid.reporting.scores import Score
-from sysid.traces import Channel, Trace
+from sysid.traces import Trace
 from tests.benchmarks._findings import found, read, scored
 from tests.benchmarks._peers_environment import python_with
+from tests.traces.made import trace_of
 
 PINNED = ("jax-sysid==1.1.0", "fastcan==0.6.0", "pyrenn==0.1")
 WORKER = Path(__file__).with_name("_peers_worker.py")
@@ -121,8 +122,7 @@ def tank() -> Problem:
     for t in range(2000):
         y[t] = level + 0.002 * rng.standard_normal()
         level = float(np.clip(level + 0.05 * (1.2 * flow[t] - np.sqrt(level)), 0.0, 0.8))
-    channels = (Channel(name="valve", unit="1"), Channel(name="level", unit="m"))
-    trace = Trace(name="tank", sample_time=0.1, channels=channels, values=np.column_stack([valve, y]))
+    trace = trace_of({"valve": valve, "level": y}, name="tank", sample_time=0.1, units={"valve": "1", "level": "m"})
     return Problem(
         name="tank, 2,000 samples",
         trace=trace,

@@ -22,6 +22,7 @@ from sysid.models import BuiltModel, HammersteinWiener, Mapping, Scaling, Start,
 from sysid.models.blocks.block_oriented import BlockStructure
 from sysid.models.blocks.curves import Curve
 from sysid.traces import Channel, Trace
+from tests.traces.made import trace_of
 
 FIRST, SECOND = ([0.0, 0.05, 0.04], np.poly([0.85 * np.exp(0.2j), 0.85 * np.exp(-0.2j)]).real), ([0.3], [1.0, -0.7])
 BRIEF = Training(starts=1, max_iterations=20, workers=1)
@@ -51,8 +52,7 @@ def steps(rng: np.random.Generator, n: int = 300) -> np.ndarray:
 
 
 def fitted(structure: BlockStructure, u: np.ndarray, y: np.ndarray) -> BuiltModel:
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    trace = Trace(name="record", sample_time=1.0, channels=channels, values=np.column_stack([u, y]))
+    trace = trace_of({"u": u, "y": y})
     model = fit_blocks([trace], Mapping.parse("u -> y"), structure, BRIEF).model
     assert isinstance(model, BuiltModel)
     return model

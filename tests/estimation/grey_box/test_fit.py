@@ -17,14 +17,14 @@ from sysid.traces import Channel, Trace
 from sysid.validation import predict_interval
 from tests.benchmarks.grey_box_starts import SYSTEMS, started
 from tests.benchmarks.grey_box_starts import record as simulated
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 ESTIMATED = Start(kind=StartKind.ESTIMATED)
 
 
 def a_trace(u: np.ndarray, y: np.ndarray, *, sample_time: float = 0.5, name: str = "record") -> Trace:
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    return Trace(name=name, sample_time=sample_time, channels=channels, values=np.column_stack([u, y]))
+    return trace_of({"u": u, "y": y}, name=name, sample_time=sample_time)
 
 
 def steps(n: int, seed: int = 0, *, low: float = 0.0, high: float = 2.0) -> np.ndarray:

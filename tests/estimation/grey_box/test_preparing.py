@@ -9,7 +9,7 @@ from sysid.estimation import Training
 from sysid.estimation.blocks.polynomial_narx import fit_polynomial_narx
 from sysid.models import Mapping, PolynomialNARX, Start, StartKind
 from sysid.models.blocks.built_model import BuiltModel
-from sysid.traces import Channel, Trace
+from tests.traces.made import trace_of
 
 
 def test_pasts_of_one_output_range_alike_whatever_stood_before_the_record() -> None:
@@ -19,8 +19,7 @@ def test_pasts_of_one_output_range_alike_whatever_stood_before_the_record() -> N
     for k in range(240):
         y[k] = level + 0.004 * rng.standard_normal()
         level += 0.1 * (u[k] - np.sqrt(abs(level)))
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m"))
-    trace = Trace(name="tank", sample_time=0.1, channels=channels, values=np.column_stack([u, y]))
+    trace = trace_of({"u": u, "y": y}, name="tank", sample_time=0.1, units={"u": "V", "y": "m"})
     model = fit_polynomial_narx(
         [trace], Mapping.parse("u -> y"), PolynomialNARX(input_delays=2, output_delays=2, degree=2),
         Training(max_iterations=20), start=Start(kind=StartKind.ESTIMATED),

@@ -21,6 +21,7 @@ from sysid.estimation.records.experiment import experiments_of, unit_range
 from sysid.estimation.results.result import FitResult
 from sysid.models import NARX, AbstractStructure, GreyBox, GreyBoxModel, Mapping, NeuralStateSpace, Start, StartKind
 from sysid.traces import Channel, Trace
+from tests.traces.made import trace_of
 
 MAPPING, ESTIMATED = Mapping.parse("u -> y"), Start(kind=StartKind.ESTIMATED)
 SWING = "dx/dt = v; dv/dt = m*(1 - x^2)*v - w*x + b*u; y = x"
@@ -42,10 +43,7 @@ def a_trace(n: int = 240, *, noise: float = 0.05, seed: int = 0, name: str = "re
             b = rates(z + 0.0125 * a, u[t])
             c = rates(z + 0.0125 * b, u[t])
             z = z + 0.025 / 6.0 * (a + 2.0 * b + 2.0 * c + rates(z + 0.025 * c, u[t]))
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="V"))
-    return Trace(
-        name=name, sample_time=0.1, channels=channels, values=np.column_stack([u, y + noise * rng.standard_normal(n)])
-    )
+    return trace_of({"u": u, "y": y + noise * rng.standard_normal(n)}, name=name, sample_time=0.1)
 
 
 def a_box(starts: dict[str, float], **fields: Any) -> GreyBox:

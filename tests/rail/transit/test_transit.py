@@ -30,6 +30,7 @@ from sysid.rail.transit.transit import (
 )
 from sysid.traces import Channel, Trace
 from sysid.units import Reference
+from tests.traces.made import trace_of
 
 STEP = 0.05
 CRUISE_TIME, STOP_TIME = 10.0, 18.0
@@ -128,8 +129,7 @@ def slow_trace(surrogate: AbstractModel) -> Trace:
     for signal in signals:
         vehicle.step(float(signal))
         rates.append(-vehicle.acceleration)
-    channels = (Channel(name="P", unit="mA"), Channel(name="A", unit="m/s^2"))
-    return Trace(name="slow", sample_time=STEP, channels=channels, values=np.column_stack([signals, rates]))
+    return trace_of({"P": signals, "A": rates}, name="slow", sample_time=STEP, units={"P": "mA", "A": "m/s^2"})
 
 
 @pytest.fixture(scope="module")

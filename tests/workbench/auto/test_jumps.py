@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from sysid.models import Mapping
 from sysid.traces import Channel, Trace
 from sysid.workbench.auto.jumps import jumps_of, jumps_told
+from tests.traces.made import trace_of
 
 MAPPING = Mapping.parse("u -> y")
 N = 400
 
 
 def told(u: NDArray[np.float64], y: NDArray[np.float64]) -> list[str]:
-    channels = (Channel(name="u", unit="V"), Channel(name="y", unit="m/s"))
-    trace = Trace(name="r", sample_time=0.01, channels=channels, values=np.column_stack([u, y]))
+    trace = trace_of({"u": u, "y": y}, name="r", sample_time=0.01, units={"u": "V", "y": "m/s"})
     assert bool(jumps_of([trace], MAPPING)) is bool(jumps_told([trace], MAPPING))
     return jumps_told([trace], MAPPING)
 
