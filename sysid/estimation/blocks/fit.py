@@ -315,7 +315,7 @@ def _cheaper(training: Training) -> Training:
 def _begun(found: BuiltModel) -> Begun:
     """What was found as a start."""
     weights = found.theta[len(found.grey.free) :]
-    return Begun(parameters=np.array(list(found.parameters.values())), weights=weights, norms=found.lowered.norms)
+    return Begun(parameters=np.array(list(found.parameters.values())), weights=weights, norms=found.norms)
 
 
 def _grown(
@@ -333,7 +333,7 @@ def _grown(
             return []
         parameters = np.array([values[one] for one in ways.names])
         weights = found.theta[len(found.grey.free) :]
-        begins.append(Begun(parameters=parameters, weights=weights, norms=found.lowered.norms))
+        begins.append(Begun(parameters=parameters, weights=weights, norms=found.norms))
     return begins
 
 

@@ -256,6 +256,7 @@ def _prepared(
         nets=ready.template.lowered.nets,
         provider=ready.provider,
         begun=ready.theta,
+        norms=ready.template.norms,
         begins=tuple(begins),
         scattered=scattered,
     )

@@ -53,6 +53,7 @@ class EquationLayout(AbstractLayout):
         nets: The networks.
         provider: The records.
         begun: What is trained where the fit starts: declared starts, networks that do nothing, and initial states.
+        norms: Levels and scales of what the networks see and give in these fits.
         begins: Where the first starts begin, in place of the declared one.
         scattered: Names of the parameters around which the starts after these are drawn; ``None`` for all.
         declared: Starts at the declared one.
@@ -63,6 +64,7 @@ class EquationLayout(AbstractLayout):
     nets: tuple[Net, ...]
     provider: EquationProvider
     begun: Array
+    norms: tuple[float, ...] = ()
     begins: tuple[Begun, ...] = ()
     scattered: frozenset[str] | None = None
     declared: int = 1
@@ -131,8 +133,7 @@ class EquationLayout(AbstractLayout):
         theta, w = drawn.copy(), self.first_weight
         theta[:w] = given.parameters / self.provider.scale[:w]
         if len(given.weights):
-            norms = self.provider.form.lowered.norms
-            theta[w : w + len(given.weights)] = renormed(self.nets, given.weights, given.norms, norms)
+            theta[w : w + len(given.weights)] = renormed(self.nets, given.weights, given.norms, self.norms)
         theta = self.provider.with_states(theta, self.provider.states(theta, WINDOW))
         centre = theta.copy()
         centre[w : len(self.provider.scale)] = self.begun[w : len(self.provider.scale)]

@@ -108,6 +108,17 @@ def test_a_curve_behind_a_block_may_turn_back() -> None:
     assert error(fit_blocks([a_trace(u, system(u))], MAPPING, structure, brief), system) < 5e-3
 
 
+def test_a_network_begins_as_the_curve_that_was_found_whatever_it_sees_is_scaled_by() -> None:
+    """It began as if nothing were scaled, a thousand times further off, and starts that were right were dropped."""
+    u, one = steps(1), Training(starts=2, max_iterations=1, workers=1)
+
+    def system(u: np.ndarray) -> np.ndarray:
+        return np.abs(block(u))
+
+    fit = fit_blocks([a_trace(u, system(u))], MAPPING, HammersteinWiener(states=2, output="network 6"), one)
+    assert error(fit, system) < 0.2
+
+
 NAMED = {
     "blocks": HammersteinWiener(states=1, input="piecewise 4", output="piecewise 4"),
     "polynomial": PolynomialNARX(),
