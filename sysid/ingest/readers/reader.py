@@ -16,7 +16,7 @@ from sysid.ingest.tables.meaning import with_meaning
 from sysid.ingest.tables.options import FileOptions, RepairOptions
 from sysid.ingest.tables.table import RawTable
 
-_IS_TABLE = re.compile(rb"(?m)^[ \t|]*[-+]?[0-9][-+0-9.,eE]*[ \t;,|]+[-+]?[0-9][-+0-9.,eE]*[ \t;,|\r\n]")
+_IS_TABLE = re.compile(rb"(?m)^[ \t|]*[-+]?\.?[0-9][-+0-9.,eE]*[ \t;,|]+[-+]?\.?[0-9][-+0-9.,eE]*[ \t;,|\r\n]")
 """A line that begins with two numbers."""
 _NAMES_ITS_VALUES = re.compile(
     rb"(?m)^[^\n]*?\b(?P<name>[A-Za-z]\w*)\s?[:=]\s?[-+]?[.\d][^\n]*\n(?:[^\n]*\n){0,3}?[^\n]*?\b(?P=name)\s?[:=]\s?[-+]?[.\d]"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 from sysid.ingest.cells.headers import parse_header
 from sysid.ingest.readers.csv.cells import BLANKS, DATA, Kind, Row, is_units, kind_of, trimmed
@@ -41,6 +42,8 @@ def names_last(above: list[Row], split: Split) -> tuple[list[Row], list[str]]:
     if labelled:
         return labelled, [split.separator.join(row.cells) for row in above]
     above, said = _without_pairs(_unmarked(above, split), split)
+    if (head := _above_what_all_share(above, split)) is not None:
+        return head, said
     if len(above) > 1 and _is_mark(above[-1], split) and _is_full(above[-2], split):
         return above[:-1], said
     for index in range(len(above) - 1, max(len(above) - 1 - _LOOKED, -1), -1):
@@ -53,6 +56,21 @@ def names_last(above: list[Row], split: Split) -> tuple[list[Row], list[str]]:
         if len(trimmed(row.cells, split.width)) != split.width or (index == len(above) - 1 and _is_full(row, split)):
             break
     return above, said
+
+
+def _above_what_all_share(above: list[Row], split: Split) -> list[Row] | None:
+    """Up to the names and their units, where lines about each channel stand below, as amplifiers' programs write them.
+
+    The last of these says the same of all columns, and can be no head.
+    """
+    if not above or split.width < 3 or len(trimmed(above[-1].cells, split.width)) != split.width:
+        return None
+    if len({cell.strip() for cell in above[-1].cells}) > 1:
+        return None
+    for index, (row, below) in enumerate(pairwise(above)):
+        if _is_full(row, split) and len(trimmed(below.cells, split.width)) == split.width and _is_of_units(below):
+            return above[: index + 2]
+    return None
 
 
 def _unmarked(above: list[Row], split: Split) -> list[Row]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sysid.ingest.readers.csv.named import as_table, names_its_values
 from sysid.ingest.readers.csv.nested import depth_of, innermost
+from sysid.ingest.readers.csv.wrapped import count_in_head, unwrapped
 from sysid.ingest.readers.sheets import SheetText
 from sysid.ingest.readers.text_source import TextFile
 
@@ -19,8 +20,15 @@ def in_a_table(file: TextFile) -> TextFile | SheetText:
     """
     head = file.head()[0]
     nested = depth_of(head)
-    if nested is None and not names_its_values(head):
+    counted = count_in_head(head) if nested is None else None
+    if nested is None and counted is None and not names_its_values(head):
         return file
     texts = (text for block in file.blocks() for text in block.data.decode().removesuffix("\n").split("\n"))
-    lines, told = as_table(texts) if nested is None else innermost(texts, *nested)
+    if counted is not None:
+        found = unwrapped(texts, *counted, file.path)
+        if found is None:
+            return file
+        lines, told = found
+    else:
+        lines, told = as_table(texts) if nested is None else innermost(texts, *nested)
     return SheetText(path=file.path, lines=lines, notes=told, encoding=file.encoding)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sysid
-from sysid.errors import UserError
+from sysid.errors import ReaderError, UserError
 from sysid.ingest import inspect_file
 from sysid.ingest.inspecting.undescribed import GuessedWarning
 from sysid.traces import Trace
@@ -74,6 +74,54 @@ def test_settings_are_no_samples(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("a: 1\nb: 2\nc: 3\nd: 4\nseed: 5\nmode: 6\n")
     with pytest.raises(UserError):
         sysid.load(tmp_path / "a.txt")
+
+
+ALONE = np.round(np.random.default_rng(1).normal(size=N - 1), 4)
+WRAPPED = ["\t".join(f"{value:+.4e}" for value in ALONE[at : at + 6]) for at in range(0, N - 1, 6)]
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "step"),
+    [
+        (
+            "a.ascii",
+            "TIMESERIES XX_A__BHZ_R, 29 samples, 40 sps, 2008-01-15T00:00:00.025000, SLIST, FLOAT, Counts",
+            0.025,
+        ),
+        ("a.at2", "RECORD 12\nACCELERATION IN UNITS OF G\nNPTS=     29, DT=   .0050 SEC", 0.005),
+    ],
+)
+def test_one_signal_over_many_lines_is_one_channel(tmp_path: Path, name: str, head: str, step: float) -> None:
+    trace = loaded(tmp_path / name, [head, *WRAPPED])
+    assert trace.sample_time == step
+    np.testing.assert_array_equal(trace["signal"], ALONE)
+
+
+def test_several_such_signals_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ReaderError, match="one below the other"):
+        loaded(
+            tmp_path / "a.ascii", ["SERIES A, 29 samples, 40 sps", *WRAPPED, "SERIES B, 29 samples, 40 sps", *WRAPPED]
+        )
+
+
+def test_a_table_whose_head_has_a_number_stays_one(tmp_path: Path) -> None:
+    trace = loaded(tmp_path / "a.txt", ["N = 90", "t u y", *(f"{k / 10:.1f} {U[k]} {Y[k]}" for k in range(N))])
+    np.testing.assert_array_equal(trace["y"], Y)
+
+
+def test_names_stand_above_what_a_program_of_amplifiers_says_of_each_channel(tmp_path: Path) -> None:
+    """The last of those lines says the same of all."""
+    about = [
+        ["time A", "F1", "F2"],
+        ["s", "N", "N"],
+        ["dt = 20 ms"] * 3,
+        ["CH 0", "CH 1", "CH 2"],
+        ["Sensor: None"] * 3,
+    ]
+    rows = [[f"{0.02 * k:.3f}", f"{U[k]}", f"{Y[k]}"] for k in range(N)]
+    trace = loaded(tmp_path / "a.asc", ["DATAFILE", "CHANNELS: 3", "", *("\t".join(row) for row in [*about, *rows])])
+    assert [(channel.name, channel.unit) for channel in trace.channels] == [("F1", "N"), ("F2", "N")]
+    assert trace.sample_time == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize("mark", [",", "\t", ";"])
