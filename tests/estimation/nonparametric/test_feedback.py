@@ -119,3 +119,21 @@ def test_the_same_stretches_are_asked_once_and_each_input_by_itself(monkeypatch:
     assert len(made) == 4
     assert found(u, y) is one
     assert len(made) == 4
+
+
+@pytest.mark.parametrize("seed", [7, 8, 10])
+def test_two_inputs_that_step_on_one_beat_are_no_loop(seed: int) -> None:
+    """Each moves some 40 times: of a heater with a fan it was said that its temperature acts on both."""
+    rng, n, x, y = np.random.default_rng(seed), 1800, 20.0, list[float]()
+    power = np.repeat(rng.uniform(10.0, 90.0, n // 40 + 1), 40)[:n]
+    fan = np.repeat(rng.choice([0.2, 0.5, 1.0], n // 60 + 1), 60)[:n]
+    for k in range(n):
+        x += 2.0 * (0.02 * power[max(k - 6, 0)] - (0.004 + 0.012 * fan[k]) * (x - 20.0)) / 1.5
+        y.append(x)
+    u, noisy, at = np.column_stack([power, fan]), np.array(y) + 0.15 * rng.standard_normal(n), np.arange(n) // (n // 16)
+    for fold in range(4):  # as a search leaves out one block of four
+        kept = [np.flatnonzero((at >= low) & (at < low + 3)) for low in range(fold - 3, 16, 4)]
+        parts = [Segment(inputs=u[one], output=noisy[one]) for one in kept if len(one)]
+        result = find_feedback(parts)
+        assert isinstance(result, feedback.Feedback)
+        assert not result.found
