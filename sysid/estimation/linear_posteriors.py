@@ -143,7 +143,7 @@ def _polynomial_names(model: TransferFunctionModel) -> list[str]:
         first = 0 if model.polynomials.sample_time is not None else 1
         found += [f"B({name}, {power})" for power in range(len(model.numerator(j)))]
         found += [f"F({name}, {power})" for power in range(first, first + n)]
-    return [*found, "constant"]
+    return [*found, "constant", *(f"Td({model.mapping.inputs[j]})" for j in model.polynomials.late)]
 
 
 def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -31,6 +31,8 @@ class TimeRecord(AbstractRecord):
         sample_time: Seconds; used for continuous bases.
         free_start: Whether the state before the first row is fitted, rather than the equilibrium at ``past``.
         moving: By input, whether it goes straight from sample to sample, for continuous bases; otherwise it is held.
+        late: Of each input the part of a sample by which it is later still, for continuous bases; by default none.
+        before: Of each input that is, its value in the row before the first, shape ``(n_inputs,)``.
     """
 
     inputs: NDArray[np.float64]
@@ -41,6 +43,8 @@ class TimeRecord(AbstractRecord):
     sample_time: float
     free_start: bool
     moving: tuple[bool, ...]
+    late: tuple[float, ...] = ()
+    before: NDArray[np.float64] | None = None
 
     def predictor(self, bases: Bases) -> MirroredPredictor | None:
         """From a fitted initial state alone; see the base class."""
@@ -50,7 +54,7 @@ class TimeRecord(AbstractRecord):
         edge = 1.0 if self.domain is Domain.DISCRETE else 0.0
         if all(growth(section.denominator, self.domain) <= edge for basis in bases for section in basis):
             return None
-        return _predictor(bases, self.domain, self.sample_time, self.moving, len(self.target))
+        return _predictor(bases, tuple(map(self._sampling, range(len(bases)))), len(self.target))
 
     def private(self, bases: Bases) -> int:
         """The initial state, if it is fitted; see the base class."""
@@ -62,13 +66,18 @@ class TimeRecord(AbstractRecord):
         if through is not None:
             found = [through.responses(j, self.inputs[:, j]) for j in range(len(bases))]
             return np.concatenate([*found, through.beginnings()], axis=1)
-        parts = [_pass(basis, self._sampling(j), self.inputs[:, j], self.past[j]) for j, basis in enumerate(bases)]
+        parts = [_pass(basis, self._sampling(j), *self._driven(j)) for j, basis in enumerate(bases)]
         if self.free_start:
             parts.append(_beginnings(bases, self.domain, self.sample_time, len(self.target)))
         return np.concatenate(parts, axis=1)
 
     def _sampling(self, j: int) -> _Sampling:
-        return _Sampling(self.domain, self.sample_time, self.moving[j])
+        return _Sampling(self.domain, self.sample_time, self.moving[j], self.late[j] if self.late else 0.0)
+
+    def _driven(self, j: int) -> tuple[NDArray[np.float64], float, float]:
+        """An input, what it has been for ever before, and the sample before its first."""
+        past = float(self.past[j])
+        return self.inputs[:, j], past, past if self.before is None else float(self.before[j])
 
     def tangents(self, bases: Bases, columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
         """One more pass through each section; see the base class."""
@@ -85,13 +94,12 @@ class TimeRecord(AbstractRecord):
                     y = y + columns[:, at] @ weights[at]
                 parts.append(_discrete_tangents(basis, y, past))
             else:
-                driven = self.inputs[:, j], self.past[j]
-                part = _continuous_tangents(basis, self._sampling(j), driven, weights[own[j]])
+                part = _continuous_tangents(basis, self._sampling(j), self._driven(j), weights[own[j]])
                 if free:
                     at = slice(shared + free[j].start, shared + free[j].stop)
                     pulse = _pulse(self.domain, len(self.target))
                     held = _Sampling(self.domain, self.sample_time)
-                    begun = _continuous_tangents(full(bases, self.domain)[j], held, (pulse, 0.0), weights[at])
+                    begun = _continuous_tangents(full(bases, self.domain)[j], held, (pulse, 0.0, 0.0), weights[at])
                     part = part + begun[-len(self.target) :]
                 parts.append(part)
         return np.concatenate(parts, axis=1)
@@ -103,12 +111,17 @@ class _Sampling(NamedTuple):
     domain: Domain
     sample_time: float
     moving: bool = False
+    late: float = 0.0
+
+    def of(self, system: Realisation) -> Realisation:
+        """The samples of a continuous system."""
+        return system.sampled(self.sample_time, moving=self.moving, late=self.late)
 
 
 def _continuous_tangents(
     basis: tuple[BasisSection, ...],
     how: _Sampling,
-    driven: tuple[NDArray[np.float64], float],
+    driven: tuple[NDArray[np.float64], float, float],
     weights: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """The basis with every section once more behind its output, sampled as one system: driven by samples and a past."""
@@ -130,25 +143,21 @@ def _continuous_tangents(
 
 
 @lru_cache(maxsize=32)
-def _predictor(
-    bases: Bases, domain: Domain, sample_time: float, moving: tuple[bool, ...], n_rows: int
-) -> MirroredPredictor | None:
+def _predictor(bases: Bases, each: tuple[_Sampling, ...], n_rows: int) -> MirroredPredictor | None:
     """The predictor over so many rows, made once for all records that are as long."""
-    systems = _sampled(bases, domain, sample_time, moving)
+    systems = _sampled(bases, each)
     return None if systems is None else MirroredPredictor.of(systems, n_rows)
 
 
 @lru_cache(maxsize=32)
-def _sampled(
-    bases: Bases, domain: Domain, sample_time: float, moving: tuple[bool, ...]
-) -> tuple[Realisation, ...] | None:
+def _sampled(bases: Bases, each: tuple[_Sampling, ...]) -> tuple[Realisation, ...] | None:
     """What each input passes from sample to sample; ``None`` where it cannot be computed with."""
-    systems = tuple(realise(basis, domain) for basis in bases)
-    if domain is Domain.CONTINUOUS:
+    systems = tuple(realise(basis, how.domain) for basis, how in zip(bases, each, strict=True))
+    if each[0].domain is Domain.CONTINUOUS:
         fastest = max((float(np.abs(system.A).max(initial=0.0)) for system in systems), default=0.0)
-        if not fastest * sample_time <= _FASTEST:
+        if not fastest * each[0].sample_time <= _FASTEST:
             return None
-        systems = tuple(system.sampled(sample_time, moving=own) for system, own in zip(systems, moving, strict=True))
+        systems = tuple(how.of(system) for system, how in zip(systems, each, strict=True))
     finite = all(np.isfinite(part).all() for one in systems for part in (one.A, one.B, one.C, one.D))
     return systems if finite else None
 
@@ -164,7 +173,8 @@ def _made_beginnings(bases: Bases, domain: Domain, sample_time: float, n_rows: i
     while True:
         pulse = _pulse(domain, m)
         made = np.concatenate(
-            [_pass(basis, _Sampling(domain, sample_time), pulse, 0.0)[-m:] for basis in full(bases, domain)], axis=1
+            [_pass(basis, _Sampling(domain, sample_time), pulse, 0.0, 0.0)[-m:] for basis in full(bases, domain)],
+            axis=1,
         )
         if m == n_rows or not np.abs(made[-_FIRST // 2 :]).max() >= GONE:
             break
@@ -187,10 +197,12 @@ def _pulse(domain: Domain, n_rows: int) -> NDArray[np.float64]:
     return np.eye(n_rows + (domain is Domain.CONTINUOUS), 1)[:, 0]
 
 
-def _pass(basis: tuple[BasisSection, ...], how: _Sampling, x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+def _pass(
+    basis: tuple[BasisSection, ...], how: _Sampling, x: NDArray[np.float64], past: float, before: float
+) -> NDArray[np.float64]:
     if how.domain is Domain.DISCRETE:
         return _discrete_columns(basis, x, past)
-    return _run_sampled(realise(basis, how.domain), how, x, past)
+    return _run_sampled(realise(basis, how.domain), how, x, past, before)
 
 
 def _bare(section: BasisSection) -> BasisSection:
@@ -203,16 +215,20 @@ _FASTEST = 1e8
 """Rate times sample time above which a trial step has left what can be sampled."""
 
 
-def _run_sampled(system: Realisation, how: _Sampling, x: NDArray[np.float64], past: float) -> NDArray[np.float64]:
+def _run_sampled(
+    system: Realisation, how: _Sampling, x: NDArray[np.float64], past: float, before: float
+) -> NDArray[np.float64]:
     """A continuous system's outputs at the samples; NaN where its rates cannot be computed with."""
     y = np.full((len(x), len(system.C)), np.nan)
     rates = np.abs(system.A) * how.sample_time
     if not np.isfinite(rates).all() or rates.max() > _FASTEST:
         return y
-    system = system.sampled(how.sample_time, moving=how.moving)
+    system = how.of(system)
     if not np.isfinite(system.A).all():
         return y
     state = system.equilibrium(past) if past != 0.0 else np.zeros(len(system.A))
+    if how.late:
+        state[-1] = before
     kernel.state_space(system.A, system.B[:, np.newaxis], system.C, system.D[:, np.newaxis], x[:, np.newaxis], state, y)
     return y
 

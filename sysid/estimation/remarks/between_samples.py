@@ -10,8 +10,9 @@ gains by these as well.
 The other way round, a model may have an input move that is held: :math:`n` coefficients from one lag more on, as behind
 a hold, then leave clearly less than its own run does, and as little as all lags together.
 
-A continuous transfer function has whole samples of dead time. One that ends between samples, as nearly every dead time
-of a plant does, moves its input within a sample: behind a hold, a coefficient more, one lag later, says it exactly.
+A continuous transfer function may be given whole samples of dead time. One that ends between samples, as nearly every
+dead time of a plant does, moves its input within a sample: behind a hold, a coefficient more, one lag later, says it
+exactly.
 """
 
 from __future__ import annotations
@@ -164,13 +165,13 @@ def _said_late(model: AbstractModel, j: int, i: int, fits: tuple[float, float, f
     if zeros < n - 1 and 100.0 - filled < np.sqrt(AS_GOOD) * (100.0 - late):
         return (
             f"{begins} {filled:.1f} % with all zeros that {n} poles may have from {name}: it has fewer zeros than the "
-            f"plant, or the plant's dead time ends between samples. Write zeros: {n - 1}, or fit a ProcessModel, whose "
-            "dead time is a time."
+            f"plant, or the plant's dead time ends between samples. Write zeros: {n - 1}, or delays: auto, which "
+            "finds such a dead time."
         )
     return (
         f"{begins} {late:.1f} % where {name} acts from within a sample on: the plant's dead time is no whole number of "
-        "samples, as this model's is. Fit a ProcessModel, whose dead time is a time, or write domain: discrete and "
-        f"zeros: {n}."
+        "samples, as this model's is. Write delays: auto, which finds one that ends between samples, or give it, as in "
+        "delays: 2.5."
     )
 
 
@@ -192,7 +193,7 @@ def _said(model: AbstractModel, j: int, i: int, lag: int, fits: tuple[float, flo
     name, target = model.mapping.inputs[j], model.mapping.outputs[i]
     other = "its dead time is too long" if lag > 1 else "it acts at once"
     if lag > 1 and _continuous(model):
-        other += ", or no whole number of samples, as a ProcessModel's may be"
+        other += ", or no whole number of samples (delays: auto)"
     return (
         f"{target} answers {name} sooner than this model has it: with a coefficient at lag {lag - 1} a free run of "
         f"these orders has a fit of {fits[1]:.1f} %, and without it one of {fits[0]:.1f} %. Either {name} moves "

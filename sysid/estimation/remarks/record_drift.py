@@ -182,7 +182,8 @@ def _added(model: AbstractModel, trace: Trace, mapping: Mapping) -> Array:
     inputs = trace.columns(mapping.inputs)
     if not isinstance(model, TransferFunctionModel) or abs(model.pole_radius - 1.0) > INTEGRATES:
         return inputs
-    late = [np.concatenate([np.full(k, u[0]), u])[: len(u)] for u, k in zip(inputs.T, model.delays, strict=True)]
+    whole = [round(k) for k in model.delays]
+    late = [np.concatenate([np.full(k, u[0]), u])[: len(u)] for u, k in zip(inputs.T, whole, strict=True)]
     return np.asarray(np.column_stack(late) - np.asarray(model.scaling.input_offset))
 
 

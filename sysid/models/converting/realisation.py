@@ -12,6 +12,27 @@ from numpy.typing import NDArray
 
 from sysid.models.converting.orthonormal_basis import BasisSection, Domain
 
+WHOLE = 1e-9
+"""Part of a sample by which a dead time misses a whole number of them and is one."""
+
+
+def parted(samples: float) -> tuple[int, float]:
+    """A dead time in whole samples, and what is left as a part of one.
+
+    Args:
+        samples: The dead time.
+
+    Returns:
+        Both; the part is 0, or below 1.
+
+    Example:
+        >>> parted(7.0), parted(7.5), parted(7.0 - 1e-12)
+        ((7, 0.0), (7, 0.5), (7, 0.0))
+    """
+    k = int(np.floor(samples + WHOLE))
+    part = float(samples) - k
+    return k, part if part > WHOLE else 0.0
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Realisation:
@@ -29,13 +50,17 @@ class Realisation:
     C: NDArray[np.float64]
     D: NDArray[np.float64]
 
-    def sampled(self, sample_time: float, *, moving: bool = False) -> Realisation:
+    def sampled(self, sample_time: float, *, moving: bool = False, late: float = 0.0) -> Realisation:
         """The same system seen at the samples; for a continuous realisation.
+
+        An input that comes late has two courses within a sample, of its own value and of the one before, which is a
+        state more, the last.
 
         Args:
             sample_time: Seconds.
             moving: Whether its input goes straight from sample to sample; it is held between them otherwise. The
                 state is then what the input of its own sample has not moved yet.
+            late: Part of a sample by which the input comes late, below 1.
 
         Returns:
             A discrete realisation, exact (Van Loan 1978, "Computing integrals involving the matrix exponential").
@@ -45,12 +70,30 @@ class Realisation:
         block[:n, :n], block[:n, n] = self.A * sample_time, self.B * sample_time
         if moving:
             block[n, n + 1] = 1.0
+        if late:
+            return self._late(block, late)
         exponential = scipy.linalg.expm(block)
         A, held = exponential[:n, :n], exponential[:n, n]
         if not moving:
             return Realisation(A=A, B=held, C=self.C, D=self.D)
         ramp = exponential[:n, n + 1]
         return Realisation(A=A, B=held - ramp + A @ ramp, C=self.C, D=self.D + self.C @ ramp)
+
+    def _late(self, block: NDArray[np.float64], late: float) -> Realisation:
+        n, moving = len(self.A), len(block) - len(self.A) - 1
+        before, after = scipy.linalg.expm(block * late), scipy.linalg.expm(block * (1.0 - late))
+        E = after[:n, :n]
+        P, older, newer, ramp = E @ before[:n, :n], E @ before[:n, n], after[:n, n], np.zeros(n)
+        reads = (0.0, 1.0)
+        if moving:
+            own, ramp = E @ before[:n, n + 1], after[:n, n + 1]
+            newer = newer - ramp + (1.0 - late) * older + own
+            older = late * older - own
+            reads = (1.0 - late, late)
+        A, B = np.zeros((n + 1, n + 1)), np.ones(n + 1)
+        A[:n, :n], A[:n, n], B[:n] = P, older, newer + P @ ramp
+        C = np.column_stack([self.C, reads[1] * self.D])
+        return Realisation(A=A, B=B, C=C, D=reads[0] * self.D + self.C @ ramp)
 
     def equilibrium(self, u: float) -> NDArray[np.float64]:
         """The state at which a discrete realisation stays while its input is held.

@@ -9,6 +9,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from sysid.models.converting.realisation import Realisation, parted
+
 APART = 1e-4
 """Step of a difference, in standard deviations, where those are no larger than the coefficients."""
 NOTHING = 1e-14
@@ -33,19 +35,27 @@ class Polynomials:
     numerators: Sequence[NDArray[np.float64]]
     denominators: Sequence[NDArray[np.float64]]
     constant: float
-    delays: Sequence[int]
+    delays: Sequence[float]
     sample_time: float | None
     moving: Sequence[bool]
 
     @property
     def vector(self) -> NDArray[np.float64]:
-        """Input by input the numerator, then the denominator but for its 1; the constant behind them."""
+        """Numerator and denominator but for its 1, input by input; the constant; dead times between samples in s."""
         parts = [
             part
             for B, F in zip(self.numerators, self.denominators, strict=True)
             for part in (B, F[1:] if self.sample_time is None else F[:-1])
         ]
-        return np.concatenate([*parts, [self.constant]])
+        return np.concatenate([*parts, [self.constant], self._late_times()])
+
+    @property
+    def late(self) -> tuple[int, ...]:
+        """Inputs whose dead time ends between samples: it is a number among the others."""
+        return tuple(j for j, delay in enumerate(self.delays) if parted(delay)[1])
+
+    def _late_times(self) -> NDArray[np.float64]:
+        return (self.sample_time or 1.0) * np.array([self.delays[j] for j in self.late])
 
     def at(self, vector: NDArray[np.float64]) -> Polynomials:
         """The same with other numbers.
@@ -62,8 +72,11 @@ class Polynomials:
             free = vector[at + len(B) : at + len(B) + len(F) - 1]
             denominators.append(np.concatenate([[1.0], free] if self.sample_time is None else [free, [1.0]]))
             at += len(B) + len(F) - 1
+        delays = list(self.delays)
+        for j, delay in zip(self.late, vector[at + 1 :].tolist(), strict=True):
+            delays[j] = max(delay / (self.sample_time or 1.0), 0.0)
         return Polynomials(
-            numerators=numerators, denominators=denominators, constant=float(vector[-1]), delays=self.delays,
+            numerators=numerators, denominators=denominators, constant=float(vector[at]), delays=delays,
             sample_time=self.sample_time, moving=self.moving,
         )  # fmt: skip
 
@@ -91,6 +104,7 @@ class Polynomials:
         B, F = self.numerators[j], self.denominators[j]
         if self.sample_time is None:
             return B, F
+        late = parted(self.delays[j])[1]
         # With the sample time as the unit of time and the numerator's size as that of the output: coefficients below
         # 1e-14 would be taken for zeros.
         powers = self.sample_time ** (len(F) - 1.0 - np.arange(len(F)))
@@ -98,10 +112,10 @@ class Polynomials:
         leading = np.trim_zeros(np.where(np.abs(top) > NOTHING * size, top, 0.0), "b")
         if not len(leading):
             return np.zeros(1), np.asarray(scipy.signal.cont2discrete(([1.0], (F * powers)[::-1]), 1.0)[1])
-        num, den, _ = scipy.signal.cont2discrete(
-            (leading[::-1] / size, (F * powers)[::-1]), 1.0, method="foh" if self.moving[j] else "zoh"
-        )
-        return np.atleast_1d(size * np.squeeze(num)), np.asarray(den)
+        A, B, C, D = scipy.signal.tf2ss(leading[::-1] / size, (F * powers)[::-1])
+        plant = Realisation(A=A, B=B[:, 0], C=C, D=D[0]).sampled(1.0, moving=self.moving[j], late=late)
+        num, den = scipy.signal.ss2tf(plant.A, plant.B[:, np.newaxis], plant.C, plant.D[:, np.newaxis])
+        return size * num[0], np.asarray(den)
 
     def _levels(self, first: NDArray[np.float64]) -> NDArray[np.float64]:
         """What each input holds the output at; 0 where it would hold it nowhere."""
@@ -114,7 +128,7 @@ class Polynomials:
     def _run(self, inputs: NDArray[np.float64], begun: NDArray[np.float64] | None) -> NDArray[np.float64]:
         levels = self._levels(inputs[0]) if begun is None else begun
         y = np.full(len(inputs), self.constant)
-        for j, delay in enumerate(self.delays):
+        for j, (delay, _) in enumerate(map(parted, self.delays)):
             b, a = self._discrete(j)
             u = np.concatenate(
                 [np.full(min(delay, len(inputs)), inputs[0, j]), inputs[: max(len(inputs) - delay, 0), j]]

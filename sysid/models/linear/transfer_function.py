@@ -20,13 +20,13 @@ from sysid.models.contract.ratio import Ratio
 from sysid.models.converting import orthonormal_basis as bases
 from sysid.models.converting.continuous import ContinuousStateSpace
 from sysid.models.converting.orthonormal_basis import BasisSection, Domain
-from sysid.models.converting.realisation import Realisation, realise
+from sysid.models.converting.realisation import Realisation, parted, realise
 from sysid.models.converting.to_control import Matrices
 from sysid.models.linear.linear_forms import LinearForms
 from sysid.models.linear.polynomial_moves import Polynomials
 from sysid.models.linear.state_space import StateSpace
 from sysid.models.orders.intersample import HELD, InterSample, intersample_of, marked, moving, to_fields
-from sysid.models.orders.lags import MOST, whole
+from sysid.models.orders.lags import MOST, of_samples, whole
 from sysid.models.orders.ranges import IntRange
 from sysid.models.orders.structure import AbstractStructure
 
@@ -41,9 +41,10 @@ class TransferFunction(AbstractStructure):
     Args:
         poles: Number of poles.
         zeros: Number of zeros, at most that of the poles.
-        delays: Dead time in samples; ``None``, or ``"auto"``, to search for it. A discrete transfer function without
-            dead time reacts to its input at once, and one that is sampled from a plant has a dead time of at least 1:
-            none is found only where that leaves clearly less, and is told.
+        delays: Dead time in samples; ``None``, or ``"auto"``, to search for it. That of a continuous one may end
+            between samples, as in 2.5. A discrete transfer function without dead time reacts to its input at once, and
+            one that is sampled from a plant has a dead time of at least 1: none is found only where that leaves clearly
+            less, and is told.
         domain: ``discrete``: ``B(1/q) / F(1/q)``, where ``zeros`` is the degree of ``B``; or ``continuous``:
             ``B(s) / F(s)``.
         intercept: Fit a constant output beside them.
@@ -60,7 +61,7 @@ class TransferFunction(AbstractStructure):
 
     poles: Annotated[tuple[int, ...], IntRange(low=1, high=8)]
     zeros: Annotated[tuple[int, ...], IntRange(low=0, high=8)]
-    delays: tuple[int, ...] | None = None
+    delays: tuple[float, ...] | None = None
     domain: Domain = Domain.DISCRETE
     intercept: bool = True
     intersample: InterSample | Dict[str, str] = HELD
@@ -80,23 +81,26 @@ class TransferFunction(AbstractStructure):
                 expected="domain: continuous, or no intersample", got=f"domain: {self.domain.value}",
                 remedy="write domain: continuous, or remove intersample",
             )  # fmt: skip
+        late = of_samples if self.domain is Domain.CONTINUOUS else whole
         known = self.delays or (0,) * len(self.poles)
         same = len(self.poles) == len(self.zeros) == len(known)
-        numbers = all(map(whole, (*self.poles, *self.zeros, *known)))
+        numbers = all(map(whole, (*self.poles, *self.zeros))) and all(map(late, known))
         if not numbers or not same or not self.poles or not all(map(_proper, self.poles, self.zeros)):
             raise ConfigError(
                 "not the orders of a transfer function",
                 expected=f"for each input 1 to {MOST_POLES} poles, no more zeros than poles, and a dead time of 0 to "
-                f"{MOST:,} samples, a whole number; or one for all inputs",
+                f"{MOST:,} samples{', a whole number' * (late is whole)}; or one for all inputs",
                 got=f"poles {shortened(list(self.poles))}, zeros {shortened(list(self.zeros))}, "
                 f"delays {shortened(self.delays)}",
                 remedy="write for example poles: [2, 2], zeros: [1, 1], delays: [1, 1]",
             )
+        if self.delays is not None:
+            object.__setattr__(self, "delays", tuple(int(k) if k == int(k) else float(k) for k in known))
 
     @property
     def label(self) -> str:
         """Poles, zeros and dead times; ``?`` where they are to be searched."""
-        rows = [self.poles, self.zeros, ("?",) if self.delays is None else self.delays]
+        rows = [self.poles, self.zeros, ("?",) if self.delays is None else [f"{k:.6g}" for k in self.delays]]
         prefix = "TF" if self.domain is Domain.DISCRETE else f"continuous TF{marked(self.intersample)}"  # type: ignore[arg-type]  # brought into this form
         return f"{prefix} [{'; '.join(' '.join(map(str, row)) for row in rows)}]"
 
@@ -187,8 +191,8 @@ class TransferFunctionModel(LinearForms):
         return sum(self.orders.poles) + sum(self.orders.zeros) + len(self.orders.zeros) + self.orders.intercept
 
     @property
-    def delays(self) -> tuple[int, ...]:
-        """Dead time of each input in samples."""
+    def delays(self) -> tuple[float, ...]:
+        """Dead time of each input in samples; of a continuous one it may end between two."""
         return self.orders.delays or (0,) * len(self.orders.poles)
 
     def basis(self, j: int) -> tuple[BasisSection, ...]:
@@ -322,7 +326,7 @@ class TransferFunctionModel(LinearForms):
         parts = [self._block(j) for j in range(len(self.sections))]
         if not any(taps.any() for taps in self.taps):
             # Nothing drives it, and the records still said how it leaves the state in which it begins.
-            first, n, k = parts[0], len(parts[0].A), self.delays[0]
+            first, n, k = parts[0], len(parts[0].A), int(self.delays[0])
             parts[0] = replace(first, B=np.zeros(n), C=(np.arange(n) >= k).astype(np.float64)[np.newaxis])
         B = np.zeros((sum(len(part.A) for part in parts), len(parts)))
         at = 0
@@ -341,13 +345,14 @@ class TransferFunctionModel(LinearForms):
     def _block(self, j: int) -> Realisation:
         """One input's dead time and basis, with the weighted taps as its output."""
         part = realise(self.basis(j), self.orders.domain)
+        k, late = parted(self.delays[j])
         if self.orders.domain is Domain.CONTINUOUS:
             # Over the sample time, states are of one size with those of a dead time, whatever the unit of time is.
             T = self.sample_time
-            part = part.sampled(T, moving=self.orders.moving(self.mapping.inputs)[j])
             part = replace(part, B=part.B / T, C=T * part.C)
+            part = part.sampled(T, moving=self.orders.moving(self.mapping.inputs)[j], late=late)
         row, direct = self.taps[j] @ part.C, float(self.taps[j] @ part.D)
-        n, k = len(part.A), self.delays[j]
+        n = len(part.A)
         if k == 0:
             return Realisation(A=part.A, B=part.B, C=row[np.newaxis], D=np.array([direct]))
         A, B, C = np.zeros((n + k, n + k)), np.zeros(n + k), np.zeros(n + k)

@@ -35,6 +35,22 @@ def whole(value: object) -> bool:
     return isinstance(value, int | np.integer) and not isinstance(value, bool) and bool(0 <= value <= MOST)
 
 
+def of_samples(value: object) -> bool:
+    """Whether a value can be a dead time in samples that need not be whole.
+
+    Args:
+        value: Anything that stands in a file.
+
+    Returns:
+        Whether it is a number from 0 to :data:`MOST`.
+
+    Example:
+        >>> of_samples(2), of_samples(2.5), of_samples(-0.5), of_samples(float("nan"))
+        (True, True, False, False)
+    """
+    return whole(value) or (isinstance(value, float | np.floating) and bool(0.0 <= value <= MOST))
+
+
 def per_input(given: object) -> tuple[Any, ...]:
     """One order for each input; with a single input it may be written as a number.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as Dict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 
 from sysid.models.channels.history import History
 from sysid.models.channels.scaling import Scaling
-from sysid.models.contract.ratio import Ratio
 from sysid.models.converting import orthonormal_basis as bases
-from sysid.models.converting.continuous import ContinuousStateSpace
 from sysid.models.converting.orthonormal_basis import Domain
-from sysid.models.converting.realisation import Realisation, realise
 from sysid.models.linear.transfer_function import TransferFunction, TransferFunctionModel
-from sysid.models.process.process_run import held, parted, run
+from sysid.models.process.process_run import run
 from sysid.models.process.process_type import DAMPING, DEAD_TIME, GAIN, ProcessType
 from sysid.models.process.structure import ProcessModel, shown
 
@@ -153,19 +150,10 @@ class FittedProcess(TransferFunctionModel):
         """
         return float(self.process.types[j].at(np.array(self.values[j]), DEAD_TIME).real)
 
-    def ratio(self, j: int) -> Ratio:
-        """From one input to the output, in ``s``; its dead time is no whole number of samples."""
-        return replace(super().ratio(j), delay=self.dead_time(j) / self.sample_time)
-
-    def response(self, j: int, frequency: Array) -> NDArray[np.complex128]:
-        """Frequency response of one input, with the dead time as it is; see the base class."""
-        early = self.delays[j] * self.sample_time - self.dead_time(j)
-        return np.asarray(super().response(j, frequency) * np.exp(1j * np.asarray(frequency) * early))
-
-    def continuous(self) -> ContinuousStateSpace:
-        """The system in continuous time, with its dead times as they are; see the base class."""
-        delays = tuple(self.dead_time(j) for j in range(len(self.values)))
-        return replace(super().continuous(), delays=delays)
+    @property
+    def delays(self) -> tuple[float, ...]:
+        """Dead time of each input in samples, as it is."""
+        return tuple(self.dead_time(j) / self.sample_time for j in range(len(self.values)))
 
     def output_moves(
         self,
@@ -186,25 +174,6 @@ class FittedProcess(TransferFunctionModel):
             found.append(slopes)
         found.append(moves_of_level(self.process.types, self.values, len(u), self.sample_time))
         return np.asarray((np.concatenate(found, axis=1) @ factor)[before:])
-
-    def _block(self, j: int) -> Realisation:
-        """One input's dead time and basis, as of a transfer function, but for the part of a sample."""
-        k, part = parted(self.dead_time(j), self.sample_time)
-        if not part:
-            return super()._block(j)
-        basis = realise(self.basis(j), Domain.CONTINUOUS)
-        P, now, before = held(basis.A, basis.B / self.sample_time, self.sample_time, part)
-        row, direct = self.sample_time * self.taps[j] @ basis.C, float(self.taps[j] @ basis.D)
-        n, late = len(P), k + 1
-        A, B, C = np.zeros((n + late, n + late)), np.zeros(n + late), np.zeros(n + late)
-        A[:late, :late], B[0] = np.eye(late, k=-1), 1.0
-        A[late:, late:], A[late:, k] = P, before
-        if k:
-            A[late:, k - 1] = now
-        else:
-            B[late:] = now
-        C[late:], C[k] = row, direct
-        return Realisation(A=A, B=B, C=C[np.newaxis], D=np.zeros(1))
 
     def _written(self) -> dict[str, Any]:
         orders = {key: value for key, value in self.orders.to_dict().items() if key != "kind"}

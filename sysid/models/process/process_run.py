@@ -10,59 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from sysid.kernels import linear as kernel
+from sysid.models.converting.realisation import Realisation, parted
 from sysid.models.process.process_type import DEAD_TIME, STEP, ProcessType
 
 Array = NDArray[np.float64]
-
-WHOLE = 1e-9
-"""Part of a sample by which a dead time misses a whole number of them and is one."""
-
-
-def parted(dead_time: float, sample_time: float) -> tuple[int, float]:
-    """A dead time in whole samples, and what is left as a part of one.
-
-    Args:
-        dead_time: Seconds.
-        sample_time: Seconds.
-
-    Returns:
-        Both; the part is 0, or below 1.
-
-    Example:
-        >>> parted(0.7, 0.1), parted(0.75, 0.1)[0]
-        ((7, 0.0), 7)
-    """
-    samples = dead_time / sample_time
-    k = int(np.floor(samples + WHOLE))
-    part = samples - k
-    return k, part if part > WHOLE else 0.0
-
-
-def held(A: Array, B: Array, sample_time: float, part: float) -> tuple[Array, Array, Array]:
-    """A continuous system from sample to sample, whose input comes a part of a sample late.
-
-    Args:
-        A: Shape ``(n, n)``, per second.
-        B: Shape ``(n,)``.
-        sample_time: Seconds.
-        part: Of a sample.
-
-    Returns:
-        The transition; what the input that arrives within the sample drives; and what the one before it does, shapes
-        ``(n, n)``, ``(n,)`` and ``(n,)``.
-    """
-    n = len(A)
-    block = np.zeros((n + 1, n + 1))
-    block[:n, :n], block[:n, n] = A * sample_time, B * sample_time
-    if not part:
-        whole = scipy.linalg.expm(block)
-        return whole[:n, :n], whole[:n, n], np.zeros(n)
-    before, after = scipy.linalg.expm(block * part), scipy.linalg.expm(block * (1.0 - part))
-    return after[:n, :n] @ before[:n, :n], after[:n, n], after[:n, :n] @ before[:n, n]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,19 +81,21 @@ def run(
             at = slice(n * (1 + copies.index(name)), n * (2 + copies.index(name)))
             wide[at, :n], drive[at], rows[1 + i, at] = dA, dB, C
     dead = float(kind.at(values, DEAD_TIME).real)
-    k, part = parted(dead, sample_time)
-    P, now, before = held(wide, drive, sample_time, part)
-    u = np.column_stack([_late(inputs, past, k), _late(inputs, past, k + 1)])[first:]
-    x = np.zeros(size)
-    x[:n] = _rest(kind, past) if state is None else state
-    reads = np.outer(direct, [0.0, 1.0] if part else [1.0, 0.0])
+    k, part = parted(dead / sample_time)
+    plant = Realisation(A=wide, B=drive, C=rows, D=direct).sampled(sample_time, late=part)
+    u = _late(inputs, past, k)[first:, np.newaxis]
+    before = float(_late(inputs, past, k + 1)[first])
+    begun = _rest(kind, past) if state is None else state
+    x = np.zeros(len(plant.A))
+    x[:n] = begun
+    if part:
+        x[-1] = before
     found = np.empty((len(u), len(rows)))
-    begun = x.copy()
-    kernel.state_space(P, np.column_stack([now, before]), rows, reads, u, x, found)
+    kernel.state_space(plant.A, plant.B[:, np.newaxis], plant.C, plant.D[:, np.newaxis], u, x, found)
     beginnings = np.empty((len(u), n))
-    kernel.state_space(P[:n, :n].T, np.zeros((n, 1)), np.eye(n), np.zeros((n, 1)), u[:, :1], C.copy(), beginnings)
+    kernel.state_space(plant.A[:n, :n].T, np.zeros((n, 1)), np.eye(n), np.zeros((n, 1)), u, C.copy(), beginnings)
     if DEAD_TIME in names:  # a state that is given does not move with the dead time, whatever its rate was
-        rate = A @ begun[:n] + B * u[0, 1 if part else 0]
+        rate = A @ begun + B * (before if part else u[0, 0])
         found[:, -1] += beginnings @ rate
     return ProcessRun(output=found[:, 0], slopes=found[:, 1:], beginnings=beginnings)
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid.kernels import linear as kernel
-from sysid.models.process.process_run import held, parted
+from sysid.models.converting.realisation import Realisation, parted
 from sysid.reporting.linear_views import LinearView
 
 Matrix = NDArray[np.float64]
@@ -106,13 +106,15 @@ def step_responses(view: LinearView, n: int) -> Matrix:
             # To import it takes longer than all these pictures, and few models are continuous.
             from scipy import signal
 
-            k, part = parted(view.delay, 1.0)
-            arrived = np.column_stack([np.arange(n) >= k, np.arange(n) > k]).astype(np.float64)
+            k, part = parted(view.delay)
+            arrived = (np.arange(n) >= k).astype(np.float64)[:, np.newaxis]
             for row, b, f in zip(found, view.B[1:], view.F[1:], strict=True):
                 A, B, C, D = signal.tf2ss(b[::-1], f[::-1])
-                P, now, before = held(A, B[:, 0], view.sample_time, part)
-                reads, y = D * ([0.0, 1.0] if part else [1.0, 0.0]), np.empty((n, 1))
-                kernel.state_space(P, np.column_stack([now, before]), C, reads, arrived, np.zeros(len(A)), y)
+                one = Realisation(A=A, B=B[:, 0], C=C, D=D[0]).sampled(view.sample_time, late=part)
+                y = np.empty((n, 1))
+                kernel.state_space(
+                    one.A, one.B[:, np.newaxis], one.C, one.D[:, np.newaxis], arrived, np.zeros(len(one.A)), y
+                )
                 row[:] = y[:, 0]
     return np.nan_to_num(found)
 

@@ -1,5 +1,7 @@
 """Records whose inputs move between samples, and such as are held: told where a plant is fitted to the former."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -160,21 +162,23 @@ def continuous(poles: int, zeros: int) -> sysid.TransferFunction:
 
 def told_late(structure: sysid.TransferFunction, u: np.ndarray, y: np.ndarray) -> list[str]:
     fit = fitting.fit([trace_of(u, y, sample_time=T)], ONE, structure, start=ESTIMATED, stability=None)
-    return [told for told in fit.warnings if "ProcessModel" in told]
+    return [told for told in fit.warnings if "delays: auto" in told]
 
 
 @pytest.mark.parametrize("late", [0.5, 1.3])
 @pytest.mark.parametrize("poles", PLANTS)
-def test_a_dead_time_that_ends_between_samples_is_told_with_what_has_one(poles: int, late: float) -> None:
+def test_a_dead_time_that_ends_between_samples_is_found_and_one_of_whole_samples_told(poles: int, late: float) -> None:
     """Such fits ended 3 to 5 points below what the record allows, CONVERGED, without a word."""
     u, y = record(poles, "levels", noise=0.01, late=late)
-    (told,) = told_late(continuous(poles, poles - 1), u, y)
+    given = dataclasses.replace(continuous(poles, poles - 1), delays=(int(late),))
+    (told,) = told_late(given, u, y)
     assert "no whole number of samples" in told
     said = float(told.split(", and ")[1].split(" %")[0])
-    assert f"domain: discrete and zeros: {poles}" in told
-    discrete = sysid.TransferFunction(poles=poles, zeros=poles, domain="discrete")
-    fit = fitting.fit([trace_of(u, y, sample_time=T)], ONE, discrete, start=ESTIMATED, stability=None)
+    fit = fitting.fit(
+        [trace_of(u, y, sample_time=T)], ONE, continuous(poles, poles - 1), start=ESTIMATED, stability=None
+    )
     assert said == pytest.approx(100.0 * (1.0 - np.sqrt(fit.history["mse"][-1]) / np.std(y)), abs=0.3)
+    assert fit.model.delays[0] == pytest.approx(late, abs=0.02) and not fit.warnings
 
 
 def test_a_zero_that_is_missing_is_told_as_that() -> None:

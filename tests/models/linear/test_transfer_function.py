@@ -212,3 +212,42 @@ def test_moves_do_not_depend_on_the_units_of_time_and_output() -> None:
         numerators=[np.zeros(2)], denominators=[F], constant=0.0, delays=(0,), sample_time=T_, moving=(False,)
     )
     assert not nothing.moves(np.diag(nothing.vector), u, known=False)[:, 2:].any()
+
+
+LATE = (1.3, 0.75)
+
+
+@pytest.mark.parametrize("of", [LATE, (0.4, 2.0)], ids=str)
+def test_a_dead_time_between_samples_is_in_the_free_run_and_everywhere_else(of: tuple[float, ...]) -> None:
+    model, fine, u = build(Domain.CONTINUOUS, delays=of), 100, inputs()
+    total = np.zeros(len(u))
+    for j, late in enumerate(of):
+        num, den, _ = signal.cont2discrete((BC[j][::-1], FC[j][::-1]), T / fine, "zoh")
+        dead = round(late * fine)
+        held = np.concatenate([np.zeros(dead), np.repeat(u[:, j], fine)])[: len(u) * fine]
+        total += signal.lfilter(num.ravel(), den, held)[::fine]
+    np.testing.assert_allclose(model.simulate(u), total, atol=1e-9)
+    again = model_from_dict(json.loads(json.dumps(model.to_dict())))
+    np.testing.assert_array_equal(again.simulate(u), model.simulate(u))
+    assert model.structure.label == f"continuous TF [2 1; 1 0; {of[0]:g} {of[1]:g}]"
+    assert model.continuous().delays == pytest.approx([late * T for late in of])
+    assert model.ratio(0).delay == of[0]
+
+
+def test_the_free_run_moves_with_dead_times_between_samples() -> None:
+    model, u, h = build(Domain.CONTINUOUS, delays=LATE), inputs(), 1e-6
+    vector = model.polynomials.vector
+    assert vector[-2:] == pytest.approx(np.array(LATE) * T)
+    found = model.polynomials.moves(1e-3 * np.eye(len(vector))[:, -2:], u, known=False)
+    for j, column in enumerate(found.T):
+        there, back = (
+            build(Domain.CONTINUOUS, delays=tuple(np.array(LATE) + way * h * np.eye(2)[j])).simulate(u)
+            for way in (1.0, -1.0)
+        )
+        np.testing.assert_allclose(column, 1e-3 * (there - back) / (2 * h * T), atol=1e-6)
+
+
+def test_a_discrete_one_has_whole_samples() -> None:
+    with pytest.raises(ConfigError, match="a whole number"):
+        TransferFunction(poles=1, zeros=0, delays=1.5)
+    assert TransferFunction(poles=1, zeros=0, delays=2.0, domain="continuous").to_dict()["delays"] == [2]

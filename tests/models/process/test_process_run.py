@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sysid.models.process.process_run import parted, run
+from sysid.models.process.process_run import run
 from sysid.models.process.process_type import ProcessType
 
 PLANTS = {
@@ -61,13 +61,6 @@ def test_derivatives_are_those_of_differences(kind: str, values: list[float], be
 def test_at_rest_nothing_moves() -> None:
     of, own = ProcessType.parse("P2DZU"), np.array(PLANTS["P2DZU"])
     assert np.allclose(run(of, own, np.full(50, 3.0), 3.0, T).output, 6.0)
-
-
-@pytest.mark.parametrize(
-    ("dead", "found"), [(0.0, (0, 0.0)), (0.7, (7, 0.0)), (0.7 - 1e-12, (7, 0.0)), (0.7 + 1e-12, (7, 0.0))]
-)
-def test_a_dead_time_of_whole_samples_is_one_but_for_rounding(dead: float, found: tuple[int, float]) -> None:
-    assert parted(dead, 0.1) == found
 
 
 def test_slopes_of_polynomials_are_those_of_differences() -> None:

@@ -20,7 +20,7 @@ from sysid.estimation.linear.poles import scattered, sections_of, stabilised
 from sysid.estimation.linear.sanathanan_koerner import MAX_ITERATIONS, sk_poles
 from sysid.estimation.linear.transfer_function.integrators import all_at_one, with_integrators
 from sysid.estimation.linear.transfer_function.problem import AbstractProblem
-from sysid.estimation.linear.transfer_function.runs import End, tried
+from sysid.estimation.linear.transfer_function.runs import Delays, End, tried
 from sysid.estimation.linear.transfer_function.search import solve
 from sysid.estimation.linear.transfer_function.training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import Sections, SeparableProvider
@@ -137,7 +137,7 @@ class _Problem(AbstractProblem):
 
     def provider(
         self,
-        delays: tuple[int, ...],
+        delays: Delays,
         *,
         unknown: int | None = None,  # noqa: ARG002 - spectra have no first samples
     ) -> SeparableProvider:
@@ -320,7 +320,7 @@ class _Problem(AbstractProblem):
         span = int(min(max(10.0 / (slowest * unit), 10.0), 1e9))
         return scattered(n, span, unit, rng, self.orders.domain)
 
-    def _record(self, spectrum: Spectrum, delays: tuple[int, ...]) -> SpectralRecord:
+    def _record(self, spectrum: Spectrum, delays: Delays) -> SpectralRecord:
         s = 1j * spectrum.frequency
         T = self.terms.sample_time
         discrete = self.orders.domain is Domain.DISCRETE

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from sysid.estimation.linear.begun_at_rest import at_rest, moving
 from sysid.estimation.records.experiment import Experiment
 from sysid.models import Scaling
-from sysid.models.process.process_run import ProcessRun, parted, run
+from sysid.models.converting.realisation import parted
+from sysid.models.process.process_run import ProcessRun, run
 from sysid.models.process.process_type import DAMPING, DEAD_TIME, GAIN, ZERO, ProcessType
 from sysid.models.process.structure import ProcessModel
 
@@ -252,7 +253,7 @@ class Problem:
             The problem.
         """
         late = max((values[i] for i, (_, name) in enumerate(self.names) if name == DEAD_TIME), default=0.0)
-        k, part = parted(late, self.sample_time)
+        k, part = parted(late / self.sample_time)
         most = k + (part > 0.0)
         lost = [min(most, len(one.target) - 1) * (one.free and not one.rests) for one in self.records]
         moves = np.any([moving(one.inputs) for one in self.records], axis=0)

@@ -10,7 +10,7 @@ from sysid.estimation.linear.delay_search import CHANCE, READ_BACKWARDS, searche
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.poles import too_fast
 from sysid.estimation.linear.transfer_function.problem import AbstractProblem
-from sysid.estimation.linear.transfer_function.runs import EXACT, Candidate, short_run, tried
+from sysid.estimation.linear.transfer_function.runs import EXACT, Candidate, Delays, short_run, tried
 from sysid.estimation.nonparametric.dead_time import AROUND, around
 from sysid.models.converting.orthonormal_basis import Domain, section_poles
 
@@ -18,7 +18,7 @@ COMPARED = 2
 """Starts, the best as they are, from which a dead time is tried."""
 
 
-def found_delays(problem: AbstractProblem) -> tuple[tuple[int, ...], tuple[str, ...]]:
+def found_delays(problem: AbstractProblem) -> tuple[Delays, tuple[str, ...]]:
     """Those of the structure, or those of least error.
 
     Args:
@@ -62,7 +62,7 @@ class DelaySearch:
     """
 
     problem: AbstractProblem
-    reached: dict[tuple[int, ...], Candidate] = field(default_factory=dict)
+    reached: dict[Delays, Candidate] = field(default_factory=dict)
 
     def run(self, least: int, most: int) -> tuple[tuple[int, ...], tuple[str, ...]]:
         """Those of least loss, and what is to be said of the search.

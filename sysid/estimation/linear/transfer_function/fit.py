@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -25,7 +26,7 @@ from sysid.estimation.linear.transfer_function.delays import DelaySearch
 from sysid.estimation.linear.transfer_function.level import integrating, standing
 from sysid.estimation.linear.transfer_function.pole_moves import slowness
 from sysid.estimation.linear.transfer_function.problem import AbstractProblem, Score
-from sysid.estimation.linear.transfer_function.runs import End
+from sysid.estimation.linear.transfer_function.runs import Delays, End
 from sysid.estimation.linear.transfer_function.search import solve
 from sysid.estimation.linear.transfer_function.training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.variable_projection import SeparableProvider
@@ -36,6 +37,7 @@ from sysid.estimation.records.experiment import Experiment, experiments_of
 from sysid.estimation.records.informative import informative
 from sysid.estimation.results.result import FitResult
 from sysid.models import AbstractModel, Domain, Mapping, Scaling, Start, TransferFunction, TransferFunctionModel
+from sysid.models.converting.realisation import parted
 from sysid.traces import Trace
 
 
@@ -152,8 +154,9 @@ class _Problem(AbstractProblem):
     terms: Terms
     as_scored: Score = None
     rested: bool = True
+    between: bool = True
 
-    def provider(self, delays: tuple[int, ...], *, unknown: int | None = None) -> SeparableProvider:
+    def provider(self, delays: Delays, *, unknown: int | None = None) -> SeparableProvider:
         """The least-squares problem with these dead times; see the base class."""
         return SeparableProvider(
             poles=self.pole_parameters(max(len(e.output) for e in self.experiments)),
@@ -270,13 +273,13 @@ class _Problem(AbstractProblem):
         records = [record for record in provider.records if isinstance(record, TimeRecord)]
         return free_starts(records, self.orders.poles)
 
-    def _records(self, delays: tuple[int, ...], most: int | None) -> tuple[TimeRecord, ...]:
+    def _records(self, delays: Delays, most: int | None) -> tuple[TimeRecord, ...]:
         """Records whose first samples are left out where an input a dead time ago would come before a record.
 
         Dead times that are compared (up to ``most``) leave out the same samples: whether a record begins at rest is
         not judged by each of them.
         """
-        unknown, dead = (max(delays), min(delays)) if most is None else (most, 0)
+        unknown, dead = (math.ceil(max(delays)), int(min(delays))) if most is None else (most, 0)
         lost = [unknown] * len(self.experiments)
         if self.rested:
             lost = left_out([_beginning(experiment) for experiment in self.experiments], unknown, dead)
@@ -291,7 +294,7 @@ class _Problem(AbstractProblem):
             )
         return records
 
-    def _record(self, experiment: Experiment, delays: tuple[int, ...], unknown: int) -> TimeRecord:
+    def _record(self, experiment: Experiment, delays: Delays, unknown: int) -> TimeRecord:
         """A record with its measured history put before it."""
         measured = experiment.past is not None and experiment.past.any()
         inputs, output = experiment.inputs, experiment.output
@@ -302,9 +305,11 @@ class _Problem(AbstractProblem):
             output = np.concatenate([experiment.history.output, output])
             weights = np.concatenate([experiment.past_weights, weights])
         scaled, held = self.scaling.scale_inputs(inputs), self.scaling.scale_inputs(past[np.newaxis])[0]
-        rows = slice(unknown if experiment.free else 0, None)
+        first = unknown if experiment.free else 0
+        rows, (whole, late) = slice(first, None), zip(*map(parted, delays), strict=True)
+        delayed = delayed_inputs(scaled, held, whole)
         return TimeRecord(
-            inputs=np.asfortranarray(delayed_inputs(scaled, held, delays)[rows]),
+            inputs=np.asfortranarray(delayed[rows]),
             # From a state that is fitted any past can be reached, and zero is one that every system has.
             past=np.zeros(len(held)) if experiment.free else held,
             target=self.scaling.scale_output(output)[rows],
@@ -313,6 +318,8 @@ class _Problem(AbstractProblem):
             sample_time=self.terms.sample_time,
             free_start=experiment.free,
             moving=self.orders.moving(self.terms.mapping.inputs),
+            late=late,
+            before=delayed[first - 1] if first else held,
         )
 
 

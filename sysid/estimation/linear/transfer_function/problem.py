@@ -16,15 +16,19 @@ from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.delay_search import FEW
 from sysid.estimation.linear.pole_starts import PoleStart
 from sysid.estimation.linear.transfer_function.integrators import all_at_one, with_edge
-from sysid.estimation.linear.transfer_function.runs import End
+from sysid.estimation.linear.transfer_function.runs import Delays, End
 from sysid.estimation.linear.transfer_function.training import Terms, TransferFunctionTraining
 from sysid.estimation.linear.transfer_function.uncertainty import transfer_function_uncertainty
-from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider
+from sysid.estimation.linear.variable_projection import PoleParameters, SeparableProvider, Separated
 from sysid.estimation.results.uncertainty import Uncertainty
 from sysid.models import AbstractModel, Scaling, TransferFunction, TransferFunctionModel
 from sysid.models.converting.orthonormal_basis import Domain
+from sysid.models.converting.realisation import parted
 
 Score = Callable[[AbstractModel], float] | None
+
+APART = 1e-3
+"""Part of the way to the next whole sample by which a dead time is moved to see what that does."""
 
 
 class AbstractProblem(ABC):
@@ -34,11 +38,13 @@ class AbstractProblem(ABC):
     training: TransferFunctionTraining
     scaling: Scaling
     terms: Terms
+    between: bool = False
+    """Whether dead times that are searched may end between samples."""
     as_scored: Score = None
     """Of a model its error over the records from the start that was declared, where one was."""
 
     @abstractmethod
-    def provider(self, delays: tuple[int, ...], *, unknown: int | None = None) -> SeparableProvider:
+    def provider(self, delays: Delays, *, unknown: int | None = None) -> SeparableProvider:
         """The least-squares problem with these dead times.
 
         Args:
@@ -241,8 +247,25 @@ class AbstractProblem(ABC):
             rest_output=self.terms.rest_output,
         )
         # Of errors through a mirrored predictor the derivatives at fixed numerators are not known.
-        known = None if separated.mirrored else transfer_function_uncertainty(model, provider, separated)
+        known = None
+        if not separated.mirrored:
+            known = transfer_function_uncertainty(model, provider, separated, self._late(end, separated))
         return model, known
+
+    def _late(self, end: End, separated: Separated) -> dict[int, NDArray[np.float64]]:
+        """By input whose dead time was found between samples how the output moves with it, per second."""
+        found = {}
+        for j, delay in enumerate(end.delays):
+            part = parted(delay)[1]
+            if not part or self.orders.delays is not None:
+                continue
+            step, both = APART * min(part, 1.0 - part), []
+            for sign in (1.0, -1.0):
+                provider = self.provider((*end.delays[:j], delay + sign * step, *end.delays[j + 1 :]))
+                columns = tuple(record.columns(separated.bases) for record in provider.records)
+                both.append(provider.design(columns, separated.constants) @ separated.weights)
+            found[j] = (both[0] - both[1]) / (2.0 * step * self.terms.sample_time)
+        return found
 
     def at_one(self, end: End, *, every: bool = False) -> End:
         """The end with all poles at 1, and pairs on the circle, that records of this length do not tell from there.

@@ -18,6 +18,8 @@ from sysid.estimation.linear.transfer_function.training import TransferFunctionT
 from sysid.estimation.linear.variable_projection import Sections, SeparableProvider
 from sysid.estimation.results.result import Status
 
+Delays = tuple[float, ...]
+"""Dead time of each input in samples; those of a continuous transfer function may end between two."""
 SIGNIFICANT = 6.6
 """Drop of twice the log-likelihood that one more free parameter has by chance in one case of a hundred."""
 EXACT = 1e-20
@@ -54,7 +56,7 @@ class Candidate:
     """
 
     start: PoleStart
-    delays: tuple[int, ...]
+    delays: Delays
     provider: SeparableProvider
     theta: NDArray[np.float64]
     loss: float
@@ -73,7 +75,7 @@ class End:
         notes: What a reader should know.
     """
 
-    delays: tuple[int, ...]
+    delays: Delays
     provider: SeparableProvider
     theta: NDArray[np.float64]
     status: Status
@@ -128,7 +130,7 @@ class End:
         return bool(left * np.log((loss + floor) / (than + floor)) > SIGNIFICANT + free * np.log(n))
 
 
-def tried(start: PoleStart, delays: tuple[int, ...], provider: SeparableProvider) -> Candidate:
+def tried(start: PoleStart, delays: Delays, provider: SeparableProvider) -> Candidate:
     """A start as it is.
 
     Args:
@@ -144,7 +146,7 @@ def tried(start: PoleStart, delays: tuple[int, ...], provider: SeparableProvider
 
 
 def short_run(
-    start: PoleStart, delays: tuple[int, ...], provider: SeparableProvider, training: TransferFunctionTraining
+    start: PoleStart, delays: Delays, provider: SeparableProvider, training: TransferFunctionTraining
 ) -> Candidate:
     """A few steps from a start.
 

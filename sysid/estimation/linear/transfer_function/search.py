@@ -18,11 +18,21 @@ from sysid.estimation.least_squares.state import Iteration
 from sysid.estimation.linear import slow_poles
 from sysid.estimation.linear.delay_search import FEW, READ_BACKWARDS
 from sysid.estimation.linear.pole_starts import PoleStart
+from sysid.estimation.linear.transfer_function.between_samples import between_samples
 from sysid.estimation.linear.transfer_function.delays import delays_of_least_error, found_delays
 from sysid.estimation.linear.transfer_function.integrators import near_ones_put
 from sysid.estimation.linear.transfer_function.pole_moves import filled_up, next_smaller, slowness
 from sysid.estimation.linear.transfer_function.problem import AbstractProblem, Score
-from sysid.estimation.linear.transfer_function.runs import EXACT, Candidate, End, Watch, long_run, short_run, tried
+from sysid.estimation.linear.transfer_function.runs import (
+    EXACT,
+    Candidate,
+    Delays,
+    End,
+    Watch,
+    long_run,
+    short_run,
+    tried,
+)
 from sysid.estimation.linear.transfer_function.words import of_level, of_speed, of_stability, of_starts
 from sysid.estimation.linear.variable_projection import Sections
 from sysid.estimation.nonparametric.dead_time import descend
@@ -78,6 +88,8 @@ def solve(own: AbstractProblem, began: float, on_iteration: Callable[[Iteration]
         reached, told = from_part
     if reached is None:
         raise FitDivergedError("no start gives a finite free run", remedy="lower the number of poles")
+    if own.between and own.orders.delays is None:
+        reached = replace(reached, end=between_samples(reached.problem, reached.end, watch, score))
     end, unit = reached.end, own.scaling.output_scale**2
     model, uncertainty = reached.problem.model(end)
     fast, slow = (*of_speed(model), *own.at_end(end)), own.told(end)
@@ -95,7 +107,7 @@ def solve(own: AbstractProblem, began: float, on_iteration: Callable[[Iteration]
         uncertainty=uncertainty,
         notes=(
             *reached.notes,
-            f"Dead times in samples: {', '.join(map(str, end.delays))}."
+            f"Dead times in samples: {', '.join(f'{k:.6g}' for k in end.delays)}."
             + intersample.told(own.orders.moving(own.terms.mapping.inputs), own.terms.mapping.inputs),
             *(told if reached.problem is own else ()),
             *end.notes,
@@ -145,23 +157,23 @@ def _from_part(
     return Reached(problem=problem, end=end, notes=(*found.notes, part.about_part())), told
 
 
-def _delays_near(own: AbstractProblem, delays: tuple[int, ...], sections: Sections) -> tuple[int, ...]:
+def _delays_near(own: AbstractProblem, delays: Delays, sections: Sections) -> tuple[int, ...]:
     """Dead times of least error over all samples, by descent from those of a part of them and its poles."""
-    least, most = own.delay_range()
-    reach, quick = min(most, max(delays) + FEW), replace(own.training, short_iterations=QUICK)
-    start, known = PoleStart(name="stretches", sections=sections), dict[tuple[int, ...], float]()
+    (least, most), begun = own.delay_range(), tuple(map(int, delays))
+    reach, quick = min(most, max(begun) + FEW), replace(own.training, short_iterations=QUICK)
+    start, known = PoleStart(name="stretches", sections=sections), dict[Delays, float]()
 
-    def loss(of: tuple[int, ...]) -> float:
+    def loss(of: Delays) -> float:
         if of not in known:
             known[of] = short_run(start, of, own.provider(of, unknown=reach), quick).loss
         return known[of]
 
-    return descend(delays, least, reach, loss)
+    return descend(begun, least, reach, loss)
 
 
 def _reached(
     own: AbstractProblem,
-    delays: tuple[int, ...],
+    delays: Delays,
     watch: Watch,
     score: Score,
     known: dict[TransferFunction, Reached | None],
@@ -189,7 +201,7 @@ def _reached(
 
 
 def _smaller(
-    own: AbstractProblem, delays: tuple[int, ...], watch: Watch, known: dict[TransferFunction, Reached | None]
+    own: AbstractProblem, delays: Delays, watch: Watch, known: dict[TransferFunction, Reached | None]
 ) -> list[Reached]:
     """What the structures that this one contains reach, each as it would alone."""
     found = []
@@ -230,7 +242,7 @@ def _snapped(own: AbstractProblem, end: End, ceiling: float) -> End:
 
 
 def _free_poles(
-    own: AbstractProblem, end: End, delays: tuple[int, ...], watch: Watch, score: Score
+    own: AbstractProblem, end: End, delays: Delays, watch: Watch, score: Score
 ) -> tuple[AbstractProblem, End]:
     """The same without bounds on the poles, where the data ask for it: plants that integrate, or are unstable.
 

@@ -16,31 +16,37 @@ from sysid.models import TransferFunctionModel
 from sysid.models.converting import orthonormal_basis as bases
 from sysid.models.converting.orthonormal_basis import Domain
 
+Late = dict[int, NDArray[np.float64]] | None
+
 
 def transfer_function_uncertainty(
-    model: TransferFunctionModel, provider: SeparableProvider, solution: Separated
+    model: TransferFunctionModel, provider: SeparableProvider, solution: Separated, late: Late = None
 ) -> Uncertainty:
-    """What simulation errors say about numerators, denominators and the constant, in the channels' units.
+    """What simulation errors say about numerators, denominators, the constant and dead times, in the channels' units.
 
     Args:
         model: The fitted model.
         provider: The least-squares problem.
         solution: Its linear part at the minimum.
+        late: By input whose dead time was found between samples how the weighted output moves with it, per second.
 
     Returns:
-        The uncertainty: ``B(input, power)``, ``F(input, power)``, ``constant``.
+        The uncertainty: ``B(input, power)``, ``F(input, power)``, ``constant``, ``Td(input)`` in seconds.
     """
     with np.errstate(all="ignore"):  # what the data leave open has a variance beyond all numbers
-        found = _uncertainty(model, provider, solution)
+        found = _uncertainty(model, provider, solution, late or {})
     open_ = ~np.isfinite(np.diag(found.covariance))
     covariance = found.covariance.copy()
     covariance[open_] = covariance[:, open_] = np.nan
     return replace(found, covariance=covariance)
 
 
-def _uncertainty(model: TransferFunctionModel, provider: SeparableProvider, solution: Separated) -> Uncertainty:
+def _uncertainty(
+    model: TransferFunctionModel, provider: SeparableProvider, solution: Separated, late: dict[int, NDArray[np.float64]]
+) -> Uncertainty:
     linear = provider.design(solution.columns, solution.constants)
-    J = np.concatenate([linear, provider.tangents(solution)], axis=1)
+    moved = [column[:, np.newaxis] for column in late.values()]
+    J = np.concatenate([linear, provider.tangents(solution), *moved], axis=1)
     variance = float(solution.residual @ solution.residual) / max(provider.n_samples - J.shape[1], 1)
     if not np.isfinite(J).all():  # a free run beyond all numbers says nothing about its parameters
         J = np.zeros_like(J)
@@ -54,7 +60,7 @@ def _uncertainty(model: TransferFunctionModel, provider: SeparableProvider, solu
     hang = _coloured(provider, solution.residual, J @ root)
     if hang is not None:
         root = root @ sandwich(np.eye(len(hang)), hang, provider.n_samples)
-    names, values, rows = _polynomials(model, J.shape[1])
+    names, values, rows = _polynomials(model, J.shape[1], tuple(late))
     spread = rows @ root
     unit = model.scaling.output_scale**2
     covariance = variance * (spread @ spread.T)
@@ -79,13 +85,13 @@ def _coloured(
 
 
 def _polynomials(
-    model: TransferFunctionModel, width: int
+    model: TransferFunctionModel, width: int, late: tuple[int, ...]
 ) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
-    """Names, values and derivatives of all polynomial coefficients with respect to taps and sections."""
+    """Names, values and derivatives of all coefficients and dead times by taps, sections and dead times."""
     names: list[str] = []
     values: list[float] = []
     rows: list[NDArray[np.float64]] = []
-    tap, coefficient = 0, width - sum(model.orders.poles)
+    tap, coefficient = 0, width - sum(model.orders.poles) - len(late)
     for j, name in enumerate(model.mapping.inputs):
         basis = model.basis(j)
         gain = model.scaling.output_scale / model.scaling.input_scale[j]
@@ -111,6 +117,10 @@ def _polynomials(
         row[tap] = model.scaling.output_scale
         names.append("constant")
         values.append(model.scaling.output_offset + model.scaling.output_scale * model.constant)
+        rows.append(row)
+    for row, j in zip(np.eye(width)[width - len(late) :], late, strict=True):
+        names.append(f"Td({model.mapping.inputs[j]})")
+        values.append(model.delays[j] * model.sample_time)
         rows.append(row)
     return tuple(names), np.array(values), np.array(rows)
 
