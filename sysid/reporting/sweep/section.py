@@ -81,9 +81,13 @@ def sweep_points(folder: Path, published: PublishedTable | None) -> list[tuple[s
     # A search may have held parts of records out, where nothing is declared to choose; its choice says which.
     chose = "what chose" if record.method == "auto" else TRACES[record.choose_on]
     trials = "1 trial" if len(record.trials) == 1 else f"{len(record.trials)} trials"
+    below = min(record.tried_in_full, key=record.choice, default=winner)
+    first = record.choice(below) >= least
+    # A search may take a smaller model, one that is stable, or one that is nearer the others beyond the records.
+    beside = "" if first else f"; {below.label} has the least, {quantity(record.choice(below), unit)}"
     text = (
-        f"{winner.label} has the least {FIGURES[record.choose_by].words} on {chose}, "
-        f"{quantity(least, unit)}, of {trials} ({_shown(record)}). They took "
+        f"{winner.label} has {'the least' if first else 'a'} {FIGURES[record.choose_by].words} on {chose}"
+        f"{', ' if first else ' of '}{quantity(least, unit)}, of {trials} ({_shown(record)}){beside}. They took "
         f"{seconds(record.wall_s)} on {record.workers} worker{'s' if record.workers != 1 else ''}."
     )
     best = next(iter(_published(record, published)["error"]), None)

@@ -207,10 +207,14 @@ def cost_table(record: SweepRecord) -> Table:
         share = f" on {rung['record']:.0%} of the record" if rung["record"] < 1.0 else ""
         rows.append((f"dropped after {rung['iterations']} iterations{share}", str(dropped)))
     unusable = sum(not trial.usable and trial.dropped_at is None for trial in trials)
+    ended = [trial.cpu_s for trial in trials if trial.cpu_s > 0.0]  # of what was stopped no time is known
     rows += [
-        ("trained in full and unusable", str(unusable)),
+        ("failed, stopped, or not usable", str(unusable)),
         ("wall time", seconds(record.wall_s)),
-        ("processor time of all trials", seconds(sum(t.cpu_s for t in trials if math.isfinite(t.cpu_s)))),
+        (
+            f"processor time of {'all trials' if len(ended) == len(trials) else 'trials that ended'}",
+            seconds(sum(ended)),
+        ),
         ("workers", str(record.workers)),
         ("method", record.method),
         (

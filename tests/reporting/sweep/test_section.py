@@ -160,7 +160,7 @@ def timed(seconds: float) -> dict[str, TrialCase]:
 def test_what_it_took_is_told() -> None:
     words = dict(texts(cost_table(record())))
     assert words["dropped after 5 iterations on 50% of the record"] == "1"
-    assert words["trained in full and unusable"] == "1"
+    assert words["failed, stopped, or not usable"] == "1"
 
 
 def test_maps_are_over_the_two_longest_ranges() -> None:
@@ -216,6 +216,20 @@ def test_the_verdict_tells_what_the_sweep_found_beside_what_is_published_and_wha
     for words in ("17 trained in full and usable", "1 dropped before their end", "1 unstable in free run"):
         assert words in text
     assert f"{best.label} has {quantity(mean_not_fitted(best), 'psi²')} on average".replace("\u00a0", " ") in text
+
+
+def test_the_verdict_calls_no_error_the_least_that_is_not(tmp_path: Path) -> None:
+    """A search may choose a smaller model, and its error had been called the least of all."""
+    least, other = sorted(record().tried_in_full, key=lambda t: t.selection_free_run_mse)[:2]
+    told = {}
+    for winner in (least, other):
+        write_sweep(tmp_path, record(method="auto", winner=winner.number, beside=[]))
+        ((_, text),) = sweep_points(tmp_path, None)
+        told[winner.label] = text.replace("\u00a0", " ")
+    ours, theirs = (quantity(one.selection_free_run_mse, "psi²").replace("\u00a0", " ") for one in (other, least))
+    assert told[least.label].startswith(f"{least.label} has the least free-run mse on what chose, {theirs}, of 18")
+    assert told[other.label].startswith(f"{other.label} has a free-run mse on what chose of {ours}, of 18 trials")
+    assert f"; {least.label} has the least, {theirs}." in told[other.label]
 
 
 def test_published_values_are_drawn_at_the_trials_of_their_structures() -> None:
