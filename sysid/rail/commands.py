@@ -5,7 +5,6 @@ Named in the entry-point group ``sysid.commands``, so that no other room knows o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,11 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sysid.errors import ConfigError
+from sysid.rail.written import write_table_and_picture
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from sysid.rail.dynamics.track import TrackProfile
     from sysid.rail.dynamics.train import Train
     from sysid.rail.track.features import Feature
@@ -112,7 +109,7 @@ def terrain(
             "effective_grade": grades, "correlation": felt,
         }  # fmt: skip
         spans = [(one.start / 1000.0, one.end / 1000.0, f"{one.kind}, {one.severity.value}") for one in found]
-        _save(out, "terrain", columns, x=x / 1000.0, label="position of the leading end [km]", rows=[
+        write_table_and_picture(out, "terrain", columns, x=x / 1000.0, label="position of the leading end [km]", rows=[
             ("elevation [m]", columns["elevation_m"]), ("correlation [per mille]", 1000.0 * felt),
             ("effective grade [per mille]", 1000.0 * grades),
         ], spans=spans)  # fmt: skip
@@ -214,7 +211,7 @@ def drive(
             "time_s": run.motion.time, "position_m": run.position, "speed_m_s": run.speed, "limit_m_s": limits,
             "notch": run.notch.astype(float),
         }  # fmt: skip
-        _save(out, "drive", columns, x=run.position / 1000.0, label="distance [km]", rows=[
+        write_table_and_picture(out, "drive", columns, x=run.position / 1000.0, label="distance [km]", rows=[
             ("speed [km/h]", 3.6 * run.speed), ("limit [km/h]", np.where(np.isfinite(limits), 3.6 * limits, np.nan)),
             ("notch", columns["notch"]), ("elevation [m]", line.elevation(run.position)),
         ])  # fmt: skip
@@ -269,7 +266,7 @@ def eot(
             for ends, values in (("both", found.both), ("one", found.one))
             for place, node in places.items()
         }
-        _save(out, "eot", columns, x=found.time, label="time [s]")
+        write_table_and_picture(out, "eot", columns, x=found.time, label="time [s]")
 
 
 @app.command(epilog="Example: sysid rail stops --friction 0.7 --grade -0.01")
@@ -320,7 +317,7 @@ def stops(
             for name, channel in (("wanted_m_s", "V_REF"), ("speed_m_s", "V"), ("deceleration_m_s2", "A"),
                                   ("signal_mA", "P"), ("modifier", "M"))
         }  # fmt: skip
-        _save(out, "stops", columns, x=columns["time_s"], label="time of all stops [s]")
+        write_table_and_picture(out, "stops", columns, x=columns["time_s"], label="time of all stops [s]")
 
 
 def _line(path: Path, section: str | None) -> Any:
@@ -350,55 +347,3 @@ def _only_said(dry_run: bool, out: Path | None, name: str, record: Path | None =
         files = [str(record)] * (record is not None) + [f"{out}/{name}.csv and .svg"] * (out is not None)
         typer.echo("nothing is done: --dry-run" + (f"; it would write {', '.join(files)}" if files else ""))
     return dry_run
-
-
-def _save(
-    folder: Path,
-    name: str,
-    columns: dict[str, NDArray[np.float64]],
-    *,
-    x: NDArray[np.float64],
-    label: str,
-    rows: Sequence[tuple[str, NDArray[np.float64]]] = (),
-    spans: Sequence[tuple[float, float, str]] = (),
-) -> None:
-    """The table, and a picture of some rows, or of every column but the time."""
-    import numpy as np
-
-    from sysid.atomic import replacing
-
-    folder.mkdir(parents=True, exist_ok=True)
-    with replacing(folder / f"{name}.csv") as draft:
-        table = np.column_stack(list(columns.values()))
-        np.savetxt(draft, table, fmt="%.9g", delimiter=",", header=",".join(columns), comments="")
-    typer.echo(f"written: {folder / f'{name}.csv'}")
-    shown = rows or [(one.replace("_", " "), values) for one, values in columns.items() if one != "time_s"]
-    _picture(folder / f"{name}.svg", x, label, shown, spans)
-
-
-def _picture(
-    file: Path,
-    x: NDArray[np.float64],
-    label: str,
-    rows: Sequence[tuple[str, NDArray[np.float64]]],
-    spans: Sequence[tuple[float, float, str]],
-) -> None:
-    """One panel a row, what is marked shaded in all of them."""
-    from matplotlib.figure import Figure
-
-    from sysid.atomic import replacing
-
-    figure = Figure(figsize=(8.0, 1.8 * len(rows)), layout="constrained")
-    panels = figure.subplots(len(rows), 1, sharex=True)
-    for panel, (title, values) in zip(panels, rows, strict=True):
-        panel.plot(x, values, linewidth=1.2, color="#1f5a96")
-        panel.set_ylabel(title, fontsize=8)
-        panel.grid(visible=True, alpha=0.3)
-        for first, last, _ in spans:
-            panel.axvspan(first, last, color="#d9822b", alpha=0.2)
-    for first, last, said in spans:
-        panels[0].annotate(said, (0.5 * (first + last), panels[0].get_ylim()[1]), ha="center", va="bottom", fontsize=7)
-    panels[-1].set_xlabel(label)
-    with replacing(file) as draft:
-        figure.savefig(draft, format="svg", metadata={"Date": None})
-    typer.echo(f"written: {file}")

@@ -27,7 +27,7 @@ from sysid.ingest.inspecting.time_findings import (
     step_beside,
     without_copies,
 )
-from sysid.ingest.readers.trees.records import role_of
+from sysid.ingest.readers.trees.roles import role_of
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.options import FileOptions, RepairOptions, TimeOptions
 from sysid.ingest.tables.over_frequency import frequencies_in, swept_beside

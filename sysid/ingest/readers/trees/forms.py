@@ -12,7 +12,7 @@ import numpy as np
 from sysid.errors import ReaderError
 from sysid.ingest.readers.trees.joining import joined_signals
 from sysid.ingest.readers.trees.leaves import Leaf, Whole, leaf_of, number_of, refused, texts_of
-from sysid.ingest.readers.trees.records import role_of
+from sysid.ingest.readers.trees.roles import role_of
 from sysid.ingest.readers.trees.stacks import taken_apart
 from sysid.ingest.tables.joining import Signal
 from sysid.ingest.tables.time_columns import is_called_time

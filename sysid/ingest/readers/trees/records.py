@@ -12,17 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sysid.ingest.readers.trees.roles import PIECES, WORDS, role_of
 from sysid.ingest.tables.columns import RawColumn
 from sysid.ingest.tables.table import RawTable, RecordChoice
 from sysid.ingest.tables.time_columns import recognise_time
 
-_ROLES = {
-    "estimation": {"est", "estimation", "estim", "id", "ident", "idn", "identification", "train", "training", "trn"},
-    "validation": {"val", "valid", "validation", "vali", "ver", "verification", "vrf", "vld", "check", "chk"},
-    "test": {"test", "testing", "tst"},
-    "selection": {"sel", "selection"},
-}
-_WORDS = {word: role for role, words in _ROLES.items() for word in words}
 _SHORT = {"e": "estimation", "v": "validation"}
 _ENDINGS = ("train", "test", "est", "val", "id")
 _NUMBERED = re.compile(
@@ -31,7 +25,6 @@ _NUMBERED = re.compile(
     re.IGNORECASE,
 )
 _MANY = 3  # names with both letters, from which on it is no chance
-_PIECES = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^A-Za-z\d]+")
 _INDEXED = re.compile(r".*\{\d+\}")
 
 
@@ -54,18 +47,6 @@ class Found:
     column: RawColumn
     step: float | None
     whole: bool
-
-
-def role_of(name: str) -> str | None:
-    """What a record may be used for, by a word in its name.
-
-    Args:
-        name: For example ``"id"``, ``"run_val"``, ``"TestData"``.
-
-    Returns:
-        The role, or ``None`` if no word says one.
-    """
-    return next((_WORDS[piece] for piece in map(str.casefold, _PIECES.findall(name)) if piece in _WORDS), None)
 
 
 def records_of(table: RawTable, found: list[Found], *, separator: str, head: str = "") -> tuple[RecordChoice, ...]:
@@ -267,10 +248,10 @@ def _agreeing(tags: dict[str, dict[str, Found]]) -> dict[str, dict[str, Found]]:
 
 def _word_tag(name: str) -> tuple[str, str] | None:
     """``uEst``, ``u_est``, ``est_u``, ``uest`` to the stem and the word."""
-    pieces = _PIECES.findall(name)
+    pieces = PIECES.findall(name)
     for word, rest in ((pieces[-1:], pieces[:-1]), (pieces[:1], pieces[1:])):
         stem = "".join(rest).strip("_ .-")
-        if stem and word[0].casefold() in _WORDS:
+        if stem and word[0].casefold() in WORDS:
             return stem, word[0]
     ending = next((word for word in _ENDINGS if name.endswith(word)), "")
     return (name.removesuffix(ending), ending) if ending and name != ending else None

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sysid.ingest import read_table
-from sysid.ingest.readers.trees.records import role_of
+from sysid.ingest.readers.trees.roles import role_of
 
 LONG, SHORT = np.arange(20.0), np.arange(12.0)
 
