@@ -26,6 +26,8 @@ _OF_TEXT = frozenset({"csv", "excel"})
 _LONG_SHARE = 0.6
 _CHANGE_SHARE = 0.5
 _FEW_TEXTS = 3
+_STATE_OF_A_POINT = re.compile(r"\[-\d+\] \D+")
+"""``[-11059] No Good Data``, as historians write in place of a value."""
 _CALLED_NAMES = re.compile(
     r"(?:signal|tag|variable|var|channel|sensor|parameter|measurement|metric|point|item|kanal|messstelle|größe|grandeur)s?"
     r"(?:[ _]?(?:name|id|tag))?|name|_field|(?:tag|point)name",
@@ -152,6 +154,8 @@ def _missing(table: RawTable) -> dict[str, Any] | None:
 
 def _is_remark(text: str) -> bool:
     plain = text.casefold()
+    if _STATE_OF_A_POINT.fullmatch(text):
+        return True
     return not any(map(str.isdigit, text)) and plain not in TRUTH and not any(plain in pair for pair in PAIRS)
 
 

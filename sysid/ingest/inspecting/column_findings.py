@@ -62,6 +62,8 @@ def _told(column: RawColumn, problem: ReaderError) -> str:
     """Why a column cannot be used; words that might be states are quoted."""
     words = column.words
     few = words is not None and words.complete and 1 < len(words.texts) <= _FEW_STATES
+    if column.strange:
+        return f"{problem.what}: {', '.join(repr(text[:30]) for text in column.strange[:3])}"
     if words is None or not few or problem.what == UNKNOWN_DATES:
         return problem.what
     quoted = ", ".join(f"{text[:20]!r}" for text in words.texts)

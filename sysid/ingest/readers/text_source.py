@@ -9,7 +9,7 @@ import lzma
 import re
 import zipfile
 import zlib
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,12 +34,6 @@ _ASCII_INSIDE = {"utf-8", "utf-8-sig", "cp1252", "iso8859-1", "iso8859-15", "asc
 _FEWEST_LINES = 8
 _START = 256
 _GARBLED = re.compile("[\u00a1-\u00ff]{3}|\ufffd")
-_IN_CHINESE = re.compile(rb"(?:[\xa1-\xa9\xb0-\xd7][\xa1-\xfe])+")
-_KOREAN = range(0xB0, 0xC9)
-"""How the syllables of Korean begin in its own encoding; words of these alone may be either's."""
-_LETTER = "[\u3040-\u30ff\u4e00-\u9fff]"
-_IN_JAPANESE = re.compile(rf"(?!.*(?:[A-Za-z]{_LETTER}|{_LETTER}[A-Za-z]))(?:[\0-\x7f]|{_LETTER})+", re.DOTALL)
-_IN_CYRILLIC = re.compile(rb"[\xc0-\xdf]*[\xe0-\xff]*")
 _PACKED = (
     (b"\x1f\x8b", "gzip"),
     (b"BZh", "bzip2"),
@@ -208,34 +202,6 @@ def seems_garbled(names: Iterable[str]) -> bool:
         (True, False)
     """
     return any(_GARBLED.search(name) for name in names)
-
-
-def meant_encoding(names: Sequence[str]) -> str | None:
-    """The encoding in which names that were read in Windows-1252 are words.
-
-    Args:
-        names: As they were read.
-
-    Returns:
-        The encoding; ``None`` where they may be words as they are, or it is another one.
-
-    Example:
-        >>> meant_encoding(["Âðåìÿ, ñ", "Äàâëåíèå"]), meant_encoding(["Ê±¼ä(s)", "µçÑ¹(V)"]), meant_encoding(["Größe"])
-        ('cp1251', 'gb18030', None)
-    """
-    try:
-        text = "\n".join(names).encode("cp1252")
-    except UnicodeEncodeError:
-        return None
-    if sum(0x81 <= one <= 0x9F for one in text) > 1 and _IN_JAPANESE.fullmatch(text.decode("cp932", "replace")):
-        return "cp932"
-    words = re.findall(rb"[\x80-\xff]+", text)
-    if not seems_garbled(names):
-        return None
-    if all(map(_IN_CYRILLIC.fullmatch, words)):
-        return "cp1251"
-    chinese = all(map(_IN_CHINESE.fullmatch, words)) and any(one not in _KOREAN for word in words for one in word[::2])
-    return "gb18030" if chinese else None
 
 
 def not_text(path: Path, tries: list[str], problem: Exception) -> ReaderError:

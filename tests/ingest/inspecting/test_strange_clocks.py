@@ -152,6 +152,17 @@ def test_one_sample_is_not_proposed(tmp_path: Path) -> None:
         propose_dataset(inspect_file(write(tmp_path, "t [s],u [V]\n0,1\n")))
 
 
+@pytest.mark.parametrize(
+    ("cell", "told"), [("[-11059] No Good Data", "missing"), ("<0.1", "'<0.1'"), ("1.5*", "'1.5*'")]
+)
+def test_what_stands_among_numbers_is_quoted(tmp_path: Path, cell: str, told: str) -> None:
+    text = "t [s],u [V],y [V]\n" + "".join(f"{k / 10},{U[k]},{cell if k in {7, 8} else Y[k]}\n" for k in range(N))
+    found = inspect_file(write(tmp_path, text))
+    assert any(told in one for one in found.problems if "y" in one)
+    (y,) = (one for one in found.columns if one.name == "y")
+    assert y.missing == 2 or cell in y.problem
+
+
 def test_words_that_may_be_states_are_quoted(tmp_path: Path) -> None:
     text = "t [s],mode,y [V]\n" + "".join(f"{k / 10},{('Off', 'Heat', 'Cool')[k // 7 % 3]},{Y[k]}\n" for k in range(N))
     (mode,) = (one for one in inspect_file(write(tmp_path, text)).columns if one.name == "mode")

@@ -19,6 +19,9 @@ from sysid.written_units import USUAL_UNITS
 BLANKS = " "
 """The separator that stands for a run of blanks and tabs."""
 
+MOST_LINES = 64
+"""Lines of a table that lies on its side, at most: each is a channel."""
+
 
 class Kind(enum.Enum):
     """What a cell looks like."""

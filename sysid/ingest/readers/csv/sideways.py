@@ -11,12 +11,13 @@ import numpy as np
 from sysid.ingest.cells.calendar import is_calendar
 from sysid.ingest.cells.headers import is_unit, parse_header, split_reference
 from sysid.ingest.cells.numbers import NumberFormat
+from sysid.ingest.readers.csv.cells import MOST_LINES
 from sysid.ingest.tables.columns import RawColumn, array_column, distinct
 from sysid.ingest.tables.table import RawTable
 from sysid.ingest.tables.time_columns import recognise_time
 
-_MOST, _LEAST = 64, 8
-"""Channels at most, and samples at least."""
+_LEAST = 8
+"""Samples at least."""
 _NAMELESS, _LONGER = 32, 4
 """Samples that lines of numbers alone have at least, and how many times as many as there are lines."""
 _MOST_LABELS = 6
@@ -38,7 +39,7 @@ def sideways(path: Path, lines: Sequence[str], *, comment: str | None) -> RawTab
         or numbers alone, many more of them. The first line may lack a name, as that of a turned index does.
     """
     kept = [line.strip() for line in lines if line.strip() and line.lstrip()[0] not in (comment or "#%")]
-    if not 1 < len(kept) <= _MOST:
+    if not 1 < len(kept) <= MOST_LINES:
         return None
     for separator, decimal in _SEPARATORS:
         cells = [line.rstrip(separator).split(separator) for line in kept]

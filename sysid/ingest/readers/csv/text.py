@@ -18,13 +18,11 @@ from sysid.ingest.cells.calendar import Calendar
 from sysid.ingest.cells.headers import Header, parse_headers, split_reference
 from sysid.ingest.cells.words import WordCollector, states_for
 from sysid.ingest.readers.csv.above import NO_UNITS
-from sysid.ingest.readers.csv.bad_cells import not_a_number
 from sysid.ingest.readers.csv.beside import records_beside
 from sysid.ingest.readers.csv.body import AnyColumn, Body, Counts, Numbers, Stamps, Texts
-from sysid.ingest.readers.csv.cells import Kind, unit_text
+from sysid.ingest.readers.csv.cells import MOST_LINES, Kind, unit_text
 from sysid.ingest.readers.csv.layout import Layout, recognise
 from sysid.ingest.readers.csv.rewritten import in_a_table
-from sysid.ingest.readers.csv.sideways import sideways
 from sysid.ingest.readers.reader import Reader
 from sysid.ingest.readers.sheets import SheetText
 from sysid.ingest.readers.text_source import (
@@ -32,7 +30,6 @@ from sysid.ingest.readers.text_source import (
     TextFile,
     ZeroBytesError,
     encodings,
-    meant_encoding,
     not_text,
     seems_garbled,
 )
@@ -58,8 +55,11 @@ def _read(path: Path, options: FileOptions, repairs: RepairOptions) -> RawTable:
             table = table_of_text(text, options, repairs)
             if isinstance(text, SheetText):
                 return replace(table, notes=(*text.notes, *table.notes))
-            meant = meant_encoding(table.names) if encoding == "cp1252" and options.encoding is None else None
-            if meant is None:
+            if encoding != "cp1252" or options.encoding is not None:
+                return table
+            from sysid.ingest.readers.csv.meant import meant_encoding  # here: most files are in UTF-8
+
+            if (meant := meant_encoding(table.names)) is None:
                 return table
             table = table_of_text(TextFile(path=path, encoding=meant), options, repairs)
             told = f"the names are words in {meant}, which is a guess (encoding: {meant})"
@@ -88,9 +88,15 @@ def table_of_text(file: TextFile | SheetText, options: FileOptions, repairs: Rep
     """
     path = file.path
     lines, whole = file.head()
-    lying = sideways(path, lines, comment=options.comment) if whole else None
-    if lying is not None:
-        return lying
+    if (
+        whole
+        and sum(bool(line.strip()) and line.lstrip()[0] not in (options.comment or "#%") for line in lines)
+        <= MOST_LINES
+    ):
+        from sysid.ingest.readers.csv.sideways import sideways  # here: most tables are longer
+
+        if (lying := sideways(path, lines, comment=options.comment)) is not None:
+            return lying
     layout = recognise(lines, options, path, whole=whole)
     headers = _headers(layout, options, path)
     time = _calendar_column(headers, layout, options)
@@ -370,6 +376,8 @@ def _numbers(header: Header, column: Numbers | Counts, layout: Layout, path: Pat
         values[values == number - (column.origin or 0 if isinstance(column, Counts) else 0)] = np.nan
     problem = None
     if column.strange:
+        from sysid.ingest.readers.csv.bad_cells import not_a_number  # here: most tables have none
+
         cell, line = next(iter(column.strange.items()))
         problem = not_a_number(cell, header, line=line, layout=layout, path=path)
         values = np.full(len(values), np.nan)
