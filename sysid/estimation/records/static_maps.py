@@ -15,9 +15,11 @@ Records = Sequence[tuple[Array, Array]]
 LEFT = 0.1
 """Share of an output's standard deviation up to which what is near in the inputs may leave it unexplained. What settles
 within a sample is a map, too; what remembers is far off where an input has just moved. For each input of those that
-move, where outputs stand exactly wherever inputs do, as those of models: of more inputs fewer points are near."""
+move, where outputs stand but for their noise wherever inputs do: of more inputs fewer points are near."""
 STILL = 1e-9
 """Share of an output's range by which it may move while it stands."""
+MOST_OF, MORE = 95.0, 1.5
+"""Percentage of the samples at which noise is looked at too, and times of what it moves an output by that are noise."""
 MEANT = 75.0
 """Percentage of points that have to be explained so: a few lie at a corner of the map, or where none is near."""
 FEWEST, MOST, PARTS = 40, 5_000, 6
@@ -56,14 +58,20 @@ def is_static(records: Records) -> bool:
 
 
 def _stand(records: Records) -> bool:
-    """Whether no output moves in the sample after inputs have, where these then stay."""
+    """Whether outputs move no more in the sample after inputs have than later, where inputs stay: by their noise."""
     span = np.ptp(np.concatenate([y for _, y in records]), axis=0)
-    after: list[Array] = []
+    after, later = list[Array](), list[Array]()
     for u, y in records:
         moves = (np.diff(u, axis=0) != 0.0).any(axis=1)
-        after.append(np.abs(np.diff(y, axis=0))[1:][moves[:-1] & ~moves[1:]])
-    moved = np.concatenate(after)
-    return len(moved) >= FEWEST and bool((moved <= STILL * span).all())
+        steps = np.abs(np.diff(y, axis=0))[1:]
+        after.append(steps[moves[:-1] & ~moves[1:]])
+        later.append(steps[~moves[:-1] & ~moves[1:]])
+    first, noise = np.concatenate(after), np.concatenate(later)
+    if min(len(first), len(noise)) < FEWEST:
+        return False
+    usual, most = (np.percentile(noise, rank, axis=0) for rank in (MEANT, MOST_OF))
+    at = [np.percentile(first, rank, axis=0) for rank in (MEANT, MOST_OF)]
+    return bool(((at[0] <= MORE * usual + STILL * span) & (at[1] <= MORE * most + STILL * span)).all())
 
 
 def _halves(records: Records) -> list[tuple[Array, Array]]:
