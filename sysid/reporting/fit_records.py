@@ -101,7 +101,9 @@ class LearningCurve(Record):
 class EvidenceRecord(Record):
     """What Bayesian regularisation found."""
 
-    log_evidence: Number = Field(description="Logarithm of the marginal likelihood.")
+    log_evidence: Number = Field(
+        description="Of the marginal likelihood; where errors persist, of an independent one, times the samples."
+    )
     correlation_time: Number = Field(default=math.nan, description="Samples after which a residual is news.")
     alphas: dict[str, Number] = Field(default={}, description="Precision of the prior, per group of weights.")
     effective_parameters: dict[str, Number] = Field(default={}, description="Per group of weights.")

@@ -24,8 +24,10 @@ system are correlated over tens to hundreds of samples (:math:`\tau`, ``correlat
 :math:`\beta` too large by that factor and switches the regularisation off. The likelihood is therefore raised to the
 power :math:`1/\tau`: :math:`N/\tau` samples of loss :math:`E_D/\tau`. With :math:`\tau = 1` this is MacKay's update.
 
-Limits: the update does not guarantee that the evidence increases; a power of the likelihood is an approximation, so
-that evidences of fits with different :math:`\tau` are not strictly comparable.
+Starts of one structure end with different :math:`\tau`, and an evidence of more samples is the larger one whatever they
+say. So it is told for all of them, :math:`\tau \ln p(D)`: what one independent sample says, :math:`N` times.
+
+Limits: the update does not guarantee that the evidence increases; a power of the likelihood is an approximation.
 """
 
 from __future__ import annotations
@@ -145,7 +147,8 @@ def update(prior: Prior, theta: NDArray[np.float64], at: Linearisation, n_sample
     energies = np.array([0.5 * np.sum((theta - prior.centre)[group.members] ** 2) for group in prior.groups])
     penalised = prior.beta * at.loss + float(prior.alphas @ energies)
     evidence = Evidence(
-        log_evidence=-penalised - 0.5 * log_det + 0.5 * independent * float(np.log(prior.beta * tau / (2.0 * np.pi))),
+        log_evidence=tau * (-penalised - 0.5 * log_det)
+        + 0.5 * n_samples * float(np.log(prior.beta * tau / (2.0 * np.pi))),
         beta=prior.beta * tau,
         alphas=_named(prior.groups, prior.alphas),
         effective_parameters=_named(prior.groups, gammas),

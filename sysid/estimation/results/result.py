@@ -58,7 +58,8 @@ class Evidence:
     """What Bayesian regularisation found.
 
     Args:
-        log_evidence: Logarithm of the marginal likelihood of the scaled residuals.
+        log_evidence: Logarithm of the marginal likelihood of the scaled residuals; where these persist, that of an
+            independent one, as many times as there are samples.
         beta: Precision of the scaled residuals.
         alphas: Precision of the prior of each group of weights.
         effective_parameters: Number of parameters that the data determine, per group.
