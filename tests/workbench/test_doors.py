@@ -91,7 +91,7 @@ FITS = [
     pytest.param(NARX | {"output_delays": []}, {"seed": 7, "max_iterations": 4}, EVERYWHERE, id="NARX of inputs alone"),
     pytest.param(NARX | {"limits": [None, 130]}, {"seed": 7, "max_iterations": 4}, EVERYWHERE, id="NARX with a limit"),
     pytest.param(
-        NARX | {"gated": True}, {"seed": 7, "max_iterations": 6, "pretraining": 60, "starts": 3, "ensemble": 2},
+        NARX | {"gated": True}, {"seed": 7, "max_iterations": 4, "pretraining": 20, "starts": 3, "ensemble": 2},
         EVERYWHERE, id="NARX gated, an ensemble",
     ),
     pytest.param(NSS, {"seed": 7, "max_iterations": 8, "starts": 2}, ALONE, id="NSS"),
@@ -189,13 +189,15 @@ def said(fit: FitResult) -> dict[str, Any]:
 
 @pytest.fixture
 def place(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A workspace in which no report is written: it is not what is compared."""
+    """A workspace in which no report is written, nor many first blocks are tried: it is not what is compared."""
 
     def no_report(folder: Path) -> Path:
         (folder / "page").touch()
         return folder / "page"
 
     monkeypatch.setattr("sysid.reporting.report.write_report", no_report)
+    monkeypatch.setattr("sysid.estimation.blocks.first_block.DRAWN", 20)
+    monkeypatch.setattr("sysid.estimation.blocks.first_block.EVALUATIONS", 6)
     return workspace
 
 

@@ -55,6 +55,6 @@ def small() -> Iterator[None]:
     """A search that tries little, and looks at the data without an order search."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sysid.workbench.auto.ledger.FAMILIES", SMALL)
-        patch.setattr("sysid.workbench.auto.parts.SEARCH", {"max_iterations": 30, "starts": 4})
+        patch.setattr("sysid.workbench.auto.parts.SEARCH", {"max_iterations": 15, "starts": 4})
         patch.setattr("sysid.workbench.auto.plan.suggested", lambda *_, **__: [])
         yield

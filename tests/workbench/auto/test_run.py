@@ -41,10 +41,10 @@ from tests.workbench.auto.conftest import data, record, traces
 
 pytestmark = pytest.mark.usefixtures("small")
 
-FEW = 480
+FEW = 240
 """Iterations of two linear structures and two networks, four times each, and of one network again."""
-SEVERAL = 3 * FEW
-"""The same, with iterations for the best network from other starts."""
+SEVERAL = 6 * FEW
+"""The same of trials that are ``longer``, with iterations for the best network from other starts."""
 FIELDS: dict[str, Any] = {"kind": "auto", "name": "tries", "data": "rig", "mapping": "u -> y", "workers": 1}
 FIELDS |= {"export": None, "stability": {"count": 15}}
 
@@ -63,6 +63,12 @@ def searched(folder: Path, known: Data, *, told: list[Event] | None = None, find
 
 def tried(found: Searched) -> list[tuple[int, str, float]]:
     return [(one.number, one.label, one.selection_free_run_mse) for one in found.record.trials]
+
+
+@pytest.fixture
+def longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trials of twice as many iterations, where it matters how well they fit."""
+    monkeypatch.setattr("sysid.workbench.auto.parts.SEARCH", {"max_iterations": 30, "starts": 4})
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +118,7 @@ def test_the_chosen_one_is_fitted_once_more_to_all_of_the_record(first: tuple[Pa
     assert any("once more" in note for note in best.notes)
 
 
+@pytest.mark.usefixtures("longer")
 def test_where_its_starts_are_apart_the_last_fit_is_the_mean_of_several(
     tmp_path: Path, known: Data, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -264,8 +271,9 @@ def test_declared_selection_traces_choose_and_what_they_chose_is_exported_as_it_
     assert best.exports[0].largest_difference < 1e-9
 
 
+@pytest.mark.usefixtures("longer")
 def test_several_outputs_are_one_search(tmp_path: Path) -> None:
-    found = searched(tmp_path, data(record("a", 150, outputs=2)), mapping="u -> y1+y2")
+    found = searched(tmp_path, data(record("a", 150, outputs=2)), mapping="u -> y1+y2", iterations=2 * FEW)
     winner = found.record.winning
     assert winner is not None
     assert found.record.unit == "σ"  # errors count over each output's variance
