@@ -42,12 +42,12 @@ LENGTHS = {
 
 
 SHORT = {
-    "abdx-service": ["VAL02", "VAL03", "VAL04"],
-    "abdx-combined": ["VAL03", "VAL05"],
+    "abdx-service": ["VAL04"],
+    "abdx-combined": ["VAL05"],
     "abdx-selection": ["SEL02"],
     "abdx-combined-selection": ["SEL03"],
-    "abdx-combined-selection-literal": ["SEL08"],
-    "ab-linear": ["VAL02", "VAL04"],
+    "abdx-combined-selection-literal": ["SEL06"],
+    "ab-linear": ["VAL02"],
     "ab-linear-selection": ["SEL04"],
 }
 """Cases that are simulated here; the long ones take 2.5 s each and differ by their commands only."""

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid.estimation import FitResult, Loop, Status
+from sysid.estimation import FitResult, Loop, StabilityOptions, Status
 from sysid.export import EXPORTERS, Surrogate, expected_flags, export_bundle, read_bundle
 from sysid.export.differences import largest_difference
+from sysid.export.expected_runs import RANDOM_SEQUENCES, random_cases
 from sysid.export.exporter import Runner
 from sysid.export.forms.layout import layout_of
 from sysid.kernels.neurons import NEURONS
@@ -285,7 +286,10 @@ def with_another(trace: Trace) -> Trace:
     return replace(trace, channels=channels, values=np.column_stack([trace.values, 0.1 * trace["BC"]]))
 
 
-def test_a_bundle_carries_one(model, traces, tmp_path) -> None:
+def test_a_bundle_carries_one(model, traces, tmp_path, monkeypatch) -> None:
+    """Checked over few sequences: what many tell of a model is looked at with the checks."""
+    monkeypatch.setattr("sysid.export.stability.StabilityOptions", partial(StabilityOptions, count=15))
+    monkeypatch.setattr("sysid.export.writing.random_cases", partial(random_cases, sequences=RANDOM_SEQUENCES // 10))
     fit = FitResult(
         model=model, status=Status.CONVERGED, loop=Loop.CLOSED, train_time_s=1.0,
         history={"iteration": np.arange(2.0), "mse": np.array([2.0, 1.0])},

@@ -69,7 +69,7 @@ def off(found: Found, runs: Records) -> Array:
 
 @pytest.mark.parametrize("name", PLANTS)
 def test_a_loop_is_found_and_runs_on_over_records_that_it_has_not_seen(name: str) -> None:
-    found = found_loop(records(name, 12))
+    found = found_loop(records(name, 8))
     assert found is not None
     assert found.loop.kind in PLANTS[name][0]
     assert np.quantile(off(found, records(name, 40, seed=1)), 0.95) < 0.01
