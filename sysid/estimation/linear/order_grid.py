@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 from sysid.errors import ConfigError
@@ -61,8 +62,9 @@ class OrderGrid:
         Returns:
             The number.
         """
+        counts = math.prod(high - low + 1 for low, high in self._ranges(n_inputs))
         nk = self.max_nk - self.min_nk + 1
-        return int((self.max_na - self.min_na + 1) * len(self.counts(n_inputs)) * nk ** (n_inputs - self.read))
+        return int((self.max_na - self.min_na + 1) * counts * nk ** (n_inputs - self.read))
 
     def least(self, n_inputs: int) -> list[int]:
         """Smallest number of past values of each input.
@@ -95,8 +97,11 @@ class OrderGrid:
         Returns:
             One tuple per combination.
         """
-        ends = zip(self.least(n_inputs), self.most(n_inputs), strict=True)
-        return list(itertools.product(*(range(low, high + 1) for low, high in ends)))
+        return list(itertools.product(*(range(low, high + 1) for low, high in self._ranges(n_inputs))))
+
+    def _ranges(self, n_inputs: int) -> list[tuple[int, int]]:
+        """Smallest and largest number of past values of each input."""
+        return list(zip(self.least(n_inputs), self.most(n_inputs), strict=True))
 
     def lags(self, n_inputs: int) -> Lags:
         """All that any candidate looks at.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -82,6 +84,15 @@ def test_criteria_are_what_their_authors_wrote() -> None:
     assert losses.score(Criterion.AIC)[0] == pytest.approx(n * np.log(v) + 2 * p)
     assert losses.score(Criterion.AICC)[0] == pytest.approx(n * np.log(v) + 2 * p + 2 * p * (p + 1) / (n - p - 1))
     assert losses.score(Criterion.BIC)[0] == pytest.approx(n * np.log(v) + p * np.log(n))
+
+
+def test_candidates_of_many_inputs_are_counted_without_being_made() -> None:
+    """What says that a search is too large made all combinations for it: of eight inputs half a million."""
+    grid = OrderGrid(max_na=4, max_nb=6, max_nk=1)
+    assert len(grid.counts(3)) == 6**3
+    assert grid.size(3) == 4 * 6**3 * 2**3
+    assert grid.size(20) == 4 * 6**20 * 2**20
+    assert replace(grid, read=2).size(20) == 4 * 6**18 * 5**2 * 2**18
 
 
 def test_shortlist_has_the_best_of_every_size() -> None:
