@@ -73,6 +73,7 @@ def write_workspace(folder: Path) -> None:
     }
     (data / "dataset.yaml").write_text(yaml.safe_dump(description, allow_unicode=True), encoding="utf-8")
     common = {"data": "hostile", "start": "first-sample", "mapping": {"inputs": list(INPUTS), "output": OUTPUT}}
+    common["stability"] = {"count": 20}
     many = len(INPUTS)
     pipeline = {
         **common,
@@ -90,6 +91,7 @@ def write_workspace(folder: Path) -> None:
         "method": "grid",
         "choose": {"by": "free_run_mse", "on": "selection"},
         "workers": 1,
+        "export": None,
     }
     for name, content in (("hostile", pipeline), ("swept", sweep)):
         (folder / "pipelines" / f"{name}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
