@@ -67,7 +67,7 @@ def tried(found: Searched) -> list[tuple[int, str, float]]:
 
 @pytest.fixture
 def longer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Trials of twice as many iterations, where it matters how well they fit."""
+    """Trials of twice as many iterations, where it matters how far they came: that there are none left, or how well."""
     monkeypatch.setattr("sysid.workbench.auto.parts.SEARCH", {"max_iterations": 30, "starts": 4})
 
 
@@ -262,6 +262,7 @@ def test_another_seed_is_another_search(first: tuple[Path, Searched], known: Dat
     assert tried(again) != tried(first[1])
 
 
+@pytest.mark.usefixtures("longer")
 def test_declared_selection_traces_choose_and_what_they_chose_is_exported_as_it_is(tmp_path: Path) -> None:
     known = data(record("a", 150), others={Role.SELECTION: record("b", 100, seed=2)})
     found = searched(tmp_path, known, iterations=200, export={"formats": ["onnx"]})
