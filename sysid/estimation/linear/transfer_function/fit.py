@@ -319,7 +319,7 @@ class _Problem(AbstractProblem):
             free_start=experiment.free,
             moving=self.orders.moving(self.terms.mapping.inputs),
             late=late,
-            before=delayed[first - 1] if first else held,
+            before=delayed[first - 1] if 0 < first <= len(delayed) else held,  # no row is left of a shorter record
         )
 
 
