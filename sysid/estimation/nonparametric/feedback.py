@@ -185,8 +185,10 @@ def _beyond_turns(blocks: Sequence[NDArray[np.float64]], count: int, past: int, 
     Q = np.linalg.qr(known)[0]
     moves = moves - Q @ (Q.T @ moves)
     Q = np.linalg.qr(output - Q @ (Q.T @ output))[0]
-    turned = np.random.default_rng(0).choice([-1.0, 1.0], (TURNS, len(moves))) * moves
-    return bool(np.sum((Q.T @ moves) ** 2) > np.sum((turned @ Q) ** 2, axis=1).max())
+    rng, own = np.random.default_rng(0), float(np.sum((Q.T @ moves) ** 2))
+    # One by one: all at once would be as many copies of the record.
+    turned = (rng.choice([-1.0, 1.0], len(moves)) * moves for _ in range(TURNS))
+    return all(float(np.sum((one @ Q) ** 2)) < own for one in turned)
 
 
 def _curved(s: Segment, at: slice) -> list[NDArray[np.float64]]:

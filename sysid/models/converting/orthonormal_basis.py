@@ -235,7 +235,7 @@ def responses(basis: Sequence[BasisSection], variable: NDArray[np.complex128]) -
 
 
 def powers_of(variable: NDArray[np.complex128], order: int) -> NDArray[np.complex128]:
-    """Powers by multiplication: NumPy's ``**`` takes a logarithm of every complex number, and ten times as long.
+    """Powers by multiplication: NumPy's ``**`` takes a logarithm of every complex number.
 
     Args:
         variable: Shape ``(n_points,)``.
